@@ -1,0 +1,91 @@
+"""Asks, in a process of its own, about a suite's solvers: forms, version, faults of their options.
+
+A library that prints or crashes while it is imported then harms no run, and the driver stays light.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from problems.errors import Fault, InputError
+from solvers.base import Form
+
+from .suite import Suite
+
+
+@dataclass(frozen=True)
+class Description:
+    """The forms a solver takes, the version of what solves, and a hash of the code here that calls it."""
+
+    forms: list[Form]
+    version: str
+    code: str
+
+    @property
+    def usual_form(self) -> Form:
+        """The dual where the solver takes it."""
+        return "dual" if "dual" in self.forms else self.forms[0]
+
+
+def describe(suite: Suite) -> list[Description]:
+    """A description for each of the suite's solver entries. Raises InputError, all faults at once."""
+    from .measure import environment
+
+    question = json.dumps({"solvers": [[e.name, e.options] for e in suite.solver], "plugin": suite.plugin})
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "harness.describe"],
+        input=question,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        env=environment(1),
+    )
+    if done.returncode != 0:
+        names = ", ".join(dict.fromkeys(entry.name for entry in suite.solver))
+        last = (done.stderr.strip().splitlines() or [""])[-1]
+        why = f"importing one of these ended with exit code {done.returncode} {last}".strip()
+        raise InputError.one(suite.plugin or f"suite {suite.name}", "solver", names, why)
+    said = json.loads(done.stdout.splitlines()[-1])
+    if said["faults"]:
+        raise InputError([Fault(**fault) for fault in said["faults"]])
+    return [Description(**found) for found in said["found"]]
+
+
+def main() -> None:
+    from solvers.registry import make_solver, solver_version
+
+    question = json.loads(sys.stdin.read())
+    plugin = Path(question["plugin"]) if question["plugin"] else None
+    found, faults = [], []
+    for name, options in question["solvers"]:
+        try:
+            solver = make_solver(name, options, plugin)
+            code = code_of(type(solver).__module__)
+            found.append(asdict(Description(list(solver.forms), solver_version(name, plugin), code)))
+        except InputError as error:
+            faults += [asdict(fault) for fault in error.faults]
+    print()
+    print(json.dumps({"found": found, "faults": faults}, default=repr))
+
+
+def code_of(module: str) -> str:
+    """Hash of the sources in `solvers` that a module is made of: its own and those it takes names from."""
+    sources: dict[str, str] = {}
+    todo = [module]
+    while todo:
+        name = todo.pop()
+        if name not in sources and (name == module or name.startswith("solvers.")):
+            sources[name] = inspect.getsource(sys.modules[name])
+            values = list(vars(sys.modules[name]).values())
+            todo += [v.__name__ if inspect.ismodule(v) else str(getattr(v, "__module__", "")) for v in values]
+    return hashlib.sha256("".join(sources[name] for name in sorted(sources)).encode()).hexdigest()[:12]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+"""What an answer is judged on: a scene's data and its reference; and what the report needs of them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from problems.assembly import LoadCase, Prepared
+from problems.build import Progress, load_case, prepared
+from problems.effects.fasteners import Fasteners
+from problems.scene import Scene, read_scene
+
+from . import records
+from .judge import Judgement, judge
+from .reference import Reference, reference
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A scene that is ready to be measured and judged on. reference_s : what its reference took."""
+
+    scene: Scene
+    prepared: Prepared
+    load: LoadCase
+    reference: Reference
+    reference_s: float
+
+    def judge_file(self, path: Path, limit_mm: float) -> Judgement:
+        """Judge a saved answer; one that cannot be read is none."""
+        try:
+            with np.load(path) as saved:
+                x, lam = saved["x"], saved["lam"]
+        except Exception:  # numpy, zipfile and zlib raise kinds of their own
+            return Judgement("no_answer", self.reference.bound_mm)
+        return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
+
+
+def ground(source: str, progress: Progress = lambda text, fraction: None) -> Ground:
+    """Open or build a scene, by name or path, and its reference. Raises InputError."""
+    scene = read_scene(source)
+    data = prepared(scene, progress)
+    load = load_case(scene, data)
+    progress("reference", 0.0)
+    start = time.perf_counter()
+    return Ground(scene, data, load, reference(scene.key, data, load), time.perf_counter() - start)
+
+
+def record(ground: Ground, directory: Path) -> None:
+    """Put the scene into DIRECTORY/problems.jsonl and its contacts into DIRECTORY/scenes/NAME.npz."""
+    scene, facts, known = ground.scene, ground.prepared.facts, ground.reference
+    row = {
+        "scene": scene.name,
+        "title": scene.title,
+        "scene_key": scene.key,
+        "n": ground.prepared.assembly.n,
+        "m": ground.prepared.assembly.m,
+        "active": int(known.active.sum()),
+        **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},
+        "build_s": facts.get("seconds"),
+        "reference_s": ground.reference_s,
+        "reference_bound_mm": known.bound_mm,
+        "reference_route": known.route,
+    }
+    path = directory / "problems.jsonl"
+    others = [other for other in records.read_whole(path) if other["scene"] != scene.name]
+    records.rewrite(path, [*others, row])
+    arrays = {
+        "gap_before": ground.load.g,
+        "gap_after": ground.load.g - ground.prepared.assembly.A.T @ known.x,
+        "lam": known.lam,
+    }
+    nodes = ground.prepared.assembly.contact_nodes
+    if nodes is not None:
+        arrays["contact_nodes"] = nodes
+    if scene.joint:
+        places = [effect.positions(scene.joint) for effect in scene.effects if isinstance(effect, Fasteners)]
+        if places:
+            arrays["fasteners"] = np.concatenate(places)
+    np.savez(directory / "scenes" / (scene.name.replace("/", "_") + ".npz"), **arrays)

@@ -1,0 +1,64 @@
+"""What the measurements were made on, and with which versions."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+PACKAGES = ("rivetbench", "numpy", "scipy", "qpsolvers", "osqp", "clarabel", "proxsuite", "piqp")
+
+
+def machine() -> dict[str, Any]:
+    """CPU, cores, memory, system, BLAS kernels and versions; `machine` names it in one line."""
+    cpu, cores = _cpu_model(), usable_cores()
+    system = f"{platform.system()} {platform.release()}"
+    return {
+        "machine": f"{cpu}, {cores} cores, {system}",
+        "cpu": cpu,
+        "cores": cores,
+        "memory_mib": physical_memory_mib(),
+        "system": system,
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        "blas": _blas(),
+        "versions": {name: installed_version(name) for name in PACKAGES},
+    }
+
+
+def usable_cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def physical_memory_mib() -> int:
+    return int(psutil.virtual_memory().total // 2**20)
+
+
+def installed_version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _cpu_model() -> str:
+    info = Path("/proc/cpuinfo")
+    for line in info.read_text().splitlines() if info.exists() else []:
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _blas() -> list[str]:
+    """The BLAS libraries of numpy and scipy: kind, version, kernels, threads by default."""
+    import scipy.linalg  # noqa: F401  loads scipy's own
+    import threadpoolctl
+
+    pools = [pool for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"]
+    names = ("internal_api", "version", "architecture")
+    return sorted({" ".join(str(pool[name]) for name in names if pool.get(name)) for pool in pools})

@@ -1,0 +1,186 @@
+"""From a suite to the list of measurements, in the order in which they are made."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from problems.errors import Fault, InputError
+from problems.scene import read_scene
+from solvers.base import FORMS, Form
+
+from .suite import SolverEntry, Suite, checked, found_scenes
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One solver on one scene in one form: what one process will do.
+
+    scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
+    """
+
+    suite: str
+    scene: str
+    source: str
+    solver: str
+    form: Form
+    variant: str
+    options: dict[str, Any]
+    tolerance: float
+    threads: int
+    repeat: int
+    time_limit_s: float
+    memory_limit_mib: int
+    limit_mm: float
+    gated: bool
+    plugin: str | None = None
+
+    @cached_property
+    def key(self) -> str:
+        """Identity of the measurement, the same in every run: '4386/0107 ipm dual tol=1e-09 …'."""
+        words = [self.scene, self.solver, self.form, *([self.variant] if self.variant else [])]
+        words += [f"tol={self.tolerance:g}", f"threads={self.threads}", f"repeat={self.repeat}"]
+        return " ".join(words + ([json.dumps(self.options, sort_keys=True)] if self.options else []))
+
+    @property
+    def stem(self) -> str:
+        """A file name for it."""
+        words = [self.scene, self.solver, self.form, self.variant, f"{self.tolerance:g}"]
+        words += [f"t{self.threads}", f"r{self.repeat}"]
+        return re.sub(r"[^\w.+-]+", "-", "_".join(filter(None, words)))
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """What the command line changes in a suite; empty or None leaves it as it is."""
+
+    sizes: tuple[int, ...] = ()
+    scenes: tuple[str, ...] = ()
+    solvers: tuple[str, ...] = ()
+    forms: tuple[Form, ...] = ()
+    tolerances: tuple[float, ...] = ()
+    repeats: int | None = None
+    threads: tuple[int, ...] = ()
+    time_limit_s: float | None = None
+    memory_limit_mib: int | None = None
+    plugin: Path | None = None
+
+
+def overridden(suite: Suite, change: Overrides) -> Suite:
+    """The suite with the command line's changes. Raises InputError, all faults at once.
+
+    --scene takes the place of the suite's scenes; --size keeps those of that size; --solver keeps
+    those entries and adds a plain one for a solver that the suite does not name; --plugin adds its own.
+    """
+    faults: list[Fault] = []
+    data = suite.model_dump(exclude_none=True)
+    if change.scenes:
+        data["scenes"] = found_scenes(list(change.scenes), "--scene", "scene", Path.cwd(), faults)
+    if change.sizes:
+        sizes = dict(_sizes(data["scenes"])) if not faults else {}
+        for size in set(change.sizes) - set(sizes.values()):
+            allowed = ", ".join(map(str, sorted(set(sizes.values()))))
+            faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
+        data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
+    plugin = str(change.plugin.resolve()) if change.plugin else suite.plugin
+    if change.solvers:
+        data["solver"] = [entry for entry in data["solver"] if entry["name"] in change.solvers]
+    named = {entry["name"] for entry in data["solver"]}
+    own = [change.plugin.stem] if change.plugin and not change.solvers else []
+    data["solver"] += [{"name": name} for name in (*change.solvers, *own) if name not in named]
+    for entry in data["solver"]:
+        if change.forms:
+            entry["forms"] = list(change.forms)
+        if change.tolerances:
+            entry.pop("tolerances", None)
+        if change.time_limit_s is not None:
+            entry.pop("time_limit_s", None)
+    changes = {
+        "tolerances": list(change.tolerances),
+        "repeats": change.repeats,
+        "threads": list(change.threads),
+        "time_limit_s": change.time_limit_s,
+        "memory_limit_mib": change.memory_limit_mib,
+        "plugin": plugin,
+    }
+    data |= {key: value for key, value in changes.items() if value not in ([], None)}
+    if faults:
+        raise InputError(faults)
+    return checked(data, Path("command line"))
+
+
+def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
+    for scene in scenes:
+        size = read_scene(scene).expected_size
+        if size is not None:
+            yield scene, size[0]
+
+
+def expand(suite: Suite) -> list[Measurement]:
+    """All measurements of a suite, by scene. Repeats are interleaved, each round shuffled with a seed
+    of its own, so that a drift of the machine does not fall on one solver.
+
+    Raises InputError where nothing is left to measure or two files have the same scene name.
+    """
+    names: dict[str, str] = {}
+    faults: list[Fault] = []
+    for source in suite.scenes:
+        try:
+            name = read_scene(source).name
+        except InputError as error:
+            faults += error.faults
+            continue
+        if name in names.values():
+            faults.append(Fault(suite.name, "scenes", source, f"another is called {name} too; rename it"))
+        names[source] = name
+    if faults:
+        raise InputError(faults)
+    plan: dict[str, Measurement] = {}
+    for source, name in names.items():
+        entries = [entry for entry in suite.solver if _takes(entry, name, source)]
+        for repeat in range(suite.repeats):
+            once = [made for entry in entries for made in _of_entry(suite, entry, name, source, repeat)]
+            if suite.repeats > 1:
+                random.Random(f"{name} {repeat}").shuffle(once)
+            for measurement in once:
+                plan.setdefault(measurement.key, measurement)
+    if not plan:
+        restricted = {entry.name: entry.scenes for entry in suite.solver}
+        raise InputError.one(suite.name, "scenes", suite.scenes, f"no solver is for these: {restricted}")
+    return list(plan.values())
+
+
+def _of_entry(
+    suite: Suite, entry: SolverEntry, scene: str, source: str, repeat: int
+) -> Iterator[Measurement]:
+    tolerances = entry.tolerances or suite.tolerances
+    for form, tolerance, threads in product(entry.forms or FORMS, tolerances, suite.threads):
+        yield Measurement(
+            suite=suite.name,
+            scene=scene,
+            source=source,
+            solver=entry.name,
+            form=form,
+            variant=entry.variant,
+            options=entry.options,
+            tolerance=tolerance,
+            threads=threads,
+            repeat=repeat,
+            time_limit_s=entry.time_limit_s or suite.time_limit_s,
+            memory_limit_mib=suite.memory_limit_mib,
+            limit_mm=suite.limit_mm,
+            gated=entry.gated,
+            plugin=suite.plugin,
+        )
+
+
+def _takes(entry: SolverEntry, name: str, source: str) -> bool:
+    return entry.scenes is None or any(fnmatchcase(name, glob) or glob == source for glob in entry.scenes)

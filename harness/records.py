@@ -1,0 +1,147 @@
+"""The files of a results directory: rows that survive whatever ends the run.
+
+A row is one JSON line in measurements.jsonl, appended, flushed and synced before the next
+measurement starts. The one damage that a sudden end can do is a torn last line; it is set aside.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import filelock
+import numpy as np
+
+from problems.errors import InputError
+
+Row = dict[str, Any]
+
+MEASUREMENTS = "measurements.jsonl"
+TORN = "measurements.torn"
+OUTDATED = "measurements.outdated.jsonl"
+
+
+def to_line(row: Row) -> str:
+    """One line of strict JSON: figures that are not finite become null."""
+    return json.dumps(_plain(row), ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    match value:
+        case None | bool() | int() | str():
+            return value
+        case float():
+            return value if math.isfinite(value) else None
+        case np.generic():
+            return _plain(value.item())
+        case np.ndarray():
+            return _plain(value.tolist())
+        case dict():
+            return {str(k): _plain(v) for k, v in value.items()}
+        case list() | tuple() | set():
+            return [_plain(v) for v in value]
+    return str(value)
+
+
+def append(path: Path, row: Row) -> None:
+    """Append one line and force it to the disk; on a failure (a full disk) leave the file as it was."""
+    with path.open("ab") as file:
+        size = file.seek(0, os.SEEK_END)
+        try:
+            file.write(to_line(row).encode() + b"\n")
+            file.flush()
+            os.fsync(file.fileno())
+        except OSError:
+            os.truncate(path, size)
+            raise
+
+
+def read(path: Path) -> list[Row]:
+    """All rows. Raises InputError naming the line that is torn or no JSON; no file is no rows."""
+    rows, torn = _split(path)
+    if torn:
+        raise InputError.one(
+            path,
+            f"line {len(rows) + 1}",
+            torn.decode(errors="replace"),
+            "torn by an interrupted run; `run` into the same directory sets it aside and goes on",
+        )
+    return rows
+
+
+def read_whole(path: Path) -> list[Row]:
+    """The rows that can be read, for a file that is made anew with each of them."""
+    return _split(path)[0]
+
+
+def set_torn_aside(path: Path) -> bool:
+    """Move a torn last line into measurements.torn; says whether there was one."""
+    _, torn = _split(path)
+    if torn:
+        with path.with_name(TORN).open("ab") as file:
+            file.write(torn + b"\n")
+        os.truncate(path, path.stat().st_size - len(torn))
+    return bool(torn)
+
+
+def _split(path: Path) -> tuple[list[Row], bytes]:
+    """The whole rows, and the bytes of a torn last line."""
+    content = path.read_bytes() if path.exists() else b""
+    *lines, last = content.split(b"\n")
+    rows: list[Row] = []
+    for number, line in enumerate(lines, start=1):
+        row = _parse(line)
+        if row is None and number == len(lines) and not last:
+            return rows, line + b"\n"
+        if row is None:
+            raise InputError.one(path, f"line {number}", line.decode(errors="replace"), "not a JSON object")
+        rows.append(row)
+    return rows, last
+
+
+def _parse(line: bytes) -> Row | None:
+    try:
+        row = json.loads(line)
+    except ValueError:
+        return None
+    return row if isinstance(row, dict) else None
+
+
+def rewrite(path: Path, rows: list[Row]) -> None:
+    """Put `rows` in the place of the file's, at once or not at all."""
+    replace_text(path, "".join(to_line(row) + "\n" for row in rows))
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a file at once or not at all."""
+    new = path.with_name(path.name + ".new")
+    with new.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    new.replace(path)
+
+
+@contextmanager
+def held(directory: Path) -> Iterator[None]:
+    """Make the directory and hold it against a second run. Raises InputError if that cannot be."""
+    try:
+        (directory / "answers").mkdir(parents=True, exist_ok=True)
+        (directory / "scenes").mkdir(exist_ok=True)
+        lock = filelock.FileLock(directory / ".lock", timeout=0)
+        lock.acquire()
+    except filelock.Timeout:
+        raise InputError.one(
+            "--out", "directory", str(directory), "another run is writing here: wait for it, or name another"
+        ) from None
+    except OSError as error:
+        raise InputError.one("--out", "directory", str(directory), f"cannot be written: {error}") from error
+    try:
+        yield
+    finally:
+        lock.release()

@@ -1,0 +1,206 @@
+"""Runs a suite: scene by scene, one worker process a measurement, one row each, resumable at any point."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from contextlib import suppress
+from dataclasses import asdict
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from problems.errors import Fault, InputError
+from problems.scene import read_scene
+
+from . import records
+from .describe import Description, describe
+from .ground import Ground, ground, record
+from .judge import Judgement
+from .machine import installed_version, machine, physical_memory_mib
+from .measure import measure
+from .plan import Measurement, expand
+from .records import Row
+from .show import Display
+from .suite import Suite, to_toml
+
+DONE, NOTHING_JUDGED = 0, 3
+
+#: A row's fields that the worker tells of; null where it does not.
+TOLD = (
+    *("status", "message", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
+    *("form_s", "load_s", "solver_reported_s", "peak_rss_mib", "threads", "kernels", "details", "stderr"),
+    "answer",
+)
+CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
+
+Solvers = dict[tuple[str, str], Description]
+
+
+def run(suite: Suite, directory: Path, console: Console) -> int:
+    """Make the suite's measurements that DIRECTORY does not hold yet.
+
+    Returns 0, or 3 when no row of the suite could be judged. Raises InputError before the first
+    measurement where the suite cannot be run; KeyboardInterrupt leaves a directory that resumes.
+    """
+    descriptions = describe(suite)
+    suite = with_forms(suite, descriptions)
+    solvers = {(e.name, e.variant): d for e, d in zip(suite.solver, descriptions, strict=True)}
+    plan = expand(suite)
+    refuse_what_cannot_fit(plan)
+    with records.held(directory):
+        rows = resumed(directory, plan, solvers, console)
+        records.replace_text(directory / "suite.toml", to_toml(suite))
+        here = remember_machine(directory)
+        made = {row["key"] for row in rows}
+        left = [m for m in plan if m.key not in made]
+        done = len(plan) - len(left)
+        console.print(f"{suite.name}: {len(plan)} measurements, {done} of them already in {directory}")
+        if left:
+            rows += measure_all(left, done, directory, solvers, here, console)
+    planned = {m.key for m in plan}
+    return summary([row for row in rows if row["key"] in planned], console)
+
+
+def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
+    """The suite with the usual form for each entry that names none."""
+    entries = zip(suite.solver, descriptions, strict=True)
+    filled = [e.model_copy(update={"forms": e.forms or [found.usual_form]}) for e, found in entries]
+    return suite.model_copy(update={"solver": filled})
+
+
+def measure_all(
+    left: list[Measurement], done: int, directory: Path, solvers: Solvers, here: str, console: Console
+) -> list[Row]:
+    """Make the measurements and append their rows."""
+    sizes = {m.scene: size[0] for m in left if (size := read_scene(m.source).expected_size)}
+    rows, base = [], None
+    with Display(console, left, done, sizes) as display:
+        for measurement in left:
+            if base is None or base.scene.name != measurement.scene:
+                start = time.monotonic()
+                base = ground(measurement.source, partial(display.building, measurement.scene))
+                record(base, directory)
+                display.ready(measurement.scene, time.monotonic() - start)
+            display.doing(f"{measurement.scene}: {measurement.solver} {measurement.form}")
+            start = time.monotonic()
+            solver = solvers[measurement.solver, measurement.variant]
+            row = one_row(measurement, base, directory, solver, here)
+            records.append(directory / records.MEASUREMENTS, row)
+            rows.append(row)
+            display.finished(measurement, row, time.monotonic() - start)
+    return rows
+
+
+def one_row(m: Measurement, base: Ground, directory: Path, solver: Description, here: str) -> Row:
+    """Measure, judge, and put together the row."""
+    start = time.monotonic()
+    answer = directory / "answers" / f"{m.stem}.npz"
+    if m.form in solver.forms:
+        told = measure(m, answer)
+    else:
+        told = {"status": "unsupported", "message": f"takes {' and '.join(solver.forms)} only"}
+    if "cannot_save" in told:
+        raise OSError(told["cannot_save"])
+    judgement = Judgement("no_answer", base.reference.bound_mm)
+    if told.get("answer"):
+        judgement = base.judge_file(answer, m.limit_mm)
+    told = {name: told.get(name) for name in TOLD}
+    known = [told[name] for name in CLOCKS if told[name] is not None]
+    return {
+        "key": m.key,
+        **{name: getattr(m, name) for name in ("suite", "scene", "source", "solver", "form", "variant")},
+        "n": base.prepared.assembly.n,
+        "m": base.prepared.assembly.m,
+        "active": int(base.reference.active.sum()),
+        **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated", "limit_mm")},
+        "threads_asked": m.threads,
+        **told,
+        **asdict(judgement),
+        **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
+        "overhead_s": time.monotonic() - start - sum(known),
+        "machine": here,
+        "scene_key": base.scene.key,
+        "solver_version": solver.version,
+        "solver_code": solver.code,
+        "rivetbench_version": installed_version("rivetbench"),
+        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
+    """The rows that DIRECTORY holds; what a new run of the plan would not repeat is set aside."""
+    path = directory / records.MEASUREMENTS
+    if records.set_torn_aside(path):
+        console.print(f"{path}: the last line was torn; it now stands in {records.TORN}", style="yellow")
+    rows = records.read(path)
+    planned = {m.key: m for m in plan}
+    sources = {m.scene: m.source for m in plan}
+    scene_keys = {name: read_scene(source).key for name, source in sources.items()}
+
+    def is_old(row: Row) -> bool:
+        m = planned.get(row["key"])
+        return m is not None and outdated(row, m, solvers[m.solver, m.variant], scene_keys[m.scene])
+
+    old = [row for row in rows if is_old(row)]
+    if old:
+        for row in old:
+            records.append(directory / records.OUTDATED, row | {"answer": None})
+        rows = [row for row in rows if row not in old]
+        records.rewrite(path, rows)
+        why = "the scene, the solver or the limits have changed since"
+        console.print(f"{len(old)} rows are set aside in {records.OUTDATED}: {why}", style="yellow")
+    return rows
+
+
+def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
+    """Whether a row is of another scene, solver or accuracy, or was ended by a limit that is wider now."""
+    now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated)
+    before = tuple(row.get(k) for k in ("scene_key", "solver_version", "solver_code", "limit_mm", "gated"))
+    out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
+    out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
+    return now != before or out_of_time or out_of_memory
+
+
+def refuse_what_cannot_fit(plan: list[Measurement]) -> None:
+    """Raise InputError where the memory limit is no limit here, or the matrices alone are above it.
+
+    K and its factors take at least 8n² bytes (two parts of n/2 each), Q takes 8m².
+    """
+    faults, physical = [], physical_memory_mib()
+    limits = {(m.source, m.memory_limit_mib) for m in plan}
+    for limit in sorted({limit for _, limit in limits if limit > physical}):
+        faults.append(Fault("--memory-limit", "memory_limit_mib", limit, f"this machine has {physical} MiB"))
+    for source, limit in sorted(limits):
+        size = read_scene(source).expected_size
+        need = (8 * size[0] ** 2 + 8 * size[1] ** 2) / 2**20 if size else 0
+        if need > limit:
+            allowed = f"the matrices of scene {source} alone take {need:.0f} MiB"
+            faults.append(Fault("--memory-limit", "memory_limit_mib", limit, allowed))
+    if faults:
+        raise InputError(faults)
+
+
+def remember_machine(directory: Path) -> str:
+    """Write DIRECTORY/machine.json, keep that of another machine under another name; returns its line."""
+    here: dict[str, Any] = machine()
+    path = directory / "machine.json"
+    with suppress(OSError, ValueError):
+        if json.loads(path.read_text("utf-8"))["machine"] != here["machine"]:
+            path.rename(path.with_name(f"machine-{len(list(directory.glob('machine*.json')))}.json"))
+    records.replace_text(path, json.dumps(here, indent=1, ensure_ascii=False) + "\n")
+    return str(here["machine"])
+
+
+def summary(rows: list[Row], console: Console) -> int:
+    """Say how many rows there are of each verdict; 3 if none could be judged."""
+    counts = Counter(row["verdict"] for row in rows)
+    console.print(", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items()))
+    if counts["within"] + counts["outside"]:
+        return DONE
+    console.print("Nothing could be judged: no row has an answer.", style="red")
+    return NOTHING_JUDGED

@@ -1,0 +1,182 @@
+"""A suite: which scenes, solvers, forms, tolerances and repeats to measure. A TOML file, checked whole.
+
+title = "…"
+scenes = ["4386/0107", "6112/*", "my-scene.toml"]     # names, globs over names, or paths
+tolerances = [1e-9]
+[[solver]]
+name = "ipm"
+forms = ["dual"]
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+
+from problems.errors import Fault, InputError
+from problems.scene import read_toml, scene_names, validation_faults
+from solvers.base import Form
+from solvers.registry import SOLVERS, solver_names
+
+SUITES = Path(__file__).parent / "suites"
+Some = Field(min_length=1)
+
+
+class SolverEntry(BaseModel):
+    """One [[solver]]: how it is called, and what it is measured on.
+
+    Without `forms` it is the dual, or the primal of a solver that takes that only.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    forms: Annotated[list[Form], Some] | None = None
+    variant: str = ""
+    options: dict[str, Any] = {}
+    tolerances: Annotated[list[PositiveFloat], Some] | None = None
+    scenes: Annotated[list[str], Some] | None = None
+    gated: bool = True
+    time_limit_s: PositiveFloat | None = None
+
+
+class Suite(BaseModel):
+    """What a suite file says; scenes are names, or absolute paths of files. `name` is the file's."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    title: str = ""
+    description: str = ""
+    scenes: Annotated[list[str], Some]
+    tolerances: Annotated[list[PositiveFloat], Some] = [1e-9]
+    repeats: PositiveInt = 1
+    threads: Annotated[list[PositiveInt], Some] = [2]
+    time_limit_s: PositiveFloat = 60.0
+    memory_limit_mib: PositiveInt = 8192
+    limit_mm: PositiveFloat = 1e-7
+    plugin: str | None = None
+    solver: Annotated[list[SolverEntry], Some]
+
+
+def suite_names() -> list[str]:
+    """The suites that come with the package."""
+    return sorted(path.stem for path in SUITES.glob("*.toml"))
+
+
+def read_suite(name_or_path: str) -> Suite:
+    """Read a suite by name or by the path of its TOML file.
+
+    Raises InputError naming the file, the key, the value and what is allowed, all faults at once.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        path = SUITES / f"{name_or_path}.toml"
+        if not path.is_file():
+            raise InputError([unknown("SUITE", "name", name_or_path, "suite", suite_names())])
+    return checked(read_toml(path), path)
+
+
+def checked(data: dict[str, Any], path: Path) -> Suite:
+    """A suite from a TOML file's content; its globs and relative paths are made out here."""
+    faults: list[Fault] = []
+    data = {"name": path.stem, **data}
+    if isinstance(data.get("scenes"), list):
+        data["scenes"] = found_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
+    if isinstance(data.get("plugin"), str):
+        data["plugin"] = str((path.parent / data["plugin"]).resolve())
+    faults += _unknown_solvers(data, path)
+    return validated(data, path, faults)
+
+
+def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) -> Suite:
+    """A suite from what `to_toml` wrote, or with what is wrong with it besides `faults`."""
+    faults = list(faults)
+    try:
+        suite = Suite.model_validate(data)
+    except ValidationError as error:
+        faults += map(_with_known_keys, validation_faults(path, "", error))
+    else:
+        faults += _twice(suite, path)
+    if faults:
+        raise InputError(faults)
+    return suite
+
+
+def found_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:
+    """The scenes that names, globs and paths (relative to `base`) stand for, each once, in their order."""
+    known = scene_names()
+    found: dict[str, None] = {}
+    for pattern in map(str, patterns):
+        if Path(pattern).suffix in (".toml", ".npz"):
+            path = (base / pattern).resolve()
+            if not path.is_file():
+                faults.append(Fault(where, key, pattern, "no such file"))
+            found[str(path)] = None
+            continue
+        names = [name for name in known if fnmatchcase(name, pattern)]
+        if not names:
+            faults.append(unknown(where, key, pattern, "scene", known))
+        found |= dict.fromkeys(names)
+    return list(found) or list(map(str, patterns))
+
+
+def unknown(where: str, key: str, value: str, kind: str, known: list[str]) -> Fault:
+    """The fault of a name that is not known, with the nearest that are."""
+    near = get_close_matches(value, known, 3)
+    nearest = f"did you mean {' or '.join(near)}? " if near else ""
+    return Fault(where, key, value, f"no such {kind}; {nearest}allowed: {', '.join(known)}")
+
+
+def _with_known_keys(fault: Fault) -> Fault:
+    if fault.allowed != "unknown key":
+        return fault
+    model = SolverEntry if fault.key.startswith("solver.") else Suite
+    known = [name for name in model.model_fields if model is SolverEntry or name != "name"]
+    return replace(fault, allowed=unknown("", "", fault.key.rpartition(".")[2], "key", known).allowed)
+
+
+def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
+    entries = data["solver"] if isinstance(data.get("solver"), list) else []
+    names = {k: str(e["name"]) for k, e in enumerate(entries) if isinstance(e, dict) and "name" in e}
+    known = [*SOLVERS, *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
+    if not set(names.values()) <= set(known):
+        known += [name for name in solver_names() if name not in known]  # slow, it imports every library
+    return [
+        unknown(str(path), f"solver.{k}.name", n, "solver", known) for k, n in names.items() if n not in known
+    ]
+
+
+def _twice(suite: Suite, path: Path) -> Iterator[Fault]:
+    """Entries that a table could not tell apart."""
+    options: dict[tuple[str, str], dict[str, Any]] = {}
+    for k, entry in enumerate(suite.solver):
+        if options.setdefault((entry.name, entry.variant), entry.options) != entry.options:
+            allowed = f"{entry.name} stands above with other options under this variant; name another"
+            yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
+
+
+def to_toml(suite: Suite) -> str:
+    """The suite as a TOML file that reads back as the same suite."""
+    data = suite.model_dump(exclude_none=True, exclude={"solver"})
+    lines = [f"{key} = {_value(value)}" for key, value in data.items()]
+    for entry in suite.solver:
+        lines += ["", "[[solver]]"]
+        lines += [f"{key} = {_value(value)}" for key, value in entry.model_dump(exclude_none=True).items()]
+    return "\n".join(lines) + "\n"
+
+
+def _value(value: Any) -> str:
+    match value:
+        case dict():
+            return "{" + ", ".join(f"{json.dumps(key)} = {_value(item)}" for key, item in value.items()) + "}"
+        case list():
+            return "[" + ", ".join(map(_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,1 @@
+"""Riveting problems: parts, condensation, effects, scenes and their matrices."""

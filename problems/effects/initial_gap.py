@@ -1,0 +1,50 @@
+"""Initial gap between the parts before riveting: constant, or a random field around its mean."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ..assembly import Matrix, Vector
+from ..effect import GapEffect
+from ..joint import Finite, Joint, Positive, Table
+
+
+class RandomField(Table):
+    """Gaussian field: standard deviation and correlation length in mm, and the seed."""
+
+    sd: Positive
+    correlation_length: Positive
+    seed: Annotated[int, Field(ge=0)]
+
+
+class InitialGap(GapEffect):
+    """g = mean + sd · Lx Z Lyᵀ in mm, Z standard normal, at every contact.
+
+    The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
+    roots Lx and Ly of two one-dimensional correlation matrices. A negative gap is an overclosure.
+    """
+
+    kind: Literal["initial_gap"]
+    mean: Finite
+    random: RandomField | None = None
+
+    def gap(self, joint: Joint) -> Vector:
+        g = np.full(joint.size[1], self.mean)
+        if self.random:
+            rng = np.random.default_rng(self.random.seed)
+            Lx, Ly = (_square_root(grid, self.random.correlation_length) for grid in (joint.x, joint.y))
+            for k in range(len(joint.pairs)):
+                Z = rng.standard_normal((len(joint.y), len(joint.x)))
+                field = self.random.sd * (Ly @ Z @ Lx).ravel()
+                g[k * joint.node_count : (k + 1) * joint.node_count] += field
+        return g
+
+
+def _square_root(grid: Vector, correlation_length: float) -> Matrix:
+    """Symmetric square root of exp(−(x_i − x_j)² / 2ℓ²); unique, so no sign depends on the machine."""
+    C = np.exp(-0.5 * ((grid[:, None] - grid) / correlation_length) ** 2)
+    w, V = np.linalg.eigh(C)
+    return (V * np.sqrt(np.clip(w, 0.0, None))) @ V.T

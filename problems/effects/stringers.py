@@ -1,0 +1,33 @@
+"""Stringers: beams along y at an even pitch, bonded to the skin."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from pydantic import Field
+
+from ..effect import StiffnessEffect
+from ..joint import Finite, Positive
+from ..plate import Plate
+
+
+class Stringers(StiffnessEffect):
+    """K += Σ EI ∫ w_yy² dy + GJ ∫ w_xy² dy over start ≤ y ≤ stop, at x = 0, pitch, 2·pitch, …
+
+    pitch, start, stop in mm; I and J in mm⁴. E and G = E / 2(1 + ν) are the part's.
+    """
+
+    kind: Literal["stringers"]
+    pitch: Positive
+    start: Finite
+    stop: Finite
+    I: Positive  # noqa: E741
+    J: Annotated[float, Field(ge=0)] = 0.0
+
+    def stiffness(self, plate: Plate) -> sp.csr_array:
+        EI, GJ = plate.young * self.I, plate.shear_modulus * self.J
+        positions = np.arange(0.0, plate.x[-1] + 1e-9 * self.pitch, self.pitch)
+        beams = (plate.beam_along_y(min(x, plate.x[-1]), EI, GJ, self.start, self.stop) for x in positions)
+        return sum(beams, start=sp.csr_array((plate.size, plate.size)))

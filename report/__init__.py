@@ -1,0 +1,1 @@
+"""Markdown and pictures from results; reads nothing else."""

@@ -1,0 +1,77 @@
+"""What a section of the report is made of: text, tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import pandas as pd
+from matplotlib.figure import Figure as Drawing
+
+from .numbers import MISSING, significant
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph, list or heading in Markdown."""
+
+    kind: ClassVar[str] = "text"
+    markdown: str
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table as shown. `show` makes the text of a cell from its row of the data."""
+
+    heading: str
+    show: Callable[[Mapping[str, Any]], str]
+    align: str = "right"
+
+
+def number(heading: str, name: str, style: Callable[[object], str] = significant) -> Column:
+    return Column(heading, lambda row: style(row[name]))
+
+
+def word(heading: str, name: str) -> Column:
+    return Column(heading, lambda row: str(row[name] or MISSING).replace("|", r"\|"), "left")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: `columns` of it in the report, all of `data` with all its digits in NAME.csv beside it."""
+
+    kind: ClassVar[str] = "table"
+    name: str
+    caption: str
+    data: pd.DataFrame
+    columns: list[Column]
+
+    @property
+    def markdown(self) -> str:
+        records: list[dict[str, Any]] = self.data.to_dict("records")  # type: ignore[assignment]
+        shown = pd.DataFrame(
+            {c.heading: [c.show(record) for record in records] for c in self.columns}, dtype=object
+        )
+        align = [c.align for c in self.columns]
+        text = shown.to_markdown(index=False, disable_numparse=True, colalign=align)
+        return str(text)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture, saved as NAME.png; `caption` says what to see in it."""
+
+    kind: ClassVar[str] = "figure"
+    name: str
+    caption: str
+    drawing: Drawing
+
+
+Block = Text | Table | Figure
+
+
+@dataclass(frozen=True)
+class Section:
+    title: str
+    blocks: list[Block]

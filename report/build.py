@@ -1,0 +1,75 @@
+"""Writes the report of a results directory: Markdown, a PNG a figure, a CSV a table.
+
+To add a section: write one file in `sections` with a function `section(results)` that returns a
+`Section`, or None when the rows have nothing for it, and name it in `SECTIONS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import jinja2
+
+from . import style
+from .blocks import Block, Figure, Section, Table
+from .checks import warnings
+from .rows import Results, read
+from .sections import accuracy, breakdown, details, gap_map, machine, problems, summary, times
+
+SECTIONS: list[Callable[[Results], Section | None]] = [
+    summary.section,
+    problems.section,
+    times.section,
+    accuracy.section,
+    breakdown.section,
+    gap_map.section,
+    details.section,
+    machine.section,
+]
+
+
+def write(directory: Path) -> Path:
+    """Write DIRECTORY/report/report.md anew from the results in DIRECTORY and return its path.
+
+    Raises FileNotFoundError where DIRECTORY has no measurements.jsonl.
+    """
+    results = read(directory)
+    target = directory / "report"
+    target.mkdir(exist_ok=True)
+    for stale in [*target.glob("*.png"), *target.glob("*.csv")]:
+        stale.unlink()
+    parts = []
+    with style.applied():
+        for i, part in enumerate(results.by_machine()):
+            sections = [made for section in SECTIONS if (made := section(part))]
+            parts.append((part, [_save(section, target, i) for section in sections]))
+    path = target / "report.md"
+    path.write_text(_template().render(results=results, parts=parts, warnings=warnings(results)), "utf-8")
+    return path
+
+
+def _template() -> jinja2.Template:
+    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
+    environment = jinja2.Environment(
+        loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    return environment.get_template("report.md.j2")
+
+
+def _save(section: Section, target: Path, machine: int) -> Section:
+    """Write the section's files; those of a second machine on take its number into their names."""
+    prefix = f"machine{machine + 1}-" if machine else ""
+    return replace(section, blocks=[_save_block(block, target, prefix) for block in section.blocks])
+
+
+def _save_block(block: Block, target: Path, prefix: str) -> Block:
+    match block:
+        case Table():
+            block = replace(block, name=prefix + block.name)
+            block.data.to_csv(target / f"{block.name}.csv", index=False)
+        case Figure():
+            block = replace(block, name=prefix + block.name)
+            block.drawing.savefig(target / f"{block.name}.png", dpi=style.DPI)
+    return block

@@ -1,0 +1,70 @@
+"""Where the time goes: the share of each step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+
+from .. import style
+from ..blocks import Figure, Section
+from ..numbers import significant
+from ..rows import TIMES, Results
+
+ROW = 0.2  # inches
+STEPS = {
+    "convert_s": ("convert: data into the solver's format", "#B8B8B8", None),
+    "prepare_s": ("prepare: once an assembly", style.GREEN, None),
+    "setup_s": ("set up: once a load case", style.ORANGE, "////"),
+    "solve_s": ("solve", style.BLUE, None),
+    "form_s": ("dual form: forming p, recovering x", style.SKY, "...."),
+}
+
+
+def section(results: Results) -> Section | None:
+    cells = results.tightest
+    scenes = [scene for n in results.sizes if (scene := results.middle_scene(n))]
+    shown = [lines for scene in scenes if len(lines := _answered(cells[cells["scene"] == scene]))]
+    if not shown:
+        return None
+    heights = [0.3 + ROW * len(lines) for lines in shown]
+    drawing = style.figure(sum(heights) + 0.2 * len(shown) + 0.9)
+    panels = drawing.subplots(len(shown), 1, height_ratios=heights, sharex=True, squeeze=False)[:, 0]
+    for axes, lines in zip(panels, shown, strict=True):
+        _panel(axes, lines)
+    panels[-1].set_xlabel("share of the time, %")
+    handles = [Patch(facecolor=color, hatch=hatch, label=text) for text, color, hatch in STEPS.values()]
+    drawing.legend(handles=handles, loc="outside lower center", ncols=3)
+    caption = (
+        "*Where the time goes*, on the middle scene of each size, the fastest at the top; at the right, all "
+        "steps together in seconds. Runs without an answer are left out. What all solvers share, the "
+        "Cholesky factor of K and Q, was built before and is not in it."
+    )
+    return Section("Where the time goes", [Figure("time-steps", caption, drawing)])
+
+
+def _answered(cells: pd.DataFrame) -> pd.DataFrame:
+    return cells[cells["total_s"] > 0].sort_values("total_s")
+
+
+def _panel(axes: Axes, lines: pd.DataFrame) -> None:
+    places = np.arange(len(lines))
+    left = np.zeros(len(lines))
+    for name in TIMES:
+        _, color, hatch = STEPS[name]
+        share = (100 * lines[name].fillna(0) / lines["total_s"]).to_numpy(dtype=float)
+        look: dict[str, Any] = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.6}
+        axes.barh(places, share, left=left, height=0.72, **look)
+        left += share
+    for place, seconds in zip(places, lines["total_s"], strict=True):
+        text = f"{significant(seconds)} s"
+        axes.annotate(text, (100, place), (6, 0), textcoords="offset points", va="center", fontsize=8.5)
+    axes.set(xlim=(0, 100), ylim=(len(lines) - 0.5, -0.5))
+    axes.set_yticks(places, lines["series"])
+    axes.tick_params(axis="y", length=0)
+    axes.grid(visible=False, axis="y")
+    n, active = lines["n"].iloc[0], lines["active"].iloc[0]
+    axes.set_title(f"n = {n:.0f}" + (f", {active:.0f} active" if active == active else ""))

@@ -1,0 +1,82 @@
+"""Every measurement: one table a size and active count."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from ..blocks import Block, Column, Section, Table, Text, number, word
+from ..numbers import MISSING, power, significant, whole
+from ..rows import VERDICTS, Results
+
+FIGURES = [
+    *("scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeats"),
+    *("status", "verdict", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
+    *("form_s", "load_case_s", "once_s", "total_s", "solver_reported_s", "displacement_error_mm", "limit_mm"),
+    *("reference_bound_mm", "contact_mismatch", "min_gap_mm", "primal_residual", "dual_residual"),
+    *("duality_gap", "peak_rss_mib", "time_limit_s", "memory_limit_mib", "message"),
+]
+MARKS = {"within": "✓ within", "outside": "✗ outside", "cannot_be_judged": "? cannot be judged"}
+
+
+def section(results: Results) -> Section | None:
+    if results.cells.empty:
+        return None
+    blocks: list[Block] = [
+        Text(
+            "One table a scene: answers within the limit first, then by total time. Times in seconds; what "
+            "the columns mean stands in the last section."
+        )
+    ]
+    for n in [*results.sizes, None]:
+        of_size = results.cells[results.cells["n"].isna() if n is None else results.cells["n"] == n]
+        if len(of_size):
+            blocks.append(Text("### Size not recorded" if n is None else f"### n = {n}"))
+        ordered = of_size.sort_values(["active", "scene"])
+        blocks += [_table(str(scene), cells) for scene, cells in ordered.groupby("scene", sort=False)]
+    return Section("Every solver on every scene", blocks)
+
+
+def _table(scene: str, cells: pd.DataFrame) -> Table:
+    rank = cells["verdict"].map(VERDICTS.index) + (cells["status"] == "unsupported")
+    ordered = cells.assign(rank=rank).sort_values(["rank", "total_s", "solver", "form"], kind="stable")
+    columns = [
+        word("solver (form)", "label"),
+        Column("verdict", lambda row: MARKS.get(row["verdict"], MISSING), "left"),
+        Column("status", lambda row: str(row["status"]).replace("_", " "), "left"),
+        number("error, mm", "displacement_error_mm", power),
+        number("contacts differing", "contact_mismatch", whole),
+        Column("iterations (inner)", _iterations),
+        number("convert", "convert_s"),
+        number("prepare", "prepare_s"),
+        number("set-up", "setup_s"),
+        number("solve", "solve_s"),
+        number("dual form", "form_s"),
+        Column("total", _total),
+        Column("peak, MiB", _peak),
+    ]
+    active, m = cells["active"].max(), cells["m"].max()
+    share = f" ({100 * active / m:.0f} % of {m:.0f})" if active == active and m > 0 else ""
+    title = f"**Scene {scene}**" + (f": {active:.0f} active contacts{share}" if active == active else "")
+    name = "scene-" + scene.replace("/", "_")
+    return Table(name, title, ordered[["label", *FIGURES]], columns)
+
+
+def _iterations(row: Mapping[str, Any]) -> str:
+    inner = whole(row["inner_iterations"])
+    return whole(row["iterations"]) + (f" ({inner})" if inner != MISSING else "")
+
+
+def _total(row: Mapping[str, Any]) -> str:
+    """The seconds, or for a run that was stopped by the clock, its limit."""
+    if row["verdict"] == "no_answer" and row["status"] == "time_limit" and row["time_limit_s"] > 0:
+        return f"> {row['time_limit_s']:.4g} s (time limit)"
+    return significant(row["total_s"])
+
+
+def _peak(row: Mapping[str, Any]) -> str:
+    if row["status"] == "memory_limit" and row["memory_limit_mib"] > 0:
+        return f"> {whole(row['memory_limit_mib'])}"
+    return whole(row["peak_rss_mib"])

@@ -1,0 +1,109 @@
+"""The machine, the versions, how it was measured, and what the columns mean."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from ..blocks import Block, Section, Table, Text, word
+from ..labels import ORDER
+from ..numbers import listed, tidy_power
+from ..rows import Results
+
+MEANING = """\
+- **solver (form)**: what was run. *Primal*: min ½xᵀKx − fᵀx, Aᵀx ≤ g, in the displacements x. *Dual*:
+  min ½λᵀQλ − pᵀλ, λ ≥ 0, in the contact forces λ, with Q = AᵀK⁻¹A, p = AᵀK⁻¹f − g, x = K⁻¹(f − Aλ).
+- **error**: max |x − x*| in mm against the reference answer x*, worked out from the saved answer.
+- **verdict**: the judge's, from the error alone. *Within* or *outside* the limit; *cannot be judged* where
+  the reference's own error bound is too wide; *no answer* where there is none.
+- **status**: what the solver said (solved, inaccurate, iteration limit, failed), or what ended it (time
+  limit, memory limit, crashed). *Unsupported*: the solver does not take this form.
+- **contacts differing**: contacts closed in the answer and open in the reference, or the reverse.
+- **iterations (inner)**: outer ones, for an active-set method its changes of the set; inner ones in brackets,
+  for instance conjugate-gradient iterations.
+- **convert**, **prepare**: once an assembly: data into the solver's format; factorisations.
+- **set-up**, **solve**: once a load case.
+- **dual form**: what this form costs a load case beside the solver: forming p before, recovering x after.
+- **a load case**: set-up + solve + dual form. **total**: that, convert and prepare.
+- **peak**: the largest resident memory of the measuring process, with the data it had mapped."""
+
+
+def section(results: Results) -> Section | None:
+    if results.rows.empty:
+        return None
+    blocks: list[Block] = [
+        _machine(results),
+        _versions(results.rows),
+        Text("### Method\n\n" + _method(results)),
+        Text("### What the columns mean\n\n" + MEANING),
+        Text(
+            "### Once more\n\nFrom the directory that holds `measurements.jsonl`:\n\n"
+            "```\npython -m harness run suite.toml --out again\n```"
+        ),
+    ]
+    return Section("Machine and method", blocks)
+
+
+def _machine(results: Results) -> Table:
+    rows = results.rows
+    facts = {"machine": rows["machine"].iloc[0]} | _flat(results.machines.get(rows["machine"].iloc[0], {}))
+    facts |= {
+        "threads in effect": _values(rows["threads"]),
+        "BLAS kernels in effect": _values(rows["kernels"]),
+        "rivetbench": _values(rows["rivetbench_version"]),
+        "measured": _period(rows["recorded_at"]),
+    }
+    table = pd.DataFrame([{"what": k, "value": v} for k, v in facts.items() if v])
+    return Table("machine", "*The machine.*", table, [word("what", "what"), word("value", "value")])
+
+
+def _flat(facts: dict[str, Any], above: str = "") -> dict[str, str]:
+    """Nested facts as 'outer, inner': value."""
+    flat: dict[str, str] = {}
+    for key, value in facts.items():
+        name = (f"{above}, {key}" if above else key).replace("_", " ")
+        if isinstance(value, dict):
+            flat |= _flat(value, name)
+        elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
+            flat |= _flat({f"{key} {i}": item for i, item in enumerate(value, start=1)}, above)
+        elif value is not None:
+            flat[name] = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    return flat
+
+
+def _values(column: pd.Series[Any]) -> str:
+    """The distinct values of a column, in words."""
+    values = [v for v in column.dropna().unique() if v != ""]
+    return listed([f"{v:.10g}" if isinstance(v, float) else str(v) for v in values]) if values else ""
+
+
+def _period(times: pd.Series[Any]) -> str:
+    known = sorted(t for t in times if t)
+    return f"{known[0]} to {known[-1]}" if known else ""
+
+
+def _versions(rows: pd.DataFrame) -> Table:
+    found = rows.groupby("solver")["solver_version"].agg(_values).reset_index()
+    order = {solver: i for i, solver in enumerate(ORDER)}
+    found = found.sort_values("solver", key=lambda names: names.map(lambda s: (order.get(s, len(order)), s)))
+    columns = [word("solver", "solver"), word("version", "solver_version")]
+    return Table("versions", "*The solvers.*", found, columns)
+
+
+def _method(results: Results) -> str:
+    rows = results.rows
+    limits = [
+        f"{_values(rows[name])} {unit}"
+        for name, unit in (("time_limit_s", "s"), ("memory_limit_mib", "MiB"))
+        if rows[name].notna().any()
+    ]
+    stopped = f" Each is stopped from outside at its limits ({', '.join(limits)})." if limits else ""
+    asked = [tidy_power(t) for t in sorted(rows["tolerance"].dropna().unique())]
+    tolerances = f" The solvers were asked for a tolerance of {listed(asked)}." if asked else ""
+    return (
+        "Each measurement is a process of its own; thread counts are set before numpy is loaded and the "
+        f"clock starts after the imports.{stopped}{tolerances} Solvers read the same tolerance differently: "
+        f"compare them by the error they achieve. An answer counts when it is within {results.limit} of the "
+        "reference, whatever the solver says of itself."
+    )

@@ -1,0 +1,75 @@
+"""The problems: their size, their conditioning beside the paper's, and how well the answer is known."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from ..blocks import Block, Section, Table, number, word
+from ..numbers import MISSING, as_number, power, whole
+from ..rows import Results
+
+#: cond(K) by n, Table 4 of the paper.
+PAPER = {4386: 2.63e6, 6112: 1.11e7, 11308: 1.77e7}
+
+
+def section(results: Results) -> Section | None:
+    if results.problems.empty or "scene" not in results.problems:
+        return None
+    names = ("n", "m", "active", "cond_K", "lambda_min", "lambda_max", "reference_bound_mm")
+    table = results.problems.drop_duplicates("scene", keep="last")
+    table = table[table["scene"].isin(results.rows["scene"])]
+    if table.empty:
+        return None
+    table = table.reindex(columns=["scene", *names, "build_s", "title", "reference_route"])
+    table["build_s"] = table["build_s"].map(lambda s: sum(s.values()) if isinstance(s, dict) else s)
+    for name in (*names, "build_s"):
+        table[name] = table[name].map(as_number).astype(float)
+    table = table.sort_values(["n", "active", "scene"])
+    table["active_share"] = table["active"] / table["m"]
+    blocks: list[Block] = [_assemblies(table), _scenes(table)]
+    return Section("Problems", blocks)
+
+
+def _assemblies(table: pd.DataFrame) -> Table:
+    by_assembly = table.groupby(["n", "m", "cond_K"], as_index=False, dropna=False)
+    sizes = by_assembly.agg(scenes=("scene", "count"), build_s=("build_s", "max"))
+    sizes["cond_K_paper"] = sizes["n"].map(lambda n: PAPER.get(int(n)))
+    sizes["cond_K_difference_percent"] = 100 * (sizes["cond_K"] / sizes["cond_K_paper"] - 1)
+    columns = [
+        number("unknowns n", "n", whole),
+        number("contacts m", "m", whole),
+        number("scenes", "scenes", whole),
+        number("cond(K) measured", "cond_K"),
+        number("cond(K), paper", "cond_K_paper"),
+        number("difference, %", "cond_K_difference_percent", _signed),
+        number("build, s", "build_s"),
+    ]
+    caption = "*The assemblies.* cond(K) as computed here, beside Table 4 of the paper."
+    return Table("assemblies", caption, sizes, columns)
+
+
+def _scenes(table: pd.DataFrame) -> Table:
+    names = ["scene", "title", "n", "m", "active", "active_share", "reference_bound_mm", "reference_route"]
+    columns = [
+        word("scene", "scene"),
+        word("title", "title"),
+        number("active", "active", whole),
+        number("% of m", "active_share", _percent),
+        number("reference known to, mm", "reference_bound_mm", power),
+        word("by", "reference_route"),
+    ]
+    caption = (
+        "*The scenes.* Active: contacts closed in the reference answer. Known to: the bound on the "
+        "reference's own error; an answer is judged only where it is well below the limit."
+    )
+    return Table("scenes", caption, table[names], columns)
+
+
+def _signed(value: object) -> str:
+    number = as_number(value)
+    return MISSING if number is None else f"{number:+.2f}"
+
+
+def _percent(share: object) -> str:
+    number = as_number(share)
+    return MISSING if number is None else f"{100 * number:.1f}"

@@ -1,0 +1,123 @@
+"""One look for all figures, readable in greyscale and by colour-blind readers.
+
+A solver keeps its colour and marker in every figure of every report; solid lines and filled markers
+are the dual form, dashed lines and hollow markers the primal. Colours are those of Okabe and Ito
+(2008), without their yellow.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any
+
+import matplotlib as mpl
+import pandas as pd
+from matplotlib.axis import Axis
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullLocator
+
+BLUE, VERMILLION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+SKY, ORANGE, BLACK, GREY = "#56B4E9", "#E69F00", "#000000", "#7F7F7F"
+
+WIDTH = 9.0  # inches; at 100 pixels an inch this is the width of a page of text on a screen
+DPI = 160
+
+KNOWN = {
+    "ipm": (BLUE, "o"),
+    "gi": (VERMILLION, "s"),
+    "newton": (BLACK, "*"),
+    "piqp": (GREEN, "D"),
+    "proxqp": (PURPLE, "P"),
+    "clarabel": (ORANGE, "X"),
+    "osqp": (SKY, "p"),
+    "daqp": (GREY, "h"),
+    "quadprog": (GREEN, "<"),
+    "highs": (PURPLE, ">"),
+}
+#: For solvers not named above: each pair differs from theirs. Open triangles are kept for unfinished runs.
+SPARE = [(color, marker) for marker in "dvH8" for color in (BLACK, GREY, ORANGE, BLUE, VERMILLION, SKY)]
+#: Marker size and tint (0: the full colour, 1: white) of a solver's first, second, … variant.
+VARIANTS = ((6.5, 0.0), (5.0, 0.45), (8.0, 0.2), (4.0, 0.6), (9.0, 0.35))
+
+RC: Any = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#444444",
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.7,
+    "xtick.color": "#333333",
+    "ytick.color": "#333333",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "hatch.linewidth": 0.6,
+    "hatch.color": "#B5B5B5",
+    "savefig.dpi": DPI,
+    "figure.dpi": 100,
+}
+
+
+def applied() -> AbstractContextManager[None]:
+    """The look, for the time of a `with` block: importing this module changes no global setting."""
+    return mpl.rc_context(RC)
+
+
+def figure(height: float) -> Figure:
+    return Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.07))
+
+
+def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
+    """Keyword arguments of `Axes.plot` for each series of some cells: filled markers on solid lines for
+    the dual form, hollow ones on dashed lines for the primal.
+    """
+    unknown = sorted(set(cells["solver"]) - set(KNOWN))
+    looks = KNOWN | {solver: SPARE[i % len(SPARE)] for i, solver in enumerate(unknown)}
+    styles: dict[str, dict[str, Any]] = {}
+    for (solver, form), lines in cells.groupby(["solver", "form"]):
+        full, marker = looks[solver]
+        for i, series in enumerate(sorted(lines["series"].unique())):
+            size, tint = VARIANTS[i % len(VARIANTS)]
+            red, green, blue = (c + tint * (1 - c) for c in to_rgb(full))
+            color = to_hex((red, green, blue))
+            styles[series] = {
+                "color": color,
+                "marker": marker,
+                "markersize": size,
+                "markeredgecolor": color,
+                "markerfacecolor": color if form == "dual" else "white",
+                "markeredgewidth": 1.3,
+                "linestyle": "-" if form == "dual" else (0, (4, 2)),
+                "linewidth": 1.6,
+            }
+    return styles
+
+
+def line_only(style: dict[str, Any]) -> dict[str, Any]:
+    return {**style, "marker": ""}
+
+
+def marker_only(style: dict[str, Any]) -> dict[str, Any]:
+    return {**style, "linestyle": ""}
+
+
+def legend_entries(order: list[str], styles: dict[str, dict[str, Any]]) -> list[Line2D]:
+    return [Line2D([], [], label=series, **styles[series]) for series in order]
+
+
+def plain_log(axis: Axis) -> None:
+    """A logarithmic axis with ticks at 0.1, 0.2, 0.5, 1, … where there is room, else at powers of ten."""
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high / low < 2e3 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=20))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_locator(NullLocator())

@@ -1,0 +1,125 @@
+"""Goldfarb–Idnani's dual active-set method with Powell's safeguards, on either form.
+
+Both forms have one shape in the space of the constraints. With u ≥ 0 the multipliers and s the
+slacks, s = s0 + G u, and the method looks for s ≥ 0, uᵀs = 0:
+
+    primal form:  constraints Aᵀx ≤ g   u = λ   s = g − Aᵀx   G = AᵀK⁻¹A = Q   s0 = −p
+    dual form:    constraints λ ≥ 0     u = y   s = λ         G = Q⁻¹          s0 = Q⁻¹p
+
+u = 0 is the unconstrained minimum, where Algorithm 1 starts. The pivots are Goldfarb and Idnani's;
+carried out here they need a factor of G_CC instead of their (n, n) matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import scipy.linalg as sla
+from scipy.linalg import lapack
+
+from problems.assembly import LoadCase, Matrix, Vector
+from problems.errors import InputError
+
+from .base import FORMS, Answer, Form, Load, Problem, Solver
+from .goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    problem: Problem
+    G: Matrix
+    factor: Matrix | None  # of Q, in the dual form
+
+
+class GoldfarbIdnani(Solver):
+    """Goldfarb–Idnani with Powell's safeguards.
+
+    Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) by more than
+    rounding explains; in the dual form an overlap above the tolerance is "inaccurate". Iterations are
+    changes of the active set; drops and refinements stand in details.
+
+    Options
+    -------
+    max_pivots : at most max_pivots · m changes of the active set.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = FORMS
+
+    def __init__(self, *, max_pivots: float = 10.0) -> None:
+        if not max_pivots > 0:
+            raise InputError.one("gi", "max_pivots", max_pivots, "must be positive")
+        self.max_pivots = max_pivots
+
+    def prepare(self, data: Problem) -> _Prepared:
+        """G: Q itself, or Q⁻¹ from the Cholesky factor of Q."""
+        if data.form == "primal":
+            return _Prepared(data, data.Q, None)
+        U = sla.cholesky(data.Q, check_finite=False)
+        inverse, info = lapack.dpotri(U)
+        if info != 0:
+            raise np.linalg.LinAlgError(f"dpotri returned {info}")
+        return _Prepared(data, np.asfortranarray(np.triu(inverse) + np.triu(inverse, 1).T), U)
+
+    def solve(self, ready: _Prepared, load: Load, tolerance: float) -> Answer:
+        data = ready.problem
+        slacks = _primal_slacks(ready, load) if ready.factor is None else _dual_slacks(ready, load)
+        limit = int(self.max_pivots * len(ready.G)) + 10
+        result = goldfarb_idnani(ready.G, slacks, tolerance, limit)
+        details = {"drops": result.drops, "refinements": result.refinements} | result.cause
+        if ready.factor is not None:
+            lam = _on_support(ready, load, slacks(result.u)[0], result)
+            overlap = float((load.p - data.Q @ lam).max())
+            rounding = 4 * EPS * float(abs(load.p).max())
+            status = result.status
+            if status == "solved" and overlap > max(tolerance, rounding):
+                status, details["cause"] = "inaccurate", f"rounding: an overlap of {overlap:.1e} mm is left"
+            return Answer(status, lam, None, result.pivots, details=details)
+        x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
+        return Answer(result.status, result.u, x, result.pivots, details=details)
+
+
+def _primal_slacks(ready: _Prepared, load: Load) -> Slacks:
+    prepared, A = ready.problem.prepared, ready.problem.assembly.A
+
+    def slacks(u: Vector) -> tuple[Vector, Vector]:
+        """s = g − Aᵀx with x = K⁻¹(f − Au) refined, and its size T = |g| + |A|ᵀ|x|."""
+        x = prepared.recover(u, LoadCase(load.f, load.g))
+        return load.g - A.T @ x, abs(load.g) + abs(A).T @ abs(x)
+
+    return slacks
+
+
+def _dual_slacks(ready: _Prepared, load: Load) -> Slacks:
+    Q, factor = ready.problem.Q, (ready.factor, False)
+
+    def slacks(u: Vector) -> tuple[Vector, Vector]:
+        """s = λ with Qλ = p + u, refined once.
+
+        εT with T = |Q⁻¹| (|p + u| + |Q| |λ|) bounds what the rounding of the residual moves it by.
+        """
+        lam = sla.cho_solve(factor, load.p + u, check_finite=False)
+        lam += sla.cho_solve(factor, load.p + u - Q @ lam, check_finite=False)
+        return lam, abs(ready.G) @ (abs(load.p + u) + abs(Q) @ abs(lam))
+
+    return slacks
+
+
+def _on_support(ready: _Prepared, load: Load, lam: Vector, result: GiResult) -> Vector:
+    """λ with λ_C = 0 exactly and Q_SS λ_S = p_S refined on the rest S, so that no rounding of λ_C is left.
+
+    With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0).
+    """
+    C = result.active
+    lam = lam.copy()
+    for _ in range(2):
+        lam[C] = 0.0
+        r = load.p - ready.problem.Q @ lam
+        r[C] = 0.0
+        v = sla.cho_solve((ready.factor, False), r, check_finite=False)
+        u = np.zeros_like(v)
+        u[C] = result.factor.solve(result.factor.solve_transposed(v[C]))
+        lam += v - ready.G @ u
+    lam[C] = 0.0
+    return np.maximum(lam, 0.0)

@@ -1,0 +1,145 @@
+"""Goldfarb–Idnani in the space of the constraints: u ≥ 0, s = s0 + Gu ≥ 0, uᵀs = 0, G positive definite.
+
+Sources: Goldfarb and Idnani, Math. Programming 27:1–33, 1983 (the pivots); Powell, Math. Programming
+Study 25:46–61, 1985 (the safeguards: violations within rounding do not count, dependence is tested,
+and the point is recomputed from the original data before the method stops).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.assembly import Matrix, Vector
+
+from .base import Status
+from .growing_factor import GrowingFactor
+
+#: u → (s, T): the slacks from the original data, and for each the size of its terms.
+Slacks = Callable[[Vector], tuple[Vector, Vector]]
+
+CANDIDATES = 64  # violated constraints looked at between two products with all of G
+MAX_REFINEMENTS = 20
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class GiResult:
+    """u (m,), the active constraints C with the factor of G_CC, and how they were reached."""
+
+    status: Status
+    u: Vector
+    active: NDArray[np.intp]
+    factor: GrowingFactor
+    pivots: int
+    drops: int
+    refinements: int
+    cause: dict[str, str] = field(default_factory=dict)
+
+
+def goldfarb_idnani(G: Matrix, slacks: Slacks, tolerance: float, max_pivots: int) -> GiResult:
+    """Solve from u = 0.
+
+    A slack counts as violated when s_k < −max(tolerance, 4ε T_k). Stops when none is left after a
+    refinement; "inaccurate" when refinements no longer help, "iteration_limit" at max_pivots.
+    """
+    state = _State(G, max_pivots)
+    start, size = slacks(state.u)  # Algorithm 1, step 2
+    worst = np.inf
+    for refinements in range(1, MAX_REFINEMENTS + 1):
+        state.pivot_until_feasible(start, np.maximum(tolerance, 4 * EPS * size))  # steps 3 to 12
+        if state.pivots >= max_pivots:
+            return state.result("iteration_limit", refinements - 1)
+        s, size = slacks(state.u)  # Powell: recompute from the original data
+        state.correct(s)
+        s, size = slacks(state.u)
+        start = s - G @ state.u  # carries the rounding of G, which later pivots must not see again
+        limit = np.maximum(tolerance, 4 * EPS * size)
+        violation = max(float((-s - limit).max()), 0.0)
+        if violation == 0.0 and not (state.u < 0).any():
+            return state.result("solved", refinements)
+        if violation >= worst:
+            cause = f"rounding: a slack of {float(s.min()):.1e} remains after refinement"
+            return state.result("inaccurate", refinements, cause)
+        worst = violation if violation > 0 else worst
+        state.drop_negative()
+    return state.result("inaccurate", MAX_REFINEMENTS, "refinement does not settle the active set")
+
+
+class _State:
+    """Multipliers u, the active set C in the order of the factor, and the counts."""
+
+    def __init__(self, G: Matrix, max_pivots: int) -> None:
+        self.G = G
+        self.u = np.zeros(len(G))
+        self.C: list[int] = []
+        self.factor = GrowingFactor(len(G))
+        self.max_pivots = max_pivots
+        self.pivots = self.drops = 0
+
+    def result(self, status: Status, refinements: int, cause: str = "") -> GiResult:
+        reason = {"cause": cause} if cause else {}
+        active = np.array(self.C, dtype=np.intp)
+        u = np.maximum(self.u, 0.0)
+        return GiResult(status, u, active, self.factor, self.pivots, self.drops, refinements, reason)
+
+    def pivot_until_feasible(self, start: Vector, limit: Vector) -> None:
+        """Add violated constraints, worst first, until s = start + Gu ≥ −limit."""
+        while self.pivots < self.max_pivots:
+            s = start + self.G @ self.u
+            s[self.C] = 0.0
+            violated = np.flatnonzero(s < -limit)
+            if not violated.size:
+                return
+            worst = violated[np.argsort(s[violated])[:CANDIDATES]]
+            rows = self.G[:, worst].T  # G is symmetric
+            while self.pivots < self.max_pivots:
+                s = start[worst] + rows @ self.u
+                s[np.isin(worst, self.C)] = 0.0
+                pick = int(np.argmin(s + limit[worst]))
+                if s[pick] >= -limit[worst[pick]]:
+                    break
+                self.add(int(worst[pick]), float(s[pick]))
+
+    def add(self, k: int, s_k: float) -> None:
+        """Raise u_k until s_k = 0, dropping each active constraint whose multiplier reaches zero."""
+        while self.pivots < self.max_pivots:
+            self.pivots += 1
+            C = np.array(self.C, dtype=np.intp)
+            d = self.factor.solve_transposed(self.G[C, k])
+            r = self.factor.solve(d)
+            curvature = float(self.G[k, k] - d @ d)
+            independent = curvature > 10 * (len(C) + 1) * EPS * self.G[k, k]
+            full = -s_k / curvature if independent else np.inf
+            falling = np.flatnonzero(r > 0)
+            ratios = self.u[C[falling]] / r[falling]
+            partial = float(ratios.min(initial=np.inf))
+            step = min(full, partial)
+            if not np.isfinite(step):
+                raise np.linalg.LinAlgError(f"constraint {k} depends on the active ones: G is not definite")
+            self.u[C] -= step * r
+            self.u[k] += step
+            s_k += step * curvature
+            if full <= partial:
+                self.factor.append(d, np.sqrt(curvature))
+                self.C.append(k)
+                return
+            self.drop(int(falling[np.argmin(ratios)]))
+
+    def drop(self, position: int) -> None:
+        self.u[self.C.pop(position)] = 0.0
+        self.factor.delete(position)
+        self.drops += 1
+
+    def correct(self, s: Vector) -> None:
+        """u_C −= G_CC⁻¹ s_C, so that the active slacks vanish."""
+        if self.C:
+            self.u[self.C] -= self.factor.solve(self.factor.solve_transposed(s[self.C]))
+
+    def drop_negative(self) -> None:
+        for position in reversed(range(len(self.C))):
+            if self.u[self.C[position]] < 0:
+                self.drop(position)

@@ -1,0 +1,50 @@
+"""Small contact problems with an independent answer: non-negative least squares by Lawson and Hanson.
+
+min ½λᵀQλ − pᵀλ, λ ≥ 0 is min ‖Uλ − U⁻ᵀp‖, λ ≥ 0 with Q = UᵀU.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.optimize
+import scipy.sparse as sp
+
+from harness.trials import contact_rows, prepared_from, stiffness
+from problems.assembly import LoadCase, Prepared, Vector
+from solvers.base import Load
+
+
+def make_prepared(seed: int, pairs: int, tools: int = 0) -> Prepared:
+    """Two parts in contact at `pairs` nodes, the first one also with `tools` rigid supports."""
+    random = np.random.default_rng(seed)
+    blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
+    return prepared_from(blocks, contact_rows(pairs, tools))
+
+
+def make_strips(elements: int) -> Prepared:
+    """Two strings under tension on elastic beds (N/mm), a contact at each node: condition number ≈ 1e3."""
+    main, side = np.full(elements, 2e3 + 2.0), np.full(elements - 1, -1e3)
+    K = np.diag(main) + np.diag(side, 1) + np.diag(side, -1)
+    return prepared_from((K, 0.5 * K), contact_rows(elements, 0))
+
+
+def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, Load]:
+    """Random forces (N) and gaps (mm)."""
+    random = np.random.default_rng(seed)
+    f = random.normal(0, force, prepared.assembly.n)
+    g = random.uniform(0.01, 0.5, prepared.assembly.m)
+    case = LoadCase(f, g)
+    return case, Load(f, g, prepared.dual_load(case))
+
+
+def solve_by_nnls(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:
+    """x and λ, polished once on the active set that NNLS found."""
+    U = sla.cholesky(prepared.Q)
+    p = prepared.dual_load(case)
+    lam = scipy.optimize.nnls(U, sla.solve_triangular(U, p, trans="T"), maxiter=10_000)[0]
+    closed = lam > 0
+    lam[closed] = np.linalg.solve(prepared.Q[np.ix_(closed, closed)], p[closed])
+    # Not Prepared.recover, so that the expectation has nothing in common with it.
+    K = sla.block_diag(*prepared.assembly.blocks)
+    return np.linalg.solve(K, case.f - sp.csr_array(prepared.assembly.A) @ lam), lam

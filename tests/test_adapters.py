@@ -1,0 +1,280 @@
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import clarabel
+import cvxpy as cp
+import numpy as np
+import pytest
+import qpsolvers
+import scipy.linalg as sla
+import scipy.sparse as sp
+from small import make_load, make_prepared, make_strips, solve_by_nnls
+
+from harness.check import run
+from solvers.adapter import Converted, answer, dense, upper_triangle
+from solvers.base import FORMS, Form, Problem
+from solvers.registry import make_solver, solver_names
+from solvers.with_clarabel import STATUS as CLARABEL_STATUS
+from solvers.with_clarabel import Clarabel
+from solvers.with_osqp import Osqp
+from solvers.with_piqp import Piqp
+from solvers.with_proxqp import ProxQp
+from solvers.with_qpsolvers import TOLERANCE, QpSolvers
+
+NAMES = solver_names()
+LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")
+VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    *((name, {}) for name in NAMES),
+    ("clarabel", {"direct_solve_method": "qdldl"}),
+    ("proxqp", {"backend": "primal_ldlt"}),
+    ("proxqp", {"backend": "primal_dual_ldlt"}),
+    ("piqp", {"backend": "sparse"}),
+]
+CASES = [(name, options, form) for name, options in VARIANTS for form in FORMS]
+
+
+def skip_unless_taken(name: str, options: dict[str, Any], form: Form) -> None:
+    if form not in make_solver(name, options).forms:
+        pytest.skip(f"{name} does not take the {form} form")
+
+
+@pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
+def test_conformance(name: str, options: dict[str, Any]) -> None:
+    assert [str(finding) for finding in run(lambda: make_solver(name, options))] == []
+
+
+@pytest.mark.parametrize(("name", "options", "form"), CASES, ids=str)
+@pytest.mark.parametrize("kind", ["parts", "parts and tool", "strips"])
+def test_agrees_with_nnls(name: str, options: dict[str, Any], form: Form, kind: str) -> None:
+    skip_unless_taken(name, options, form)
+    prepared = {
+        "parts": lambda: make_prepared(1, 6),
+        "parts and tool": lambda: make_prepared(2, 20, 5),
+        "strips": lambda: make_strips(40),
+    }[kind]()
+    solver = make_solver(name, options)
+    state = solver.prepare(solver.convert(Problem(prepared, form)))
+    for seed in (3, 4):
+        case, load = make_load(seed, prepared)
+        expected_x, expected_lam = solve_by_nnls(prepared, case)
+        assert 0 < np.count_nonzero(expected_lam) < prepared.assembly.m  # a case with a real choice
+        got = solver.solve(solver.setup(state, load, 1e-9), load, 1e-9)
+        assert got.lam is not None
+        x = got.x if form == "primal" else prepared.recover(got.lam, case)
+        assert x is not None
+        np.testing.assert_allclose(x, expected_x, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(got.lam, expected_lam, rtol=0, atol=1e-3)
+        assert got.status == "solved"
+
+
+def test_both_forms_are_stated_rightly() -> None:
+    """cvxpy, which knows nothing of the dual form's derivation, on the primal and on the dual."""
+    prepared = make_prepared(5, 8, 3)
+    case, load = make_load(6, prepared)
+    _, n, m = prepared.Q, prepared.assembly.n, prepared.assembly.m
+    K = sla.block_diag(*prepared.assembly.blocks)
+    x, lam = cp.Variable(n), cp.Variable(m)
+    rows = prepared.assembly.A.T.toarray() @ x <= case.g
+    settings = {"solver": "CLARABEL", "tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
+    cp.Problem(cp.Minimize(cp.quad_form(x, cp.psd_wrap(K)) / 2 - case.f @ x), [rows]).solve(**settings)
+    cp.Problem(cp.Minimize(cp.quad_form(lam, cp.psd_wrap(prepared.Q)) / 2 - load.p @ lam), [lam >= 0]).solve(
+        **settings
+    )
+    expected_x, expected_lam = solve_by_nnls(prepared, case)
+    np.testing.assert_allclose(x.value, expected_x, atol=1e-6)
+    np.testing.assert_allclose(rows.dual_value, expected_lam, atol=1e-3)
+    np.testing.assert_allclose(lam.value, expected_lam, atol=1e-3)
+
+
+def test_nnls_agrees_with_trying_every_active_set() -> None:
+    prepared = make_prepared(7, 5, 1)
+    case, load = make_load(8, prepared)
+    Q, p, m = prepared.Q, load.p, prepared.assembly.m
+    found = []
+    for size in range(m + 1):
+        for closed in map(list, itertools.combinations(range(m), size)):
+            lam = np.zeros(m)
+            lam[closed] = np.linalg.solve(Q[np.ix_(closed, closed)], p[closed])
+            if lam.min() >= 0 and (Q @ lam - p).min() > -1e-12:
+                found.append(lam)
+    assert len(found) == 1
+    np.testing.assert_allclose(solve_by_nnls(prepared, case)[1], found[0], atol=1e-9)
+
+
+# Tolerances and settings that really reach the library.
+
+
+def library_of(solver: Any, form: Form, tolerance: float) -> Any:
+    prepared = make_prepared(9, 4)
+    _, load = make_load(10, prepared)
+    return solver.setup(solver.prepare(solver.convert(Problem(prepared, form))), load, tolerance)[1]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_settings_that_osqp_holds(form: Form) -> None:
+    settings = library_of(Osqp(polishing=True), form, 3e-7).settings
+    assert (settings.eps_abs, settings.eps_rel) == (3e-7, 0.0)
+    assert (settings.check_dualgap, settings.polishing) == (1, 1)
+    assert (settings.adaptive_rho, settings.adaptive_rho_interval) == (1, 50)
+    assert settings.max_iter >= 1_000_000
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_settings_that_clarabel_holds(form: Form) -> None:
+    settings = library_of(Clarabel(direct_solve_method="qdldl"), form, 3e-7).get_settings()
+    assert (settings.tol_feas, settings.tol_gap_abs, settings.tol_gap_rel) == (3e-7, 3e-7, 0.0)
+    assert settings.direct_solve_method == "qdldl"
+    assert settings.equilibrate_enable is (form == "primal")
+    assert settings.max_threads == 0  # the environment decides
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_settings_that_proxqp_holds(form: Form) -> None:
+    library = library_of(ProxQp(backend="primal_ldlt"), form, 3e-7)
+    settings = library.settings
+    assert (settings.eps_abs, settings.eps_rel) == (3e-7, 0.0)
+    assert settings.check_duality_gap
+    assert (settings.eps_duality_gap_abs, settings.eps_duality_gap_rel) == (3e-7, 0.0)
+    assert library.is_box_constrained() is (form == "dual")
+    assert library.which_dense_backend().name == "PrimalLDLT"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_settings_that_piqp_holds(form: Form) -> None:
+    settings = library_of(Piqp(), form, 3e-7).settings
+    assert (settings.eps_abs, settings.eps_rel) == (3e-7, 0.0)
+    assert settings.check_duality_gap
+    assert (settings.eps_duality_gap_abs, settings.eps_duality_gap_rel) == (3e-7, 0.0)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", [*LIBRARIES, "scs"])
+def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy(name: str, form: Form) -> None:
+    prepared = make_strips(40)
+    case, load = make_load(11, prepared)
+    expected_x, _ = solve_by_nnls(prepared, case)
+    errors, iterations = [], []
+    for tolerance in (1e-1, 1e-9):
+        solver = make_solver(name, {})
+        state = solver.prepare(solver.convert(Problem(prepared, form)))
+        got = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
+        assert got.lam is not None
+        x = got.x if form == "primal" else prepared.recover(got.lam, case)
+        errors.append(np.abs(x - expected_x).max())
+        iterations.append(got.iterations)
+    assert iterations[0] < iterations[1]
+    assert errors[1] < 0.1 * errors[0]
+
+
+@pytest.mark.parametrize("name", sorted(TOLERANCE))
+def test_tolerance_reaches_qpsolvers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: dict[str, Any] = {}
+    original = qpsolvers.solve_problem
+
+    def spy(problem: Any, solver: str, **settings: Any) -> Any:
+        seen.update(settings)
+        return original(problem, solver, **settings)
+
+    monkeypatch.setattr(qpsolvers, "solve_problem", spy)
+    prepared = make_prepared(12, 4)
+    _, load = make_load(13, prepared)
+    solver = QpSolvers(name)
+    got = solver.solve(solver.setup(solver.convert(Problem(prepared, "dual")), load, 3e-7), load, 3e-7)
+    assert 3e-7 in seen.values()
+    assert "tolerance" not in got.details
+
+
+def test_a_solver_that_takes_no_tolerance_says_so() -> None:
+    prepared = make_prepared(12, 4)
+    _, load = make_load(13, prepared)
+    solver = QpSolvers("quadprog")
+    ready = solver.setup(solver.convert(Problem(prepared, "primal")), load, 1e-9)
+    assert solver.solve(ready, load, 1e-9).details["tolerance"] == "not taken"
+
+
+def test_highs_accepts_the_settings_it_is_given() -> None:
+    import highspy
+
+    library = highspy.Highs()
+    library.setOptionValue("log_to_console", False)
+    for key, value in TOLERANCE["highs"](1e-12).items():
+        assert library.setOptionValue(key, value) == highspy.HighsStatus.kOk, key
+
+
+# What the adapters share.
+
+
+def test_matrices_in_the_libraries_formats() -> None:
+    random = np.random.default_rng(14)
+    blocks = [B + B.T for B in (random.standard_normal((k, k)) for k in (3, 1, 4))]
+    whole = sla.block_diag(*blocks)
+    upper = upper_triangle(blocks)
+    assert upper.has_sorted_indices
+    assert upper.nnz == 6 + 1 + 10
+    np.testing.assert_array_equal(upper.toarray(), np.triu(whole))
+    np.testing.assert_array_equal(dense(blocks), whole)
+    assert dense(blocks).flags.f_contiguous
+    assert np.shares_memory(dense(blocks[:1]), blocks[0])
+
+
+def test_small_negative_multipliers_become_zero_and_large_ones_stay() -> None:
+    lam = np.array([1.0, -1e-10, -1e-3])
+    got = answer("solved", 1e-9, lam)
+    assert got.lam is not None
+    assert got.lam.tolist() == [1.0, 0.0, -1e-3]
+    assert lam[1] == -1e-10  # the library's own array is left alone
+
+
+def test_values_that_are_not_finite_are_no_answer() -> None:
+    assert answer("solved", 1e-9, np.array([1.0, np.nan])).status == "failed"
+    assert answer("solved", 1e-9, np.ones(2), np.array([np.inf])).lam is None
+
+
+def test_almost_solved_is_not_solved() -> None:
+    assert CLARABEL_STATUS[str(clarabel.SolverStatus.AlmostSolved)] == "inaccurate"
+    assert [key for key, status in CLARABEL_STATUS.items() if status == "solved"] == ["Solved"]
+
+
+@pytest.mark.parametrize(("name", "iterations"), [("piqp", "max_iter"), ("clarabel", "max_iter")])
+def test_a_stopped_solver_does_not_say_solved(
+    name: str, iterations: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A tolerance below rounding cannot be met: whatever the library does, it is not called solved."""
+    prepared = make_strips(40)
+    _, load = make_load(15, prepared)
+    solver = make_solver(name, {})
+    got = solver.solve(solver.setup(solver.convert(Problem(prepared, "primal")), load, 1e-300), load, 1e-300)
+    assert got.status != "solved"
+
+
+def test_linear_term_has_the_sign_of_the_libraries() -> None:
+    _, load = make_load(16, make_prepared(16, 3))
+    np.testing.assert_array_equal(Converted("primal", None).q(load), -load.f)
+    np.testing.assert_array_equal(Converted("dual", None).q(load), -load.p)
+
+
+def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
+    """OSQP says solved here with a dual residual of 4e-7 at a tolerance of 1e-9."""
+    prepared = make_strips(40)
+    case, load = make_load(3, prepared)
+    expected_x, _ = solve_by_nnls(prepared, case)
+    answers = {}
+    for polishing in (False, True):
+        solver = Osqp(polishing=polishing)
+        ready = solver.setup(solver.convert(Problem(prepared, "dual")), load, 1e-9)
+        answers[polishing] = solver.solve(ready, load, 1e-9)
+    polished = answers[True]
+    assert polished.details == {"status": "solved", "polish": "accepted"}
+    assert polished.lam is not None
+    assert np.abs(prepared.recover(polished.lam, case) - expected_x).max() > 1e-7
+    assert polished.status == "inaccurate"
+    assert answers[False].status == "solved"
+
+
+def test_sparse_rows_have_the_orientation_of_the_libraries() -> None:
+    prepared = make_prepared(17, 3, 2)
+    rows = Clarabel().convert(Problem(prepared, "primal")).rows
+    assert sp.issparse(rows)
+    assert rows.shape == (prepared.assembly.m, prepared.assembly.n)

@@ -1,0 +1,212 @@
+"""Each solver here has one fault; `check` must name it, and must find nothing in the one without."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from small import make_prepared
+
+from harness.check import run
+from harness.trials import known_case, trials
+from problems.assembly import LoadCase
+from solvers.base import Answer, Form, Load, Problem, Solver
+from solvers.registry import make_solver
+
+
+class Sound(Solver):
+    """Piqp in a wrapper whose answer a subclass spoils."""
+
+    forms: tuple[Form, ...] = ("primal", "dual")  # type: ignore[misc]
+
+    def __init__(self) -> None:
+        self.inner = make_solver("piqp", {})
+
+    def convert(self, problem: Problem) -> Any:
+        self.problem = problem
+        return self.inner.convert(problem)
+
+    def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+        return self.inner.setup(state, load, tolerance)
+
+    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
+        return self.spoil(self.inner.solve(ready, load, tolerance), load)
+
+    def spoil(self, answer: Answer, load: Load) -> Answer:
+        return answer
+
+
+def spoiling(change: Callable[[Answer], Any]) -> type[Sound]:
+    class Spoilt(Sound):
+        def spoil(self, answer: Answer, load: Load) -> Answer:
+            return change(answer)
+
+    return Spoilt
+
+
+def words_of(solver: type[Solver], forms: tuple[Form, ...] | None = None) -> str:
+    return "\n".join(map(str, run(solver, forms)))
+
+
+def lam_of(answer: Answer) -> np.ndarray:
+    assert answer.lam is not None
+    return answer.lam
+
+
+def test_a_sound_solver_has_no_findings() -> None:
+    assert run(Sound) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda a: replace(a, lam=lam_of(a)[:, None]), "lam has the shape"),
+        (lambda a: replace(a, lam=lam_of(a)[:-1]), "lam has the shape"),
+        (lambda a: replace(a, lam=list(lam_of(a))), "lam is list"),
+        (lambda a: replace(a, lam=lam_of(a).astype(np.float32)), "lam is float32"),
+        (
+            lambda a: replace(a, lam=np.full_like(lam_of(a), np.nan)),
+            "lam has NaN or infinite values, and yet",
+        ),
+        (lambda a: replace(a, lam=-lam_of(a)), "lam has the wrong sign"),
+        (lambda a: replace(a, lam=2 * lam_of(a)), "mm off (limit 1e-07 mm at tolerance 1e-09), and yet"),
+        (lambda a: replace(a, lam=lam_of(a) * (1 + 1e-5), status="inaccurate"), 'status "inaccurate"'),
+        (lambda a: replace(a, lam=None), 'status is "solved" but lam is None'),
+        (lambda a: replace(a, lam=None, status="failed"), 'no answer, status "failed"'),
+        (lambda a: replace(a, status="failed"), 'status is "failed" beside a right answer'),
+        (lambda a: replace(a, status="optimal"), "status is 'optimal'"),
+        (lambda a: replace(a, details={"x": np.ones(2)}), "details is not JSON"),
+        (lambda a: replace(a, iterations=-1), "iterations is -1"),
+        (lambda a: replace(a, reported_s="fast"), "reported_s is 'fast'"),
+        (lambda a: a.lam, "solve returned ndarray"),
+    ],
+)
+@pytest.mark.parametrize("form", ["primal", "dual"])
+def test_a_fault_is_named(change: Callable[[Answer], Any], expected: str, form: Form) -> None:
+    words = words_of(spoiling(change), (form,))
+    assert expected in words
+    assert f"[{form}]" in words
+
+
+def test_a_primal_answer_needs_right_displacements() -> None:
+    assert "x is None" in words_of(spoiling(lambda a: replace(a, x=None)), ("primal",))
+
+    def moved(answer: Answer) -> Answer:
+        return answer if answer.x is None else replace(answer, x=answer.x + 2e-7)
+
+    assert "x is 2e-07 mm off" in words_of(spoiling(moved), ("primal",))
+    assert run(spoiling(moved), ("dual",)) == []
+
+
+def test_an_error_within_the_limit_is_not_a_finding() -> None:
+    def moved(answer: Answer) -> Answer:
+        return answer if answer.x is None else replace(answer, x=answer.x + 0.5e-7)
+
+    assert run(spoiling(moved), ("primal",)) == []
+
+
+def test_a_tolerance_that_is_ignored() -> None:
+    class Deaf(Sound):
+        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+            return self.inner.setup(state, load, 1e-1)
+
+    words = words_of(Deaf, ("dual",))
+    assert "it ignores the tolerance" in words
+    assert "and yet status is" in words
+
+
+def test_arrays_that_are_changed() -> None:
+    class Writes(Sound):
+        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+            load.p[0] += 1.0
+            return super().setup(state, load, tolerance)
+
+    assert "copy, then write" in words_of(Writes, ("dual",))
+
+    class WritesByForce(Sound):
+        """As a compiled extension would, which does not look at the read-only flag."""
+
+        def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
+            answer = super().solve(ready, load, tolerance)
+            load.f.flags.writeable = True
+            load.f[-1] += 1e-13 * max(1.0, abs(load.f[-1]))
+            load.f.flags.writeable = False
+            return answer
+
+    assert "changed the arrays that it was given" in words_of(WritesByForce, ("dual",))
+
+
+def test_an_answer_that_is_not_repeatable() -> None:
+    random = np.random.default_rng(1)
+
+    class Jitter(Sound):
+        def spoil(self, answer: Answer, load: Load) -> Answer:
+            lam = lam_of(answer)
+            return replace(answer, lam=lam * (1 + 1e-7 * random.uniform(0.5, 1)))
+
+    assert "not repeatable" in words_of(Jitter, ("dual",))
+
+
+def test_a_second_load_case_on_one_state() -> None:
+    class Remembers(Sound):
+        """Solves every load case on a state as if it were the first one."""
+
+        def prepare(self, data: Any) -> Any:
+            self.first: Load | None = None
+            return data
+
+        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+            self.first = self.first or load
+            return self.inner.setup(state, self.first, tolerance)
+
+    assert "wrong as a second load case" in words_of(Remembers, ("dual",))
+
+
+def test_a_step_that_raises_is_named_with_its_line() -> None:
+    class Raises(Sound):
+        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+            raise RuntimeError("no licence")
+
+    words = words_of(Raises, ("dual",))
+    assert "setup: raised RuntimeError: no licence" in words
+    assert "test_check.py, line" in words
+
+
+def test_wrong_forms_and_a_failing_constructor() -> None:
+    class Wrong(Sound):
+        forms = ("both",)  # type: ignore[assignment]
+
+    class Fails(Sound):
+        def __init__(self) -> None:
+            raise KeyError("x")
+
+    assert "forms is ('both',)" in words_of(Wrong)
+    assert "constructor: raised KeyError" in words_of(Fails)
+
+
+def test_one_fault_is_reported_once_a_form() -> None:
+    words = words_of(spoiling(lambda a: replace(a, lam=-lam_of(a))), ("dual",)).splitlines()
+    assert len(words) == 1
+
+
+def test_known_answers_fulfil_the_optimality_conditions() -> None:
+    for trial in trials():
+        prepared, assembly = trial.prepared, trial.prepared.assembly
+        for case in trial.cases:
+            gap = case.load.g - assembly.A.T @ case.x
+            force = assembly.multiply_K(case.x) - case.load.f + assembly.A @ case.lam
+            assert np.abs(force).max() < 1e-9
+            assert gap.min() > -1e-12
+            assert case.lam.min() >= 0
+            assert abs(case.lam @ gap) < 1e-9
+            again = prepared.recover(case.lam, LoadCase(case.load.f, case.load.g))
+            np.testing.assert_allclose(again, case.x, atol=1e-11)
+
+
+def test_trials_have_open_and_closed_contacts() -> None:
+    case = known_case(np.random.default_rng(2), make_prepared(2, 20), 0.5, "half")
+    assert 0 < np.count_nonzero(case.lam) < 20
+    assert {0, 40} <= {np.count_nonzero(case.lam) for case in trials()[2].cases}

@@ -1,0 +1,71 @@
+"""The judge's figures on a problem solved by hand.
+
+Two springs of 2 N/mm, pushed together by f = (3, −1) N with a gap of 0.5 mm between them: free they
+would move 1.5 and −0.5 mm and overlap by 1.5; λ = 1.5 N holds them at x = (0.75, 0.25).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from harness.judge import Judgement, judge
+from harness.reference import Reference
+from problems.assembly import Assembly, LoadCase, Prepared
+
+X, LAM = np.array([0.75, 0.25]), np.array([1.5])
+
+
+def judged(x: np.ndarray, lam: np.ndarray, bound_mm: float = 1e-15) -> Judgement:
+    springs = (np.array([[2.0]]), np.array([[2.0]]))
+    assembly = Assembly(springs, sp.csc_array([[1.0], [-1.0]]))
+    prepared = Prepared(assembly, (np.array([[2**0.5]]),) * 2, np.array([[1.0]]))
+    load = LoadCase(np.array([3.0, -1.0]), np.array([0.5]))
+    reference = Reference(X, LAM, np.array([True]), bound_mm, "by hand")
+    return judge(prepared, load, reference, np.asarray(x), np.asarray(lam), 1e-7)
+
+
+def test_the_exact_answer() -> None:
+    assert judged(X, LAM) == Judgement("within", 1e-15, 0.0, 0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_an_answer_without_contact() -> None:
+    found = judged(np.array([1.5, -0.5]), np.array([0.0]))
+    assert found.verdict == "outside"
+    assert found.displacement_error_mm == 0.75
+    assert found.min_gap_mm == -1.5
+    assert found.primal_residual == 1.5
+    assert found.dual_residual == 0.0
+    assert found.duality_gap == 0.0  # xᵀKx − fᵀx = 5 − 5
+    assert found.contact_mismatch == 0  # overlapping is closed
+
+
+def test_an_answer_that_stays_open_with_a_pulling_force() -> None:
+    found = judged(np.array([0.7, 0.3]), np.array([-0.25]))
+    assert found.contact_mismatch == 1
+    assert found.min_gap_mm == pytest.approx(0.1)
+    assert found.primal_residual == 0.0
+    assert found.dual_residual == pytest.approx(1.85)  # |1.4 − 3 − 0.25|, above max(0, −λ) = 0.25
+    assert found.duality_gap == pytest.approx(abs(2 * 0.58 - 1.8 - 0.125))
+
+
+@pytest.mark.parametrize(("shift", "verdict"), [(0.9e-7, "within"), (2e-7, "outside")])
+def test_the_limit(shift: float, verdict: str) -> None:
+    found = judged(X - np.array([0.0, shift]), LAM)
+    assert (found.verdict, found.displacement_error_mm) == (verdict, pytest.approx(shift))
+
+
+@pytest.mark.parametrize("bound", [1.1e-8, np.inf, np.nan])
+def test_a_reference_that_is_not_known_well_enough(bound: float) -> None:
+    assert judged(X, LAM, bound).verdict == "cannot_be_judged"
+
+
+@pytest.mark.parametrize("x", [[0.75], [0.75, np.nan], [0.75, np.inf], [[0.75, 0.25]]])
+def test_no_answer(x: list[float]) -> None:
+    assert judged(np.array(x), LAM).verdict == "no_answer"
+
+
+def test_displacements_without_forces() -> None:
+    found = judged(X, np.array([np.nan]))
+    assert (found.verdict, found.dual_residual, found.duality_gap) == ("within", None, None)

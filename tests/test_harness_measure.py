@@ -1,0 +1,153 @@
+"""One measurement, whatever its solver does: a status, and no process left."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+import tiny
+
+from harness.measure import measure
+from harness.plan import Measurement
+
+MIB = 300
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("measure")
+    tiny.write_problem(folder / "tiny.npz")
+    (folder / "faulty.py").write_text(tiny.FAULTY)
+    (folder / "exact.py").write_text(tiny.EXACT)
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def _cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
+
+
+def outcome(folder: Path, fault: str | None, **changes: Any) -> dict[str, Any]:
+    measurement = Measurement(
+        **{
+            **{
+                "suite": "s",
+                "scene": "tiny",
+                "source": str(folder / "tiny.npz"),
+                "form": "dual",
+                "variant": "",
+            },
+            **{"tolerance": 1e-9, "threads": 1, "repeat": 0, "limit_mm": 1e-7, "gated": True},
+            **{"solver": "faulty" if fault else "exact", "options": {"fault": fault} if fault else {}},
+            "plugin": str(folder / ("faulty.py" if fault else "exact.py")),
+            **{"time_limit_s": 20.0, "memory_limit_mib": MIB},
+            **changes,
+        }
+    )
+    return measure(measurement, folder / "answer.npz")
+
+
+def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
+    row = outcome(folder, None)
+    assert row["status"] == "solved"
+    assert row["answer"] == "answers/answer.npz"
+    assert row["threads"] == 1
+    assert row["kernels"]
+    assert row["iterations"] == 1
+    assert 10 < row["peak_rss_mib"] < MIB
+    assert all(row[name] > 0 for name in ("load_s", "convert_s", "prepare_s", "setup_s", "solve_s", "form_s"))
+    with np.load(folder / "answer.npz") as saved, np.load(folder / "tiny.npz") as given:
+        x, lam, K, A = saved["x"], saved["lam"], given["K"], given["A"]
+        gap = given["g"] - A.T @ x
+        assert np.abs(K @ x - given["f"] + A @ lam).max() < 1e-12
+        assert lam.min() >= 0
+        assert gap.min() > -1e-14
+        assert np.abs(lam * gap).max() < 1e-13
+        assert 0 < np.count_nonzero(lam) < 10
+
+
+@pytest.mark.parametrize(
+    ("fault", "status", "message"),
+    [
+        ("signal", "crashed", "killed by SIGSEGV"),
+        ("leave", "crashed", "exit code 7"),
+        ("system_exit", "failed", "SystemExit: enough"),
+        ("raises", "failed", "ValueError: no step"),
+        ("eat", "memory_limit", f"more than {MIB} MiB"),
+        ("children_eat", "memory_limit", f"more than {MIB} MiB"),
+        ("out_of_memory", "memory_limit", "as numpy does"),
+        ("nan", "failed", "lam has NaN or infinity"),
+        ("shape", "failed", "lam has shape (9,); wanted (10,)"),
+        ("none", "failed", "solve returned NoneType"),
+        ("no_lam", "failed", "says solved, and gives no lam"),
+        ("status", "failed", "status 'optimal'; allowed: solved, inaccurate"),
+    ],
+)
+def test_a_fault_is_a_status_with_a_reason(folder: Path, fault: str, status: str, message: str) -> None:
+    row = outcome(folder, fault)
+    assert row["status"] == status
+    assert message in row["message"]
+    assert row.get("answer") is None
+
+
+def test_a_solver_that_hangs_is_ended(folder: Path) -> None:
+    row = outcome(folder, "hang", time_limit_s=0.3)
+    assert (row["status"], row["message"]) == ("time_limit", "solve took more than 0.3 s")
+    assert row["prepare_s"] > 0  # what was known before is kept
+
+
+def test_the_start_does_not_count_against_the_time_limit(folder: Path) -> None:
+    slow = folder / "slow.py"
+    slow.write_text("import time\ntime.sleep(1)\n" + tiny.EXACT)
+    row = outcome(folder, None, solver="slow", plugin=str(slow), time_limit_s=0.5)
+    assert row["status"] == "solved"
+
+
+def test_giving_up_without_an_answer_is_the_solvers_own_status(folder: Path) -> None:
+    row = outcome(folder, "gives_up")
+    assert (row["status"], row["answer"], row["iterations"]) == ("iteration_limit", None, 5)
+
+
+def test_floods_of_output_are_dropped_but_for_a_tail(folder: Path) -> None:
+    row = outcome(folder, "chatter")
+    assert row["status"] == "solved"
+    assert set(row["stderr"]) == {"e"}
+    assert len(row["stderr"]) <= 2000
+    assert outcome(folder, "big_details")["details"].keys() == {"dropped"}
+
+
+def test_a_child_that_runs_on_does_not_answer_twice(folder: Path) -> None:
+    assert outcome(folder, "fork_and_go_on")["status"] == "solved"
+
+
+def test_no_process_is_left(folder: Path) -> None:
+    """Not even one whose parent is gone and that has left the process group."""
+    pid = outcome(folder, "orphan")["details"]["pid"]
+    for _ in range(100):
+        if not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
+            break
+        time.sleep(0.02)
+    else:
+        os.kill(pid, 9)
+        pytest.fail("the orphan was still running")
+
+
+def test_a_form_that_the_solver_does_not_take(folder: Path) -> None:
+    row = outcome(folder, None, form="primal")
+    assert (row["status"], row["message"]) == ("unsupported", "takes dual only")
+
+
+def test_a_full_disk_is_not_the_solvers_fault(folder: Path) -> None:
+    nowhere = folder / "missing" / "answer.npz"
+    measurement_row = outcome(folder, None)
+    assert "cannot_save" not in measurement_row
+    made = Measurement(
+        "s", "tiny", str(folder / "tiny.npz"), "exact", "dual", "", {}, 1e-9, 1, 0, 20, MIB, 1e-7, True,
+        str(folder / "exact.py"),
+    )  # fmt: skip
+    assert str(nowhere) in measure(made, nowhere)["cannot_save"]

@@ -1,0 +1,272 @@
+"""A run from a suite to rows, answers, report and gate, through real workers on a tiny scene."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+import tiny
+from rich.console import Console
+from typer.testing import CliRunner
+
+from harness import records
+from harness.cli import app
+from harness.gate import gate
+from harness.run import run
+from harness.suite import read_suite
+
+ROOT = Path(__file__).parent.parent
+CONTRACT = {
+    "suite", "scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeat",
+    "status", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s",
+    "solver_reported_s", "displacement_error_mm", "limit_mm", "verdict", "reference_bound_mm",
+    "contact_mismatch", "min_gap_mm", "primal_residual", "dual_residual", "duality_gap", "peak_rss_mib",
+    "machine",
+}  # fmt: skip
+TWO = """
+[[solver]]
+name = "exact"
+forms = ["dual", "primal"]
+gated = false
+[[solver]]
+name = "exact"
+forms = ["dual"]
+tolerances = [1e-6, 1e-8]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("run")
+
+
+@pytest.fixture(autouse=True)
+def _cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
+
+
+def said_by(call: Any, *arguments: Any) -> tuple[int, str]:
+    console = Console(file=StringIO(), width=200)
+    code = call(*arguments, console)
+    return code, console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def rows_of(directory: Path) -> list[dict[str, Any]]:
+    return records.read(directory / records.MEASUREMENTS)
+
+
+@pytest.fixture(scope="module")
+def finished(folder: Path) -> Path:
+    """A directory with the rows of a run; tests take a copy."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
+        code, text = said_by(run, read_suite(str(tiny.write_suite(folder, TWO))), folder / "finished")
+    assert code == 0
+    assert "4 measurements, 0 of them already" in text
+    return folder / "finished"
+
+
+@pytest.fixture
+def copy(finished: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(finished, tmp_path / "copy"))
+
+
+def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
+    rows = rows_of(finished)
+    assert all(set(row) >= CONTRACT for row in rows)
+    judged = [row for row in rows if row["form"] == "dual"]
+    assert {(row["verdict"], row["status"], row["n"], row["m"]) for row in judged} == {
+        ("within", "solved", 20, 10)
+    }
+    assert all(row["displacement_error_mm"] < 1e-12 and row["contact_mismatch"] == 0 for row in judged)
+    (unsupported,) = [row for row in rows if row["form"] == "primal"]
+    assert (unsupported["status"], unsupported["verdict"]) == ("unsupported", "no_answer")
+    for row in judged:
+        with np.load(finished / row["answer"]) as saved:
+            assert (saved["x"].shape, saved["lam"].shape) == ((20,), (10,))
+    (problem,) = records.read(finished / "problems.jsonl")
+    with np.load(finished / "scenes" / "tiny.npz") as arrays, np.load(finished.parent / "tiny.npz") as given:
+        eigenvalues = np.linalg.eigvalsh(given["K"])
+        assert problem["cond_K"] == pytest.approx(eigenvalues[-1] / eigenvalues[0])
+        assert problem["active"] == np.count_nonzero(arrays["gap_after"] < 1e-12) == rows[0]["active"]
+        assert np.array_equal(arrays["gap_before"], given["g"])
+    assert json.loads((finished / "machine.json").read_text())["machine"] == rows[0]["machine"]
+
+
+def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
+    lines = (copy / records.MEASUREMENTS).read_bytes().splitlines(keepends=True)
+    (copy / records.MEASUREMENTS).write_bytes(lines[0] + lines[1] + lines[2] + lines[3][:50])
+    code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
+    assert code == 0
+    assert "the last line was torn" in text
+    assert "4 measurements, 3 of them already" in text
+    again = (copy / records.MEASUREMENTS).read_bytes().splitlines(keepends=True)
+    assert again[:3] == lines[:3]
+    assert len(again) == 4
+    assert json.loads(again[3])["key"] == json.loads(lines[3])["key"]
+
+
+def test_rows_of_another_scene_or_limit_are_set_aside(copy: Path, folder: Path, tmp_path: Path) -> None:
+    suite = read_suite(str(folder / "small.toml"))
+    solver = suite.solver[1].model_copy(update={"tolerances": [1e-6]})
+    suite = suite.model_copy(update={"solver": [solver]})
+    rows = rows_of(copy)
+    for row in rows:
+        row["scene_key"] = "of an older scene" if row["tolerance"] == 1e-6 else row["scene_key"]
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    code, text = said_by(run, suite, copy)
+    assert code == 0
+    assert "1 rows are set aside" in text
+    (aside,) = records.read(copy / records.OUTDATED)
+    assert (aside["scene_key"], aside["answer"]) == ("of an older scene", None)
+    assert len(rows_of(copy)) == 4
+
+
+def moved(answer: Path, shift: float, index: int = 7) -> None:
+    with np.load(answer) as saved:
+        x, lam = saved["x"].copy(), saved["lam"]
+    x[index] += shift
+    np.savez(answer, x=x, lam=lam)
+
+
+def test_gate_passes(finished: Path) -> None:
+    code, text = said_by(gate, finished)
+    assert code == 0
+    assert "all 2 gated rows" in text
+
+
+def test_gate_believes_the_answers_and_not_the_rows(copy: Path) -> None:
+    rows = rows_of(copy)
+    for row in rows:
+        row.update(verdict="outside", displacement_error_mm=1.0, reference_bound_mm=1.0)
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    assert said_by(gate, copy)[0] == 0
+    for row in rows:
+        row.update(verdict="within", displacement_error_mm=0.0, limit_mm=1.0)
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    moved(copy / rows[2]["answer"], 2e-7)
+    code, text = said_by(gate, copy)
+    assert code == 1
+    assert "2.000e-07 mm from the reference" in text
+
+
+def test_gate_lets_a_shift_within_the_limit_pass_and_ignores_what_is_not_gated(copy: Path) -> None:
+    rows = rows_of(copy)
+    moved(copy / rows[2]["answer"], 0.5e-7)
+    (free,) = [row for row in rows if row["answer"] and not row["gated"]]
+    moved(copy / free["answer"], 1.0)
+    assert said_by(gate, copy)[0] == 0
+
+
+@pytest.mark.parametrize("harm", ["delete", "truncate", "no_answer", "row_missing", "other_scene"])
+def test_gate_takes_a_missing_answer_for_lost_accuracy(copy: Path, harm: str) -> None:
+    rows = rows_of(copy)
+    answer = copy / rows[2]["answer"]
+    match harm:
+        case "delete":
+            answer.unlink()
+        case "truncate":
+            answer.write_bytes(answer.read_bytes()[:100])
+        case "no_answer":
+            rows[2].update(answer=None, status="crashed", message="killed by SIGSEGV")
+        case "row_missing":
+            del rows[2]
+        case "other_scene":
+            rows[2]["scene_key"] = "older"
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    assert said_by(gate, copy)[0] == 1
+
+
+@pytest.mark.parametrize("rows_kept", ["none", "all_failed", "none_gated"])
+def test_gate_with_nothing_to_judge(copy: Path, rows_kept: str) -> None:
+    rows = [] if rows_kept == "none" else rows_of(copy)
+    for row in rows:
+        row.update({"answer": None} if rows_kept == "all_failed" else {"gated": False})
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    code, text = said_by(gate, copy)
+    assert code == 3
+    assert "Nothing could be judged" in text
+
+
+def harness(*arguments: object) -> Any:
+    """The command line, in this process."""
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path) -> None:
+    asked = {
+        ("gate", folder / "nowhere"): "no such directory",
+        ("run", "nosuch"): "no such suite",
+        ("run", folder / "small.toml", "--solver", "exat"): "did you mean exact",
+        ("run", folder / "small.toml", "--out", folder / "tiny.npz" / "out"): "cannot be written",
+    }
+    for arguments, message in asked.items():
+        done = harness(*arguments)
+        assert done.exit_code == 2
+        assert message in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+    with (copy / records.MEASUREMENTS).open("ab") as file:
+        file.write(b'{"torn')
+    for name in ("gate", "report"):
+        done = harness(name, copy)
+        assert done.exit_code == 2
+        assert "measurements.jsonl: line 5" in done.stderr
+
+
+def test_a_run_without_any_answer_does_not_pass(folder: Path) -> None:
+    (folder / "faulty.py").write_text(tiny.FAULTY)
+    text = '[[solver]]\nname = "faulty"\noptions = {fault = "nan"}\n'
+    suite = read_suite(str(tiny.write_suite(folder / "nan", text, plugin="../faulty.py")))
+    assert said_by(run, suite, folder / "failed")[0] == 3
+    assert said_by(gate, folder / "failed")[0] == 3
+
+
+@pytest.mark.parametrize(("ending", "code"), [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)])
+def test_an_ended_run_keeps_its_rows_and_goes_on(folder: Path, ending: signal.Signals, code: int) -> None:
+    here = folder / ending.name
+    text = """
+    [[solver]]
+    name = "faulty"
+    options = {fault = "gives_up"}
+    [[solver]]
+    name = "faulty"
+    variant = "hangs"
+    options = {fault = "hang"}
+    """
+    suite = tiny.write_suite(here, text, plugin="faulty.py", time_limit_s=100)
+    (here / "faulty.py").write_text(tiny.FAULTY)
+    rows = here / "out" / records.MEASUREMENTS
+    command = [sys.executable, "-m", "harness", "run", str(suite), "--out", str(here / "out")]
+    going = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE)
+    workers = wait_for(lambda: rows.exists() and rows.read_bytes() and psutil.Process(going.pid).children())
+    second = harness("run", suite, "--out", here / "out")
+    assert second.exit_code == 2
+    assert "another run is writing here" in second.stderr
+    os.kill(going.pid, ending)
+    going.communicate(timeout=30)
+    assert going.returncode == code
+    wait_for(lambda: not any(worker.is_running() and worker.status() != "zombie" for worker in workers))
+    before = rows.read_bytes()
+    code, text = said_by(run, read_suite(str(suite)).model_copy(update={"time_limit_s": 0.2}), here / "out")
+    assert "2 measurements, 1 of them already" in text
+    assert rows.read_bytes().startswith(before)
+    assert [row["status"] for row in rows_of(here / "out")] == ["iteration_limit", "time_limit"]
+
+
+def wait_for(condition: Any) -> Any:
+    deadline = time.monotonic() + 60
+    while not (found := condition()):
+        assert time.monotonic() < deadline, "waited too long"
+        time.sleep(0.05)
+    return found

@@ -1,0 +1,160 @@
+"""Suite files, the plan made of them, and what the command line changes."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+import tiny
+
+from harness.plan import Measurement, Overrides, expand, overridden
+from harness.run import refuse_what_cannot_fit
+from harness.suite import Suite, read_suite, suite_names, to_toml, validated
+from problems.errors import InputError
+
+TWO = """
+[[solver]]
+name = "exact"
+forms = ["dual"]
+[[solver]]
+name = "piqp"
+forms = ["dual", "primal"]
+variant = "plain"
+options = {}
+tolerances = [1e-3, 1e-6]
+gated = false
+time_limit_s = 3
+"""
+
+
+def plan_of(tmp_path: Path, **keys: object) -> list[Measurement]:
+    return expand(read_suite(str(tiny.write_suite(tmp_path, TWO, **keys))))
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_the_suites_of_the_package_can_be_planned(name: str) -> None:
+    assert expand(read_suite(name))
+
+
+def test_a_plan_is_the_product_of_what_the_suite_says(tmp_path: Path) -> None:
+    plan = plan_of(tmp_path, threads=[1, 2], repeats=3)
+    assert len(plan) == 3 * 2 * (1 + 2 * 2)
+    assert len({m.key for m in plan}) == len({m.stem for m in plan}) == len(plan)
+    first, last = plan_of(tmp_path)[0], plan_of(tmp_path)[-1]
+    assert first.key == "tiny exact dual tol=1e-09 threads=1 repeat=0"
+    assert last.key == "tiny piqp primal plain tol=1e-06 threads=1 repeat=0"
+    assert (first.gated, first.time_limit_s, last.gated, last.time_limit_s) == (True, 20, False, 3)
+    assert Path(first.source).is_absolute()
+
+
+def test_repeats_are_interleaved_and_shuffled_the_same_way_each_time(tmp_path: Path) -> None:
+    plan = plan_of(tmp_path, repeats=4)
+    assert [m.repeat for m in plan] == sorted(m.repeat for m in plan)
+    assert [m.key for m in plan] == [m.key for m in plan_of(tmp_path, repeats=4)]
+    rounds = [[m.stem[:-1] for m in plan if m.repeat == repeat] for repeat in range(4)]
+    assert len({tuple(one) for one in rounds}) > 1
+    assert len({frozenset(one) for one in rounds}) == 1
+
+
+def test_what_is_written_beside_the_rows_reads_back_the_same(tmp_path: Path) -> None:
+    suite = read_suite(str(tiny.write_suite(tmp_path, TWO, title='a "quoted" title — ü')))
+    assert validated(tomllib.loads(to_toml(suite)), tmp_path / "suite.toml") == suite
+
+
+def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
+    text = """
+    [[solver]]
+    name = "osqq"
+    form = ["dual"]
+    [[solver]]
+    name = "piqp"
+    forms = ["duel"]
+    """
+    path = tiny.write_suite(tmp_path, text, scenes=["4386/9999"], time_limit_s=-1, tolerence=[1.0])
+    with pytest.raises(InputError) as caught:
+        read_suite(str(path))
+    faults = {fault.key: fault for fault in caught.value.faults}
+    assert set(faults) == {
+        *("scenes", "time_limit_s", "tolerence"),
+        *("solver.0.name", "solver.0.form", "solver.1.forms.0"),
+    }
+    assert all(fault.where == str(path) for fault in faults.values())
+    assert "did you mean osqp" in faults["solver.0.name"].allowed
+    assert "did you mean forms?" in faults["solver.0.form"].allowed
+    assert "did you mean tolerances?" in faults["tolerence"].allowed
+    assert "4386/" in faults["scenes"].allowed
+    assert "'primal' or 'dual'" in faults["solver.1.forms.0"].allowed
+
+
+def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> None:
+    text = '[[solver]]\nname = "gi"\n[[solver]]\nname = "gi"\noptions = {a = 1}\n'
+    with pytest.raises(InputError, match=r"solver\.1\.variant"):
+        read_suite(str(tiny.write_suite(tmp_path, text)))
+
+
+def test_unknown_suite_names_the_known_ones() -> None:
+    with pytest.raises(InputError, match=r"did you mean default\? allowed: default, gate"):
+        read_suite("defualt")
+
+
+class TestOverrides:
+    @pytest.fixture
+    def suite(self, tmp_path: Path) -> Suite:
+        return read_suite(str(tiny.write_suite(tmp_path, TWO, scenes=["tiny.npz", "4386/0052", "6112/0120"])))
+
+    def test_scenes_sizes_and_solvers(self, suite: Suite) -> None:
+        changed = overridden(suite, Overrides(sizes=(6112,), solvers=("gi", "exact")))
+        assert changed.scenes == ["6112/0120"]
+        assert [(e.name, e.forms) for e in changed.solver] == [("exact", ["dual"]), ("gi", None)]
+        assert overridden(suite, Overrides(scenes=("4386/00*",))).scenes == ["4386/0052"]
+
+    def test_figures_take_the_place_of_the_entries_own(self, suite: Suite) -> None:
+        change = Overrides(
+            forms=("primal",),
+            tolerances=(1e-4,),
+            repeats=2,
+            threads=(3,),
+            time_limit_s=7,
+            memory_limit_mib=99,
+        )
+        plan = expand(overridden(suite, change))
+        assert len(plan) == 3 * 2 * 2
+        assert {(m.form, m.tolerance, m.threads, m.time_limit_s, m.memory_limit_mib) for m in plan} == {
+            ("primal", 1e-4, 3, 7, 99)
+        }
+
+    def test_a_plugin_joins_the_suites_solvers(self, suite: Suite, tmp_path: Path) -> None:
+        own = tmp_path / "mine.py"
+        own.write_text(tiny.EXACT)
+        suite = suite.model_copy(update={"solver": suite.solver[1:]})
+        changed = overridden(suite, Overrides(plugin=own))
+        assert [entry.name for entry in changed.solver] == ["piqp", "mine"]
+        assert changed.plugin == str(own)
+        assert [e.name for e in overridden(suite, Overrides(plugin=own, solvers=("mine",))).solver] == [
+            "mine"
+        ]
+
+    def test_unknown_names_give_the_known_ones(self, suite: Suite) -> None:
+        with pytest.raises(InputError, match="allowed: 4386, 6112"):
+            overridden(suite, Overrides(sizes=(4387,)))
+        with pytest.raises(InputError, match=r"no such solver; did you mean clarabel\?"):
+            overridden(suite, Overrides(solvers=("clarabell",)))
+        with pytest.raises(InputError, match="no such scene"):
+            overridden(suite, Overrides(scenes=("nowhere",)))
+
+
+def test_what_cannot_fit_is_refused(tmp_path: Path) -> None:
+    suite = read_suite(str(tiny.write_suite(tmp_path, scenes=["4386/0052"], memory_limit_mib=100)))
+    with pytest.raises(InputError, match=r"matrices of scene 4386/0052 alone take 18\d MiB"):
+        refuse_what_cannot_fit(expand(suite))
+    with pytest.raises(InputError, match="this machine has"):
+        refuse_what_cannot_fit(expand(overridden(suite, Overrides(memory_limit_mib=10**9))))
+    refuse_what_cannot_fit(expand(overridden(suite, Overrides(memory_limit_mib=400))))
+
+
+def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    tiny.write_problem(tmp_path / "other" / "tiny.npz")
+    with pytest.raises(InputError, match="another is called tiny too"):
+        plan_of(tmp_path, scenes=["tiny.npz", "other/tiny.npz"])

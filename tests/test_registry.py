@@ -1,0 +1,117 @@
+"""Solvers by name, their options, and a user's own solver from a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from problems.errors import InputError
+from solvers.plugin import load_plugin
+from solvers.registry import SOLVERS, make_solver, solver_names, solver_version
+from solvers.with_osqp import Osqp
+
+NAMES = solver_names()
+LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")
+
+
+def test_registry_names_in_house_libraries_and_what_qpsolvers_finds() -> None:
+    assert NAMES[:6] == list(SOLVERS)
+    assert {"quadprog", "daqp"} <= set(NAMES)
+    assert len(NAMES) == len(set(NAMES))
+
+
+@pytest.mark.parametrize("name", LIBRARIES)
+def test_versions_are_those_installed(name: str) -> None:
+    assert solver_version(name)[0].isdigit()
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("osqpp", {}, ["osqpp", "did you mean 'osqp'"]),
+        ("osqp", {"polish": True, "speed": 9}, ["options.polish", "options.speed", "polishing"]),
+        ("osqp", {"polishing": 1}, ["solver osqp", "options.polishing = 1", "False, True"]),
+        ("clarabel", {"direct_solve_method": "mumps"}, ["'mumps'", "'faer', 'qdldl', 'auto'"]),
+        ("proxqp", {"backend": "sparse"}, ["options.backend", "'automatic'"]),
+        ("piqp", {"backend": "gpu"}, ["options.backend", "'dense', 'sparse'"]),
+        ("quadprog", {"tol": 1}, ["options.tol", "no options"]),
+    ],
+)
+def test_bad_names_and_options_are_input_errors(name: str, options: dict[str, Any], words: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        make_solver(name, options)
+    assert len(caught.value.faults) == max(1, len(options))
+    for word in words:
+        assert word in str(caught.value)
+
+
+# Plugins.
+
+GOOD = """
+import numpy as np
+from solvers.base import Answer, Solver
+
+class Diagonal(Solver):
+    forms = ("dual",)
+    def __init__(self, *, sweeps: int = 5000):
+        self.sweeps = sweeps
+    def solve(self, ready, load, tolerance):
+        Q, lam = ready.Q, np.zeros(len(load.p))
+        for _ in range(self.sweeps):
+            for i in range(len(lam)):
+                lam[i] = max(0.0, lam[i] - (Q[i] @ lam - load.p[i]) / Q[i, i])
+        return Answer("solved", lam)
+"""
+
+
+def write(folder: Path, text: str, name: str = "mine.py") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_a_plugin_goes_by_the_name_of_its_file(tmp_path: Path) -> None:
+    path = write(tmp_path, GOOD)
+    solver = make_solver("mine", {"sweeps": 3}, path)
+    assert type(solver).__name__ == "Diagonal"
+    assert vars(solver)["sweeps"] == 3
+    assert solver_version("mine", path).startswith("sha256:")
+    assert type(make_solver("osqp", {}, path)) is Osqp
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = 1\n", ["define a subclass of Solver"]),
+        ("from solvers.base import Solver\n", ["define a subclass of Solver"]),
+        (GOOD + GOOD.replace("Diagonal", "Second"), ["Diagonal, Second", "not several"]),
+        (GOOD + "    ) = 3\n", ["line 15", "not Python"]),
+        ("import numpy\n1 / 0\n", ["line 2", "ZeroDivisionError"]),
+        ("from solvers.base import Solver\nclass Half(Solver):\n    pass\n", ["'Half'", "define solve("]),
+    ],
+)
+def test_plugin_errors_are_one_clear_message(tmp_path: Path, text: str, words: list[str]) -> None:
+    path = write(tmp_path, text)
+    with pytest.raises(InputError) as caught:
+        load_plugin(path)
+    assert len(caught.value.faults) == 1
+    for word in [str(path), *words]:
+        assert word in str(caught.value)
+
+
+def test_a_missing_plugin_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="existing Python file"):
+        load_plugin(tmp_path / "no.py")
+
+
+def test_a_plugin_may_not_take_a_name_that_is_taken(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="rename the file"):
+        make_solver("piqp", {}, write(tmp_path, GOOD, "piqp.py"))
+
+
+def test_a_plugins_own_complaint_is_an_input_error(tmp_path: Path) -> None:
+    text = GOOD.replace("self.sweeps = sweeps", "raise ValueError('sweeps must be positive')")
+    with pytest.raises(InputError, match="sweeps must be positive"):
+        make_solver("mine", {"sweeps": -1}, write(tmp_path, text))

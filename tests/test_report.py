@@ -1,0 +1,237 @@
+"""The report, from made-up results whose figures can be worked out by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from matplotlib.image import imread
+from synthetic_results import everything, no_answer, row, write_rows
+
+from report import style
+from report.build import write
+from report.numbers import power, significant
+from report.rows import read
+from report.sections.accuracy import pareto
+from report.standings import compare, standings
+
+LOW, HIGH = "4386/0100", "4386/1000"
+
+
+@pytest.fixture(autouse=True)
+def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(style, "DPI", 40)
+
+
+def times(**seconds: float) -> dict[str, float]:
+    """A row's times: nothing but these."""
+    return dict.fromkeys(("convert_s", "prepare_s", "setup_s", "solve_s", "form_s"), 0.0) | seconds
+
+
+def outside(error: float) -> dict[str, Any]:
+    return {"displacement_error_mm": error, "verdict": "outside"}
+
+
+@pytest.fixture
+def tiny(tmp_path: Path) -> Path:
+    """Two scenes; a and b are within on both, c is late on one, d is outside on both and says solved."""
+    return write_rows(
+        tmp_path,
+        [
+            row(LOW, "a", **times(setup_s=0.5, solve_s=1.0, form_s=0.5, prepare_s=7.0)),
+            row(HIGH, "a", **times(solve_s=8.0)),
+            row(LOW, "b", "primal", **times(solve_s=1.0)),
+            row(HIGH, "b", "primal", **times(solve_s=36.0)),
+            row(LOW, "c", **times(solve_s=0.1)),
+            row(HIGH, "c", **no_answer("time_limit")),
+            row(LOW, "d", **times(solve_s=0.01), **outside(3e-6)),
+            row(HIGH, "d", **times(solve_s=0.01), **outside(2e-6), status="inaccurate"),
+        ],
+    )
+
+
+def test_standings_of_a_tiny_run(tiny: Path) -> None:
+    table = standings(read(tiny)).set_index("label")
+    # a: sqrt(2 · 8) = 4; b: sqrt(1 · 36) = 6; c answers half of the scenes, d none: not compared
+    assert table["load_case_s_4386"].to_dict() == pytest.approx(
+        {"a (dual)": 4.0, "b (primal)": 6.0, "c (dual)": math.nan, "d (dual)": math.nan}, nan_ok=True
+    )
+    assert table["within"].to_dict() == {"a (dual)": 2, "b (primal)": 2, "c (dual)": 1, "d (dual)": 0}
+    assert table.loc["d (dual)", ["outside", "outside_said_solved", "worst_error_mm"]].tolist() == [
+        2,
+        1,
+        3e-6,
+    ]
+    assert table.loc["c (dual)", ["no_answer", "no_answer_because"]].tolist() == [1, "1 time limit"]
+
+
+def test_summary_says_which_solver_to_use(tiny: Path) -> None:
+    text = write(tiny).read_text("utf-8")
+    assert "use **a (dual)**: within 1e-7 mm on both scenes, 4.00 s a load case" in text
+    assert "Next is b (primal), 1.5 times as long." in text
+    assert "At 100 active, c (dual) is faster (20 times)." in text
+    assert "1 run of 8 gave no answer (1 time limit)." in text
+    assert re.search(r"\| d \(dual\) +\| +0 of 2 \| +2 \(1 said solved\) \|", text)
+
+
+def test_a_failure_enters_no_mean_and_takes_its_scene_out_of_everyones(tmp_path: Path) -> None:
+    scenes = [f"4386/{k}00" for k in (1, 2, 3)]
+    rows = [row(s, "a", **times(solve_s=t)) for s, t in zip(scenes, (1.0, 4.0, 50.0), strict=True)]
+    rows += [row(s, "b", **times(solve_s=3.0)) for s in scenes[:2]]
+    rows.append(row(scenes[2], "b", **no_answer("crashed") | {"solve_s": 0.001}))
+    comparison = compare(read(write_rows(tmp_path, rows)), 4386)
+    assert comparison.common == scenes[:2]
+    assert comparison.seconds == pytest.approx({"a (dual)": 2.0, "b (dual)": 3.0})
+
+
+def test_lines_that_are_nearly_as_fast_are_named_as_such(tmp_path: Path) -> None:
+    rows = [row(LOW, solver, **times(solve_s=t)) for solver, t in (("a", 1.0), ("b", 1.1), ("c", 2.0))]
+    text = write(write_rows(tmp_path, rows)).read_text("utf-8")
+    assert "use **a (dual)**" in text
+    assert "As fast, to within 15%: b (dual) (1.10 s). Next is c (dual), 2.0 times as long." in text
+
+
+def test_no_solver_is_recommended_where_none_is_within_on_every_scene(tmp_path: Path) -> None:
+    rows = [row(LOW, "a"), row(HIGH, "a", **outside(1e-6)), row(LOW, "b", **outside(1e-6)), row(HIGH, "b")]
+    text = write(write_rows(tmp_path, rows)).read_text("utf-8")
+    assert "a (dual) and b (dual) are each within it on 1 of 2." in text
+    assert "use **" not in text
+
+
+def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", repeat=k, **times(solve_s=t)) for k, t in enumerate((3.0, 1.0, 2.0))]
+    rows += [row(HIGH, "a", repeat=0, **times(solve_s=1.0)), row(HIGH, "a", repeat=1, **no_answer("crashed"))]
+    cells = read(write_rows(tmp_path, rows)).cells.set_index("scene")
+    assert cells.loc[LOW, ["load_case_s", "verdict", "repeats"]].tolist() == [2.0, "within", 3]
+    assert cells.loc[HIGH, ["verdict", "status"]].tolist() == ["no_answer", "crashed"]
+    assert math.isnan(cells.loc[HIGH, "load_case_s"])
+
+
+def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", machine=name, **times(solve_s=t)) for name, t in (("First", 1.0), ("Second", 9.0))]
+    text = write(write_rows(tmp_path, rows)).read_text("utf-8")
+    assert "come from 2 machines: First (1 row) and Second (1 row)." in text
+    first, second = re.split("# Machine 2: Second", text)
+    assert "1.00 s a load case" in first
+    assert "9.00 s a load case" in second
+    own = pd.read_csv(tmp_path / "report" / "machine2-summary.csv")
+    assert own["load_case_s_4386"].tolist() == pytest.approx([9.0])
+
+
+def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
+    text = write(tiny).read_text("utf-8")
+    shown = re.findall(r"\[CSV\]\(([^)]+)\)\)\n\n((?:\|.*\n)+)", text)
+    assert {name for name, _ in shown} == {path.name for path in (tiny / "report").glob("*.csv")}
+    for name, table in shown:
+        assert len(pd.read_csv(tiny / "report" / name)) == table.count("\n") - 2
+    scene = pd.read_csv(tiny / "report" / "scene-4386_0100.csv").set_index("label")
+    assert list(scene.index) == ["c (dual)", "b (primal)", "a (dual)", "d (dual)"]
+    assert scene.loc["a (dual)", "total_s"] == 9.0
+    line = next(line for line in text.splitlines() if line.startswith("| a (dual)") and "solved" in line)
+    words = [word.strip() for word in line.strip("|").split("|")]
+    assert words == [
+        *("a (dual)", "✓ within", "solved", "1.00e-9", "0", "20", "0", "7.00", "0.500", "1.00", "0.500"),
+        *("9.00", "512"),
+    ]
+
+
+def test_an_unfinished_run_shows_its_limit(tiny: Path) -> None:
+    text = write(tiny).read_text("utf-8")
+    assert re.search(r"\| c \(dual\) .* time limit .* > 60 s \(time limit\) \|", text)
+
+
+def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
+    failed = write_rows(tmp_path / "failed", [row(LOW, "a", **no_answer("crashed"))])
+    text = write(failed).read_text("utf-8")
+    assert re.findall("^## (.*)", text, re.M) == [
+        "Summary",
+        "Every solver on every scene",
+        "Machine and method",
+    ]
+    assert [path.name for path in (failed / "report").glob("*.png")] == ["summary.png"]
+    empty = write(write_rows(tmp_path / "empty", []))
+    assert "Nothing was measured" in empty.read_text("utf-8")
+
+
+def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> None:
+    text = write(everything(tmp_path, {4386: [107, 1074], 6112: [1500]})).read_text("utf-8")
+    assert len(re.findall("^## ", text, re.M)) == 8
+    for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
+        assert imread(tmp_path / "report" / name)[..., :3].std() > 0.05, f"{name} is blank"
+    assert re.search(r"\| +4386 \| +2193 \| +2 \| +2.63e6 \| +2.63e6 \| +\+0.01 \| +20.0 \|", text)
+    assert "nan" not in re.findall(r"\w+", text.lower())
+    assert "None" not in text
+
+
+def test_what_is_damaged_or_mixed_is_said(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", solver_version="1.0"), row(HIGH, "a", solver_version="1.1", threads=1)]
+    write_rows(tmp_path, rows)
+    with (tmp_path / "measurements.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row(HIGH, "b"))[:50])
+    plan = f'scenes = ["{LOW}", "{HIGH}"]\n[[solver]]\nname = "a"\nforms = ["dual", "primal"]\n'
+    (tmp_path / "suite.toml").write_text(plan, "utf-8")
+    (tmp_path / "machine.json").write_text('{"machine": "Made', "utf-8")
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "4386_1000.npz").write_bytes(b"PK torn")
+    text = write(tmp_path).read_text("utf-8")
+    assert "machine.json could not be read" in text
+    assert "The file of scene 4386/1000 could not be read." in text
+    assert "2 of 4 measurements" in text
+    assert "a was run in several versions: 1.0 and 1.1." in text
+    assert "In 1 row (a) the threads in effect were not those asked for" in text
+    assert "measurements.jsonl, line 3, could not be read" in text
+
+
+def test_several_tolerances_and_threads_stand_in_the_label(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", tolerance=tol) for tol in (1e-6, 1e-9)]
+    rows += [row(LOW, "b", threads=k, threads_asked=k) for k in (1, 2)] + [row(LOW, "c", variant="direct")]
+    labels = set(read(write_rows(tmp_path, rows)).cells["label"])
+    assert labels == {
+        *(
+            "a (dual) 1e-6",
+            "a (dual) 1e-9",
+            "b (dual) × 1 threads",
+            "b (dual) × 2 threads",
+            "c (dual) direct",
+        ),
+    }
+
+
+def test_pareto_front() -> None:
+    points = pd.DataFrame({"error": [1e-9, 1e-8, 1e-7, 1e-8], "load_case_s": [5.0, 2.0, 3.0, 9.0]})
+    assert pareto(points).index.tolist() == [0, 1]
+
+
+def test_no_two_solvers_look_alike() -> None:
+    looks = [*style.KNOWN.values(), *style.SPARE]
+    assert len(set(looks)) == len(looks)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0912, "0.0912"),
+        (12.34, "12.3"),
+        (999.6, "1000"),
+        (1234.0, "1230"),
+        (4.1e-9, "4.10e-9"),
+        (None, "–"),
+    ],
+)
+def test_significant_figures(value: float | None, text: str) -> None:
+    assert significant(value) == text
+
+
+def test_powers_of_ten() -> None:
+    assert power(1.7692e7) == "1.77e7"
+    assert power(0.05, 2) == "5.0e-2"
+
+
+def test_a_directory_without_measurements_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"measurements\.jsonl"):
+        write(tmp_path)

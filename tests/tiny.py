@@ -1,0 +1,136 @@
+"""A tiny joint as own matrices, and plugins that solve it exactly or misbehave."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+EXACT = """
+import numpy as np
+import scipy.linalg as sla
+from scipy.optimize import nnls
+from solvers.base import Answer, Solver
+
+
+class Exact(Solver):
+    forms = ("dual",)
+
+    def solve(self, problem, load, tolerance):
+        L = sla.cholesky(problem.Q, lower=True)
+        lam, _ = nnls(L.T, sla.solve_triangular(L, load.p, lower=True))
+        return Answer("solved", lam, iterations=1)
+"""
+
+FAULTY = """
+import os
+import signal
+import subprocess
+import sys
+import time
+import numpy as np
+from solvers.base import Answer, Solver
+
+MEMORY = "import time; held = bytearray(400 * 2**20); held[::4096] = bytes(len(held[::4096])); time.sleep(60)"
+
+
+class Faulty(Solver):
+    forms = ("dual",)
+
+    def __init__(self, fault="none"):
+        self.fault = fault
+
+    def solve(self, problem, load, tolerance):
+        return getattr(self, self.fault)(np.zeros(problem.assembly.m))
+
+    def hang(self, lam):
+        while True:
+            pass
+
+    def signal(self, lam):
+        os.kill(os.getpid(), signal.SIGSEGV)
+
+    def leave(self, lam):
+        os._exit(7)
+
+    def system_exit(self, lam):
+        sys.exit("enough")
+
+    def eat(self, lam):
+        held = []
+        while True:
+            held.append(np.ones(2**20))
+            time.sleep(0.002)
+
+    def out_of_memory(self, lam):
+        raise MemoryError("as numpy does")
+
+    def children_eat(self, lam):
+        subprocess.Popen([sys.executable, "-c", MEMORY], start_new_session=True)
+        time.sleep(60)
+
+    def orphan(self, lam):
+        command = f"{sys.executable} -c 'import time; time.sleep(61)' > /dev/null & echo $!"
+        pid = subprocess.run(command, shell=True, stdout=subprocess.PIPE, start_new_session=True).stdout
+        return Answer("solved", lam, details={"pid": int(pid)})
+
+    def fork_and_go_on(self, lam):
+        os.fork()
+        return Answer("solved", lam)
+
+    def chatter(self, lam):
+        for _ in range(300):
+            os.write(1, b"o" * 2**20)
+            os.write(2, b"e" * 2**16)
+        return Answer("solved", lam)
+
+    def big_details(self, lam):
+        return Answer("solved", lam, details={"trace": "x" * 2**22})
+
+    def nan(self, lam):
+        return Answer("solved", lam * np.nan)
+
+    def shape(self, lam):
+        return Answer("solved", lam[:-1])
+
+    def none(self, lam):
+        return None
+
+    def no_lam(self, lam):
+        return Answer("solved", None)
+
+    def status(self, lam):
+        return Answer("optimal", lam)
+
+    def gives_up(self, lam):
+        return Answer("iteration_limit", None, iterations=5)
+
+    def raises(self, lam):
+        raise ValueError("no step")
+"""
+
+
+def write_problem(path: Path, shift: float = 0.0) -> Path:
+    """Two parts of ten nodes each, ten contacts, three or so of them closed."""
+    rng = np.random.default_rng(3)
+    K = np.zeros((20, 20))
+    for part in (slice(0, 10), slice(10, 20)):
+        B = rng.standard_normal((10, 10))
+        K[part, part] = B @ B.T + 10 * np.eye(10)
+    A = np.vstack([np.eye(10), -np.eye(10)])
+    np.savez(path, K=K, A=A, f=3 * rng.standard_normal(20) + shift, g=0.05 + 0.1 * rng.random(10))
+    return path
+
+
+def write_suite(folder: Path, text: str = "", **keys: Any) -> Path:
+    """suite.toml with the tiny scene and the exact solver in `folder`; `text` takes the solvers' place."""
+    folder.mkdir(exist_ok=True)
+    write_problem(folder / "tiny.npz")
+    (folder / "exact.py").write_text(EXACT)
+    data = {"scenes": ["tiny.npz"], "threads": [1], "time_limit_s": 20, "plugin": "exact.py"} | keys
+    lines = [f"{key} = {json.dumps(value)}" for key, value in data.items()]
+    path = folder / "small.toml"
+    path.write_text("\n".join([*lines, text or '[[solver]]\nname = "exact"\nforms = ["dual"]\n']))
+    return path
