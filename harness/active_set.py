@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from problems.assembly import Matrix, Vector
 
+ROUNDING = 10  # times the rounding that is seen
 FULL_EXCHANGES = 3  # without a new smallest count of infeasibilities, before single pivots begin
 
 
@@ -21,37 +22,46 @@ def contact_set(Q: Matrix, p: Vector, start: NDArray[np.bool_] | None = None) ->
 
     Each pass solves Q_SS λ_S = p_S and exchanges every i in S with λ_i < 0 and outside it with
     y_i < 0. After three passes without a new smallest count of such i, only the last of them is
-    exchanged until there is one: this cannot cycle. Values within rounding of zero, that is
-    |λ_i| ≤ 4ε max|λ| and |y_i| ≤ 4ε (|p_i| + max|p|), are taken as zero.
+    exchanged until there is one: in exact arithmetic this cannot cycle. Values within rounding of zero
+    are taken as zero: rounding is what the equations leave over in y_S, and what that moves λ_S.
+    Should rounding still lead in circles, the first set met again is returned for others to check.
     """
     m = len(p)
     S = p > 0 if start is None else start.copy()
     fewest, chances = m + 1, FULL_EXCHANGES
-    eps = 4 * np.finfo(float).eps
+    met: set[bytes] = set()
     while True:
-        lam, y = solve_on(Q, p, S)
-        wrong = np.where(S, lam < -eps * abs(lam).max(initial=0), y < -eps * (abs(p) + abs(p).max()))
+        lam, y, lam_rounding, y_rounding = _solve_on(Q, p, S)
+        wrong = np.where(S, lam < -ROUNDING * lam_rounding, y < -ROUNDING * y_rounding)
         count = int(wrong.sum())
         if count == 0:
             return S
         if count < fewest:
             fewest, chances = count, FULL_EXCHANGES
+            met.clear()
         elif chances:
             chances -= 1
+        elif S.tobytes() in met:
+            return S
         else:
+            met.add(S.tobytes())
             last = np.flatnonzero(wrong)[-1]
             wrong = np.zeros(m, dtype=bool)
             wrong[last] = True
         S = S ^ wrong
 
 
-def solve_on(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vector]:
-    """λ with Q_SS λ_S = p_S and λ = 0 outside S, and y = Qλ − p with y_S = 0."""
+def _solve_on(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vector, float, float]:
+    """λ with Q_SS λ_S = p_S and λ = 0 outside S, y = Qλ − p outside S, and the rounding of either."""
     lam = np.zeros(len(p))
     rows = np.flatnonzero(S)
-    if rows.size:
-        factor = sla.cho_factor(Q[np.ix_(rows, rows)], overwrite_a=True, check_finite=False)
-        lam[rows] = sla.cho_solve(factor, p[rows], check_finite=False)
+    if not rows.size:
+        return lam, -p, 0.0, 0.0
+    factor = sla.cho_factor(Q[np.ix_(rows, rows)], overwrite_a=True, check_finite=False)
+    lam[rows] = sla.cho_solve(factor, p[rows], check_finite=False)
     y = Q @ lam - p
+    left_over = y[rows]
     y[rows] = 0.0
-    return lam, y
+    correction = sla.cho_solve(factor, left_over, check_finite=False)
+    y_rounding = max(abs(left_over).max(initial=0), np.finfo(float).eps * abs(p).max())
+    return lam, y, float(abs(correction).max(initial=0)), float(y_rounding)

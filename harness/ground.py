@@ -10,7 +10,7 @@ import numpy as np
 
 from problems.assembly import LoadCase, Prepared
 from problems.build import Progress, load_case, prepared
-from problems.effects.fasteners import Fasteners
+from problems.effect import ForceEffect
 from problems.scene import Scene, read_scene
 
 from . import records
@@ -76,7 +76,6 @@ def record(ground: Ground, directory: Path) -> None:
     if nodes is not None:
         arrays["contact_nodes"] = nodes
     if scene.joint:
-        places = [effect.positions(scene.joint) for effect in scene.effects if isinstance(effect, Fasteners)]
-        if places:
-            arrays["fasteners"] = np.concatenate(places)
+        marks = [effect.marks(scene.joint) for effect in scene.effects if isinstance(effect, ForceEffect)]
+        arrays["fasteners"] = np.concatenate([np.zeros((0, 2)), *marks])
     np.savez(directory / "scenes" / (scene.name.replace("/", "_") + ".npz"), **arrays)

@@ -112,6 +112,8 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
         "plugin": plugin,
     }
     data |= {key: value for key, value in changes.items() if value not in ([], None)}
+    if change.time_limit_s is not None:
+        data.pop("time_limit_by_size_s", None)
     if faults:
         raise InputError(faults)
     return checked(data, Path("command line"))
@@ -162,6 +164,7 @@ def _of_entry(
     suite: Suite, entry: SolverEntry, scene: str, source: str, repeat: int
 ) -> Iterator[Measurement]:
     tolerances = entry.tolerances or suite.tolerances
+    n, _ = read_scene(source).expected_size or (0, 0)
     for form, tolerance, threads in product(entry.forms or FORMS, tolerances, suite.threads):
         yield Measurement(
             suite=suite.name,
@@ -174,7 +177,7 @@ def _of_entry(
             tolerance=tolerance,
             threads=threads,
             repeat=repeat,
-            time_limit_s=entry.time_limit_s or suite.time_limit_s,
+            time_limit_s=entry.time_limit_s or suite.time_limit(n),
             memory_limit_mib=suite.memory_limit_mib,
             limit_mm=suite.limit_mm,
             gated=entry.gated,

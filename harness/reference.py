@@ -43,7 +43,8 @@ class Reference:
 
 def reference(scene_key: str, prepared: Prepared, load: LoadCase) -> Reference:
     """The reference of a scene, from the cache if it was computed before."""
-    key = cache.digest("reference", 2, scene_key, prepared.facts.get("seconds"), load.f.tobytes(), load.g.tobytes())
+    built = prepared.facts.get("seconds")
+    key = cache.digest("reference", 2, scene_key, built, load.f.tobytes(), load.g.tobytes())
     found = cache.load(key)
     if found is None:
         made = refined_active_set(prepared, load)

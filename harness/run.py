@@ -61,7 +61,7 @@ def run(suite: Suite, directory: Path, console: Console) -> int:
         done = len(plan) - len(left)
         console.print(f"{suite.name}: {len(plan)} measurements, {done} of them already in {directory}")
         if left:
-            rows += measure_all(left, done, directory, solvers, here, console)
+            rows = measure_all(left, rows, done, directory, solvers, here, console)
     planned = {m.key for m in plan}
     return summary([row for row in rows if row["key"] in planned], console)
 
@@ -74,11 +74,17 @@ def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
 
 
 def measure_all(
-    left: list[Measurement], done: int, directory: Path, solvers: Solvers, here: str, console: Console
+    left: list[Measurement],
+    rows: list[Row],
+    done: int,
+    directory: Path,
+    solvers: Solvers,
+    here: str,
+    console: Console,
 ) -> list[Row]:
-    """Make the measurements and append their rows."""
+    """Make the measurements and append their rows. `rows` are those of DIRECTORY so far."""
     sizes = {m.scene: size[0] for m in left if (size := read_scene(m.source).expected_size)}
-    rows, base = [], None
+    rows, base = list(rows), None
     with Display(console, left, done, sizes) as display:
         for measurement in left:
             if base is None or base.scene.name != measurement.scene:
@@ -89,18 +95,44 @@ def measure_all(
             display.doing(f"{measurement.scene}: {measurement.solver} {measurement.form}")
             start = time.monotonic()
             solver = solvers[measurement.solver, measurement.variant]
-            row = one_row(measurement, base, directory, solver, here)
+            hopeless = out_of_time_before(measurement, base.prepared.assembly.n, rows)
+            row = one_row(measurement, base, directory, solver, here, hopeless)
             records.append(directory / records.MEASUREMENTS, row)
             rows.append(row)
             display.finished(measurement, row, time.monotonic() - start)
     return rows
 
 
-def one_row(m: Measurement, base: Ground, directory: Path, solver: Description, here: str) -> Row:
-    """Measure, judge, and put together the row."""
+def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
+    """The scenes that show that m would run out of time, or "".
+
+    They are all those of the next smaller size n' that the same solver, form and settings were measured
+    on, if it ran out of its time T' on each, and the time T that m has is at most (n/n')² T': every
+    solver here works with dense matrices, so its time grows with n² at least.
+    """
+    same = ("solver", "form", "variant", "tolerance", "options", "threads_asked")
+    mine = (m.solver, m.form, m.variant, m.tolerance, m.options, m.threads)
+    smaller = [row for row in rows if row["n"] < n and tuple(row[name] for name in same) == mine]
+    largest = max((row["n"] for row in smaller), default=0)
+    there = [row for row in smaller if row["n"] == largest]
+    growth = (n / largest) ** 2 if largest else 0.0
+    late = [
+        row
+        for row in there
+        if row["status"] == "time_limit" and m.time_limit_s <= growth * row["time_limit_s"]
+    ]
+    return ", ".join(sorted({row["scene"] for row in late})) if len(late) == len(there) else ""
+
+
+def one_row(
+    m: Measurement, base: Ground, directory: Path, solver: Description, here: str, hopeless: str = ""
+) -> Row:
+    """Measure, judge, and put together the row. hopeless : the scene that shows that there is no time."""
     start = time.monotonic()
     answer = directory / "answers" / f"{m.stem}.npz"
-    if m.form in solver.forms:
+    if hopeless:
+        told: Row = {"status": "time_limit", "message": f"not run: too slow already on {hopeless}"}
+    elif m.form in solver.forms:
         told = measure(m, answer)
     else:
         told = {"status": "unsupported", "message": f"takes {' and '.join(solver.forms)} only"}

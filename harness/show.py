@@ -27,7 +27,7 @@ COLUMNS = [
     ("status", -15, lambda row: row["status"]),
     ("iter", 6, lambda row: _figure(row["iterations"], "d")),
     ("prepare s", 9, lambda row: _figure(_sum(row, "convert_s", "prepare_s"), ".2f")),
-    ("solve s", 8, lambda row: _figure(_sum(row, "setup_s", "solve_s", "form_s"), ".2f")),
+    ("solve s", 8, lambda row: _solve_time(row)),
     ("error mm", 8, lambda row: _figure(row["displacement_error_mm"], ".1e")),
     ("verdict", -16, lambda row: row["verdict"]),
 ]
@@ -40,6 +40,12 @@ def _figure(value: float | None, form: str) -> str:
 def _sum(row: Row, *names: str) -> float | None:
     known = [row[name] for name in names if row[name] is not None]
     return sum(known) if known else None
+
+
+def _solve_time(row: Row) -> str:
+    if row["solve_s"] is None:
+        return f"> {row['time_limit_s']:g}" if row["status"] == "time_limit" else "–"
+    return _figure(_sum(row, "setup_s", "solve_s", "form_s"), ".2f")
 
 
 def _line(cells: list[str]) -> str:

@@ -48,7 +48,10 @@ class SolverEntry(BaseModel):
 
 
 class Suite(BaseModel):
-    """What a suite file says; scenes are names, or absolute paths of files. `name` is the file's."""
+    """What a suite file says; scenes are names, or absolute paths of files. `name` is the file's.
+
+    time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of so many unknowns; time_limit_s for the rest.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -60,10 +63,15 @@ class Suite(BaseModel):
     repeats: PositiveInt = 1
     threads: Annotated[list[PositiveInt], Some] = [2]
     time_limit_s: PositiveFloat = 60.0
+    time_limit_by_size_s: dict[PositiveInt, PositiveFloat] = {}
     memory_limit_mib: PositiveInt = 8192
     limit_mm: PositiveFloat = 1e-7
     plugin: str | None = None
     solver: Annotated[list[SolverEntry], Some]
+
+    def time_limit(self, n: int) -> float:
+        """The limit in seconds on a scene of n unknowns."""
+        return self.time_limit_by_size_s.get(n, self.time_limit_s)
 
 
 def suite_names() -> list[str]:
@@ -176,7 +184,8 @@ def to_toml(suite: Suite) -> str:
 def _value(value: Any) -> str:
     match value:
         case dict():
-            return "{" + ", ".join(f"{json.dumps(key)} = {_value(item)}" for key, item in value.items()) + "}"
+            items = (f"{json.dumps(str(key))} = {_value(item)}" for key, item in value.items())
+            return "{" + ", ".join(items) + "}"
         case list():
             return "[" + ", ".join(map(_value, value)) + "]"
     return json.dumps(value, ensure_ascii=False)

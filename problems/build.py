@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from . import assembly, cache, condense, hermite, plate
+from . import assembly, cache, condense, hermite, joint, matrices, plate
 from .assembly import Assembly, LoadCase, Matrix, Prepared, Vector
 from .condense import NotPositiveDefinite
 from .effect import ForceEffect, GapEffect
@@ -59,7 +59,7 @@ def load_case(scene: Scene, prepared: Prepared) -> LoadCase:
 def cache_key(scene: Scene) -> str:
     """The hash of what made the matrices: the scene's data and the code that builds from it."""
     effects = [inspect.getmodule(type(effect)) for effect in scene.stiffness_effects]
-    modules = [assembly, condense, hermite, plate, inspect.getmodule(prepared), *effects]
+    modules = [assembly, condense, hermite, joint, matrices, plate, inspect.getmodule(prepared), *effects]
     sources = [inspect.getsource(module) for module in modules if module]
     return cache.digest(scene.assembly_key, sources)
 
@@ -89,6 +89,8 @@ def _build(scene: Scene, progress: Progress) -> tuple[dict[str, Matrix], dict[st
     lap("condition")
     progress("Q = AᵀK⁻¹A", 0.0)
     Q = _schur(made, factors)
+    if scene.joint is None:
+        _check_independent(Q, scene)
     lap("Q")
 
     arrays = {"A_data": made.A.data, "A_indices": made.A.indices, "A_indptr": made.A.indptr, "Q": Q}
@@ -164,9 +166,21 @@ def _factor(K: Matrix, part: str, scene: Scene) -> Matrix:
         raise _indefinite(scene, f"K of {part}", str(error)) from error
 
 
+def _check_independent(Q: Matrix, scene: Scene) -> None:
+    """A's columns must be independent: a pivot of Q over its diagonal entry is what sets one apart."""
+    U, info = lapack.dpotrf(Q)
+    independence = np.diag(U) ** 2 / np.diag(Q)
+    if info != 0 or independence.min() < len(Q) * np.finfo(float).eps:
+        column = info - 1 if info else int(independence.argmin())
+        own = dict(scene.matrices)
+        where, allowed = own.get("problem") or own.get("A"), "must not depend on the columns before it"
+        raise InputError.one(where, f"A[:, {column}]", "dependent", allowed)
+
+
 def _indefinite(scene: Scene, key: str, value: object) -> InputError:
     allowed = "K must be positive definite: is a part held against every rigid motion?"
-    return InputError.one(f"scene {scene.name}", key, value, allowed)
+    own = dict(scene.matrices)
+    return InputError.one(own.get("problem") or own.get("K") or f"scene {scene.name}", key, value, allowed)
 
 
 def _extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
@@ -181,7 +195,7 @@ def _extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
     v0 = np.random.default_rng(0).standard_normal(n)
     inverse = LinearOperator((n, n), matvec=solve, dtype=float)
     largest, smallest_inverse = (
-        eigsh(op, 1, which="LA", v0=v0, tol=1e-8, return_eigenvectors=False)[0] for op in (K, inverse)
+        eigsh(op, 1, which="LA", v0=v0, tol=1e-6, return_eigenvectors=False)[0] for op in (K, inverse)
     )
     return float(1 / smallest_inverse), float(largest)
 

@@ -44,7 +44,7 @@ def lock(key: str) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / f"{key}.lock"):
             yield
-    except PermissionError as error:
+    except (PermissionError, FileExistsError, NotADirectoryError) as error:
         raise InputError.one(folder, "cache folder", str(error), "writable; set RIVETBENCH_CACHE") from error
 
 

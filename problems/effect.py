@@ -10,11 +10,11 @@ import importlib
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Iterator
-from typing import ClassVar
 
+import numpy as np
 import scipy.sparse as sp
 
-from .assembly import Vector
+from .assembly import Matrix, Vector
 from .joint import Joint, Table
 from .plate import Plate
 
@@ -33,8 +33,11 @@ class StiffnessEffect(Effect):
     """Adds a term to the stiffness of one part, before condensation."""
 
     part: str
-    #: Whether the effect can keep a part from floating away.
-    holds: ClassVar[bool] = False
+
+    @property
+    def held_points(self) -> tuple[tuple[float, float], ...]:
+        """Where the effect keeps the part from floating away."""
+        return ()
 
     @abstractmethod
     def stiffness(self, plate: Plate) -> sp.csr_array:
@@ -50,6 +53,10 @@ class ForceEffect(Effect):
     @abstractmethod
     def force(self, joint: Joint) -> Vector:
         """(n,) forces in N, positive from the first part of a pair towards the second."""
+
+    def marks(self, joint: Joint) -> Matrix:
+        """(k, 2) points in mm that a picture of the junction should mark."""
+        return np.zeros((0, 2))
 
 
 class GapEffect(Effect):

@@ -144,5 +144,9 @@ class Joint(Table):
         for pair in self.contacts:
             if pair[0] not in names or pair[1] not in (*names, TOOL) or pair[0] == pair[1]:
                 yield "contacts", list(pair), f'two different parts of {names}; the second may be "{TOOL}"'
+        # Q = AᵀK⁻¹A is positive definite only if no contact follows from others.
+        sides = [[(name == a) - (name == b) for name in names] for a, b in self.pairs]
+        if self.pairs and np.linalg.matrix_rank(sides) < len(sides):
+            yield "contacts", [list(pair) for pair in self.pairs], "no pair twice, no closed chain of pairs"
         if not self.pairs:
             yield "contacts", [], f'at least one pair, for example [["{names[0]}", "{TOOL}"]]'

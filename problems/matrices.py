@@ -32,6 +32,12 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
     faults = [Fault(where.get(key, "matrices"), key, None, "is missing") for key in "KAfg" if key not in data]
     if faults:
         raise InputError(faults)
+    for key, values in data.items():
+        if values.dtype.kind not in "fiub" or (key in "KA" and values.ndim != 2):
+            found = f"{values.dtype} array of shape {values.shape}"
+            faults.append(Fault(where.get(key, "matrices"), key, found, "real numbers; K and A matrices"))
+    if faults:
+        raise InputError(faults)
     K, A = (sp.csr_array(data[key], dtype=float) for key in "KA")
     f, g = (np.asarray(data[key], dtype=float).ravel() for key in "fg")
     nodes = np.asarray(data["nodes"], dtype=float) if "nodes" in data else None
@@ -48,6 +54,9 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
             faults.append(Fault(where[key], key, "NaN or infinity", "every entry must be finite"))
     if faults:
         raise InputError(faults)
+    untouched = np.flatnonzero(abs(A).sum(axis=0) == 0)
+    if untouched.size:
+        raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must touch an unknown")
     asymmetry = abs(K - K.T).max() / max(abs(K).max(), np.finfo(float).tiny)
     if asymmetry > SYMMETRY:
         raise InputError.one(where["K"], "max|K − Kᵀ| / max|K|", float(asymmetry), f"must be ≤ {SYMMETRY:g}")
@@ -71,7 +80,7 @@ def _blocks(
 def _read_npz(path: Path) -> dict[str, Any]:
     try:
         with np.load(path) as archive:
-            return {key: archive[key] for key in archive.files}
+            return {key: archive[key] for key in (*"KAfg", "nodes") if key in archive.files}
     except (OSError, ValueError, EOFError, KeyError) as error:
         raise InputError.one(path, "file", str(error), "a readable .npz with K, A, f, g") from error
     except Exception as error:  # zipfile and pickle raise their own kinds
@@ -80,6 +89,19 @@ def _read_npz(path: Path) -> dict[str, Any]:
 
 def _read_mtx(path: Path, key: str) -> Any:
     try:
-        return scipy.io.mmread(path)
+        _check_length(path)
+        found = scipy.io.mmread(path)
+        return found.toarray() if sp.issparse(found) and key in "fg" else found
     except (OSError, ValueError) as error:
         raise InputError.one(path, key, str(error), "a readable Matrix Market file") from error
+
+
+def _check_length(path: Path) -> None:
+    """Raise ValueError if entries are missing, which mmread takes for zeros or dies of."""
+    rows, columns, entries, form, _, symmetry = scipy.io.mminfo(path)
+    if form == "array":
+        entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
+    with path.open("rb") as file:
+        found = sum(1 for line in file if line.strip() and not line.startswith(b"%")) - 1  # the sizes
+    if found < entries:
+        raise ValueError(f"truncated: {found} of {entries} entries")

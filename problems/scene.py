@@ -18,6 +18,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from .cache import digest
@@ -25,7 +26,7 @@ from .effect import Effect, StiffnessEffect, effect_class, effect_kinds
 from .errors import Fault, InputError
 from .joint import Joint, Table
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent
 SCENES = HERE / "scenes"
 ASSEMBLIES = HERE / "assemblies"
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
@@ -49,7 +50,8 @@ class Scene:
     def assembly_key(self) -> str:
         """Hash of everything that determines K and A."""
         if self.joint is None:
-            return digest([path.read_bytes().hex() for _, path in self.matrices])
+            keys = [key for key, _ in self.matrices]
+            return digest(keys, *(path.read_bytes() for _, path in self.matrices))
         return digest(_plain(self.joint), [_plain(effect) for effect in self.stiffness_effects])
 
     @property
@@ -85,7 +87,8 @@ def read_scene(name_or_path: str) -> Scene:
         if not path.is_file():
             near = get_close_matches(name_or_path, scene_names(), 3, 0.4) or scene_names()[:5]
             raise InputError.one("scene", "name", name_or_path, f"no such scene; near it: {', '.join(near)}")
-    name = path.relative_to(SCENES).with_suffix("").as_posix() if path.is_relative_to(SCENES) else path.stem
+    own = not path.resolve().is_relative_to(SCENES)
+    name = path.stem if own else path.resolve().relative_to(SCENES).with_suffix("").as_posix()
     return _scene(name, path, read_toml(path))
 
 
@@ -101,7 +104,11 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def validation_faults(where: object, prefix: str, error: ValidationError) -> Iterator[Fault]:
     """pydantic's findings in our words."""
-    for item in error.errors():
+    items = error.errors()
+    for item in items:
+        depth = len(item["loc"])
+        if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
+            continue  # it follows from a fault inside it
         key = ".".join(filter(None, [prefix, *map(str, item["loc"])]))
         value = None if item["type"] == "missing" else item["input"]
         allowed = "unknown key" if item["type"] == "extra_forbidden" else item["msg"]
@@ -116,10 +123,12 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint_data: dict[str, Any] = data.pop("joint", {})
     joint_path, effects = path, []
     if "assembly" in data:
+        if joint_data:
+            faults.append(Fault(str(path), "joint", joint_data, "give either joint or assembly"))
         joint_path = _assembly_path(path, data.pop("assembly"))
         joint_data = read_toml(joint_path)
-        effects += [(joint_path, k, e) for k, e in enumerate(joint_data.pop("effect", []))]
-    effects += [(path, k, e) for k, e in enumerate(data.pop("effect", []))]
+        effects += _effect_tables(joint_path, joint_data, faults)
+    effects += _effect_tables(path, data, faults)
     allowed = "unknown key; a scene has title, assembly or joint, effect, matrices"
     faults += [Fault(str(path), key, value, allowed) for key, value in data.items()]
 
@@ -136,6 +145,16 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     if faults or joint is None:
         raise InputError(faults)
     return Scene(name, title, joint, found)
+
+
+def _effect_tables(
+    where: Path, data: dict[str, Any], faults: list[Fault]
+) -> list[tuple[Path, int, dict[str, Any]]]:
+    tables = data.pop("effect", [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        faults.append(Fault(str(where), "effect", tables, "tables [[effect]]"))
+        return []
+    return [(where, k, table) for k, table in enumerate(tables)]
 
 
 def _effect(
@@ -158,14 +177,20 @@ def _effect(
 
 
 def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...]) -> Iterator[Fault]:
-    held = {effect.part for effect in effects if isinstance(effect, StiffnessEffect) and effect.holds}
+    held: dict[str, list[tuple[float, float]]] = {part.name: [] for part in joint.part}
+    for effect in effects:
+        if isinstance(effect, StiffnessEffect):
+            held[effect.part] += effect.held_points
     for part in joint.part:
-        if not part.clamped and part.name not in held:
-            yield Fault(str(path), f"part.{part.name}", "no support", "needs a clamped edge or supports")
+        points = held[part.name]
+        # A rigid motion of a plate is a + bx + cy: three points off a line hold it.
+        if not part.clamped and np.linalg.matrix_rank([[1, x, y] for x, y in points] or [[0.0]]) < 3:
+            allowed = "needs a clamped edge, or supports at three points off a line"
+            yield Fault(str(path), f"part.{part.name}", points or "no support", allowed)
 
 
-def _assembly_path(path: Path, name: str) -> Path:
-    choices = (path.parent / name, ASSEMBLIES / f"{name}.toml")
+def _assembly_path(path: Path, name: object) -> Path:
+    choices = (path.parent / str(name), ASSEMBLIES / f"{name}.toml")
     for choice in choices:
         if choice.is_file():
             return choice
@@ -175,6 +200,8 @@ def _assembly_path(path: Path, name: str) -> Path:
 
 def _matrices_scene(name: str, title: str, path: Path, data: dict[str, Any]) -> Scene:
     table = data.pop("matrices")
+    if not isinstance(table, dict):
+        raise InputError.one(path, "matrices", table, "a table [matrices]")
     alone = "a scene of own matrices has only title and [matrices]"
     faults = [Fault(str(path), key, value, alone) for key, value in data.items()]
     files = []
@@ -185,6 +212,8 @@ def _matrices_scene(name: str, title: str, path: Path, data: dict[str, Any]) -> 
             faults.append(Fault(str(path), f"matrices.{key}", value, "no such file"))
         else:
             files.append((key, path.parent / str(value)))
+    if not faults and set(table) not in ({"problem"}, set("KAfg")):
+        faults.append(Fault(str(path), "matrices", sorted(table), "K, A, f and g, or problem alone"))
     if faults:
         raise InputError(faults)
     return Scene(name, title, matrices=tuple(files))

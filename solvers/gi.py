@@ -71,7 +71,7 @@ class GoldfarbIdnani(Solver):
         if ready.factor is not None:
             lam = _on_support(ready, load, slacks(result.u)[0], result)
             overlap = float((load.p - data.Q @ lam).max())
-            rounding = 4 * EPS * float(abs(load.p).max())
+            rounding = 4 * EPS * float((abs(load.p) + abs(data.Q) @ lam).max())
             status = result.status
             if status == "solved" and overlap > max(tolerance, rounding):
                 status, details["cause"] = "inaccurate", f"rounding: an overlap of {overlap:.1e} mm is left"

@@ -76,6 +76,7 @@ class _State:
         self.G = G
         self.u = np.zeros(len(G))
         self.C: list[int] = []
+        self.is_active = np.zeros(len(G), dtype=bool)
         self.factor = GrowingFactor(len(G))
         self.max_pivots = max_pivots
         self.pivots = self.drops = 0
@@ -90,7 +91,7 @@ class _State:
         """Add violated constraints, worst first, until s = start + Gu ≥ −limit."""
         while self.pivots < self.max_pivots:
             s = start + self.G @ self.u
-            s[self.C] = 0.0
+            s[self.is_active] = 0.0
             violated = np.flatnonzero(s < -limit)
             if not violated.size:
                 return
@@ -98,7 +99,7 @@ class _State:
             rows = self.G[:, worst].T  # G is symmetric
             while self.pivots < self.max_pivots:
                 s = start[worst] + rows @ self.u
-                s[np.isin(worst, self.C)] = 0.0
+                s[self.is_active[worst]] = 0.0
                 pick = int(np.argmin(s + limit[worst]))
                 if s[pick] >= -limit[worst[pick]]:
                     break
@@ -126,11 +127,13 @@ class _State:
             if full <= partial:
                 self.factor.append(d, np.sqrt(curvature))
                 self.C.append(k)
+                self.is_active[k] = True
                 return
             self.drop(int(falling[np.argmin(ratios)]))
 
     def drop(self, position: int) -> None:
-        self.u[self.C.pop(position)] = 0.0
+        k = self.C.pop(position)
+        self.u[k], self.is_active[k] = 0.0, False
         self.factor.delete(position)
         self.drops += 1
 

@@ -8,18 +8,21 @@ from scipy.linalg import blas
 
 from problems.assembly import Matrix, Vector
 
-BLOCK = 128
+BLOCK = 128  # rows of a block in the solves
+NARROW = 32  # rows rotated at once in a deletion
 
 
 class GrowingFactor:
     """R upper triangular with RᵀR = G_CC for the ordered set C.
 
     Solves and deletions work on blocks of rows, so that all but the small diagonal blocks is
-    matrix–vector and matrix–matrix work in place.
+    matrix–vector and matrix–matrix work in place. Copies of the diagonal blocks are kept, because
+    the triangular solve wants them contiguous.
     """
 
     def __init__(self, capacity: int) -> None:
         self._R = np.zeros((capacity, capacity), order="F")
+        self._diagonal: list[Matrix] = []
         self.size = 0
 
     @property
@@ -33,36 +36,46 @@ class GrowingFactor:
         self._R[:q, q] = d
         self._R[q, q] = sigma
         self.size += 1
+        self._renew_diagonal(q)
 
     def delete(self, j: int) -> None:
         """C ← C without its j-th member: the row that is left over is rotated into those below it."""
-        q = self.size
-        R = self._R
-        v = R[j, j + 1 : q].copy()
-        R[:j, j : q - 1] = R[:j, j + 1 : q]
-        R[j : q - 1, j : q - 1] = R[j + 1 : q, j + 1 : q]
-        self.size = q = q - 1
-        for a in range(j, q, BLOCK):
+        R, q = self._R, self.size - 1
+        v = R[j, j + 1 : q + 1].copy()
+        for a in range(j, q, BLOCK):  # move the columns to the left, the rows below j up
             b = min(a + BLOCK, q)
+            R[:j, a:b] = R[:j, a + 1 : b + 1]
+            R[j:b, a:b] = R[j + 1 : b + 1, a + 1 : b + 1]
+        for a in range(j, q, NARROW):
+            b = min(a + NARROW, q)
             # [R_bb; v_b] = W [R_bb'; 0], and Wᵀ acts on the rest of these rows and of v.
             W, corner = sla.qr(np.vstack([R[a:b, a:b], v[a - j : b - j]]), check_finite=False)
             rest = W.T @ np.vstack([R[a:b, b:q], v[b - j :]])
             R[a:b, a:b], R[a:b, b:q], v[b - j :] = corner[:-1], rest[:-1], rest[-1]
+        self.size = q
+        self._renew_diagonal(j)
+
+    def _renew_diagonal(self, j: int) -> None:
+        """Copy the diagonal blocks from the one of row j on."""
+        del self._diagonal[j // BLOCK :]
+        for a in range(j // BLOCK * BLOCK, self.size, BLOCK):
+            e = min(a + BLOCK, self.size)
+            self._diagonal.append(np.asfortranarray(self._R[a:e, a:e]))
 
     def solve_transposed(self, b: Vector) -> Vector:
         """R⁻ᵀ b."""
         R, z = self._R, b.copy()
-        for a in range(0, self.size, BLOCK):
-            e = min(a + BLOCK, self.size)
+        for k, block in enumerate(self._diagonal):
+            a, e = k * BLOCK, k * BLOCK + len(block)
             z[a:e] -= R[:a, a:e].T @ z[:a]
-            z[a:e] = blas.dtrsv(np.asfortranarray(R[a:e, a:e]), z[a:e], trans=1)
+            z[a:e] = blas.dtrsv(block, z[a:e], trans=1)
         return z
 
     def solve(self, b: Vector) -> Vector:
         """R⁻¹ b."""
         R, z = self._R, b.copy()
-        for a in reversed(range(0, self.size, BLOCK)):
-            e = min(a + BLOCK, self.size)
-            z[a:e] = blas.dtrsv(np.asfortranarray(R[a:e, a:e]), z[a:e])
+        for k, block in reversed(list(enumerate(self._diagonal))):
+            a, e = k * BLOCK, k * BLOCK + len(block)
+            z[a:e] = blas.dtrsv(block, z[a:e])
             z[:a] -= R[:a, a:e] @ z[a:e]
         return z

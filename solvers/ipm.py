@@ -70,7 +70,7 @@ class Ipm(Solver):
         self,
         *,
         theta: float = 0.995,
-        cg_tolerance: float = 1e-2,
+        cg_tolerance: float = 1e-3,
         feasibility: float = 1e-10,
         max_iterations: int = 200,
     ) -> None:

@@ -49,5 +49,5 @@ def test_a_line_says_the_outcome_and_why() -> None:
     heading, first, second, why = shown.getvalue().splitlines()
     assert heading.split()[:2] == ["scene", "solver"]
     assert " ".join(first.split()) == "small gi dual 1e-09 2 solved 7 0.50 0.75 2.0e-11 within"
-    assert " ".join(second.split()) == "small gi dual 1e-09 2 crashed – – 0.50 – no_answer"
+    assert " ".join(second.split()) == "small gi dual 1e-09 2 crashed – – – – no_answer"
     assert why.strip() == "killed by SIGSEGV"

@@ -39,7 +39,7 @@ class Fasteners(ForceEffect):
             raise ValueError("give either points or a pattern")
         return self
 
-    def positions(self, joint: Joint) -> Matrix:
+    def marks(self, joint: Joint) -> Matrix:
         """(k, 2) coordinates in mm."""
         if self.pattern is None:
             return np.array(self.points)
@@ -55,13 +55,13 @@ class Fasteners(ForceEffect):
             yield "pattern.edge", self.pattern.edge, allowed
             return
         allowed = f"on the junction, 0 … {length:g} × 0 … {width:g} mm"
-        for k, (x, y) in enumerate(self.positions(joint)):
+        for k, (x, y) in enumerate(self.marks(joint)):
             if not (0 <= x <= length and 0 <= y <= width):
                 yield f"points[{k}]", [float(x), float(y)], allowed
 
     def force(self, joint: Joint) -> Vector:
         nx, _ = joint.junction.nodes
-        positions = self.positions(joint)
+        positions = self.marks(joint)
         ix, iy = (
             np.abs(positions[:, [axis]] - grid).argmin(axis=1) for axis, grid in enumerate((joint.x, joint.y))
         )

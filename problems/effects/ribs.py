@@ -19,7 +19,7 @@ class Ribs(StiffnessEffect):
     kind: Literal["ribs"]
     lines: Annotated[tuple[Finite, ...], Field(min_length=1)]
     I: Positive  # noqa: E741
-    J: Annotated[float, Field(ge=0)] = 0.0
+    J: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from super().faults(joint)

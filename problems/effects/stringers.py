@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import numpy as np
@@ -9,7 +10,7 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from ..effect import StiffnessEffect
-from ..joint import Finite, Positive
+from ..joint import Finite, Joint, Positive
 from ..plate import Plate
 
 
@@ -24,7 +25,16 @@ class Stringers(StiffnessEffect):
     start: Finite
     stop: Finite
     I: Positive  # noqa: E741
-    J: Annotated[float, Field(ge=0)] = 0.0
+    J: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from super().faults(joint)
+        for part in joint.part:
+            if part.name == self.part:
+                y = joint.plate(part).y
+                if max(self.start, y[0]) >= min(self.stop, y[-1]):
+                    allowed = f"a length on the part, {y[0]:g} … {y[-1]:g} mm"
+                    yield "start, stop", [self.start, self.stop], allowed
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J

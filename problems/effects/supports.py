@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import scipy.sparse as sp
 from pydantic import Field
@@ -22,7 +22,10 @@ class Supports(StiffnessEffect):
     kind: Literal["supports"]
     points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1)]
     stiffness_per_point: Positive = 1e6
-    holds: ClassVar[bool] = True
+
+    @property
+    def held_points(self) -> tuple[tuple[float, float], ...]:
+        return self.points
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from super().faults(joint)

@@ -1,0 +1,37 @@
+"""Small joints made in code, and the numbering of the plate's unknowns, written down once more."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.effect import Effect
+from problems.joint import Joint
+from problems.scene import Scene
+
+
+def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> Joint:
+    data = {"length": 400.0, "width": 120.0, "nodes": (5, 4)} | junction
+    part = [{"name": "a", "thickness": 6.0} | table for table in parts]
+    return Joint.model_validate({"junction": data, "part": part, "contacts": contacts})
+
+
+def make_scene(joint: Joint, *effects: Effect) -> Scene:
+    return Scene("small", "small", joint, effects)
+
+
+def dof(nx: int, ix: int, iy: int, dx: int = 0, dy: int = 0) -> int:
+    """The unknown of a grid point: deflection, or its derivative by x and y."""
+    return ((2 * iy + dy) * nx + ix) * 2 + dx
+
+
+def degrees(x: NDArray[np.float64], y: NDArray[np.float64], field: Any) -> NDArray[np.float64]:
+    """The degrees of freedom of a field, field(x, y) → w, w_x, w_y, w_xy."""
+    out = np.zeros(4 * len(x) * len(y))
+    for iy, y_i in enumerate(y):
+        for ix, x_i in enumerate(x):
+            for value, (dx, dy) in zip(field(x_i, y_i), [(0, 0), (1, 0), (0, 1), (1, 1)], strict=True):
+                out[dof(len(x), ix, iy, dx, dy)] = value
+    return out

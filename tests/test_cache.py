@@ -1,0 +1,177 @@
+"""The cache: whole entries or none, memory-mapped, and rebuilt when what made them changes."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from joints import make_joint, make_scene
+
+from problems import build, cache
+from problems.effects.supports import Supports
+from problems.errors import InputError
+
+ARRAYS = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
+PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
+SCENE = make_scene(
+    make_joint(PART, PART | {"name": "b"}),
+    Supports(kind="supports", part="a", points=((200.0, 60.0),), stiffness_per_point=1e3),
+)
+
+
+@pytest.fixture(autouse=True)
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_an_entry_comes_back_memory_mapped_and_read_only() -> None:
+    assert cache.load("key") is None
+    cache.store("key", ARRAYS, {"n": 3, "text": "é"})
+    found = cache.load("key")
+    assert found is not None
+    arrays, facts = found
+    assert facts == {"n": 3, "text": "é"}
+    assert arrays.keys() == ARRAYS.keys()
+    for name, array in arrays.items():
+        assert isinstance(array, np.memmap)
+        assert not array.flags.writeable
+        np.testing.assert_array_equal(array, ARRAYS[name])
+
+
+def test_storing_again_replaces_the_entry(root: Path) -> None:
+    cache.store("key", ARRAYS, {})
+    cache.store("key", {"three": np.ones(3)}, {"n": 1})
+    found = cache.load("key")
+    assert found is not None
+    assert list(found[0]) == ["three"]
+    assert [path.name for path in root.iterdir()] == ["key"]
+
+
+@pytest.mark.parametrize("kept", [0, 100, -8])
+def test_a_truncated_array_is_named_with_its_sizes(root: Path, kept: int) -> None:
+    cache.store("key", ARRAYS, {})
+    path = root / "key" / "one.npy"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:kept])
+    with pytest.raises(InputError) as error:
+        cache.load("key")
+    for said in (str(path), str(len(whole)), str(len(whole[:kept])), "delete"):
+        assert said in str(error.value)
+
+
+def test_a_missing_array_is_named(root: Path) -> None:
+    cache.store("key", ARRAYS, {})
+    (root / "key" / "two.npy").unlink()
+    with pytest.raises(InputError, match=r"two\.npy"):
+        cache.load("key")
+
+
+@pytest.mark.parametrize("text", ["", '{"files": {"one.npy"', "{}", None])
+def test_a_damaged_manifest_is_named(root: Path, text: str | None) -> None:
+    cache.store("key", ARRAYS, {})
+    manifest = root / "key" / cache.MANIFEST
+    if text is None:
+        manifest.unlink()
+    else:
+        manifest.write_text(text)
+    with pytest.raises(InputError, match=r"manifest\.json"):
+        cache.load("key")
+
+
+def test_a_writer_that_fails_leaves_nothing(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save = np.save
+
+    def disk_full(path: Path, array: Any) -> None:
+        if path.name == "two.npy":
+            path.write_bytes(b"half")
+            raise OSError("no space left on device")
+        save(path, array)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "save", disk_full)
+        with pytest.raises(OSError, match="no space"):
+            cache.store("key", ARRAYS, {})
+    assert list(root.iterdir()) == []
+    assert cache.load("key") is None
+
+
+def test_what_a_killed_writer_leaves_is_not_seen(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Looked at from within the writing, after each file."""
+    save, seen = np.save, []
+
+    def look(path: Path, array: Any) -> None:
+        save(path, array)
+        seen.append(cache.load("key"))
+
+    monkeypatch.setattr(np, "save", look)
+    cache.store("key", ARRAYS, {})
+    assert seen == [None, None]
+    assert cache.load("key") is not None
+
+
+def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: list[str] = []
+    first = build.prepared(SCENE, lambda text, _: steps.append(text))
+    assert len(steps) > 3
+
+    def fail(*_: object) -> None:
+        pytest.fail("built a second time")
+
+    monkeypatch.setattr(build, "_build", fail)
+    second = build.prepared(SCENE, lambda text, _: pytest.fail(text))
+    for one, other in zip(first.assembly.blocks, second.assembly.blocks, strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(first.Q, second.Q)
+    assert first.facts == second.facts
+    for array in (second.Q, *second.assembly.blocks, *second.factors):
+        assert isinstance(array, np.memmap)
+        assert not array.flags.writeable
+
+
+def test_prepared_holds_what_it_says() -> None:
+    made = build.prepared(SCENE)
+    A = made.assembly.A.toarray()
+    np.testing.assert_array_equal(A, np.vstack([np.eye(20), -np.eye(20)]))
+    for K, U in zip(made.assembly.blocks, made.factors, strict=True):
+        np.testing.assert_array_equal(np.tril(U, -1), 0)
+        np.testing.assert_allclose(U.T @ U, K, atol=1e-12 * abs(K).max())
+    inverses = [np.linalg.inv(K) for K in made.assembly.blocks]
+    np.testing.assert_allclose(made.Q, sum(inverses), rtol=1e-9)
+    values = np.concatenate([np.linalg.eigvalsh(K) for K in made.assembly.blocks])
+    assert made.facts["lambda_min"] == pytest.approx(values.min(), rel=1e-6)
+    assert made.facts["lambda_max"] == pytest.approx(values.max(), rel=1e-6)
+    assert json.dumps(made.facts)
+
+
+def test_a_truncated_part_of_a_scene_stops_the_run(root: Path) -> None:
+    build.prepared(SCENE)
+    path = root / build.cache_key(SCENE) / "Q.npy"
+    path.write_bytes(path.read_bytes()[:-16])
+    with pytest.raises(InputError, match=r"Q\.npy"):
+        build.prepared(SCENE)
+
+
+@pytest.mark.parametrize(
+    "module", ["hermite", "plate", "condense", "joint", "matrices", "assembly", "build", "effects.supports"]
+)
+def test_a_change_of_the_code_that_builds_changes_the_key(
+    module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, key = inspect.getsource, build.cache_key(SCENE)
+
+    def edited(made: Any) -> str:
+        return source(made) + ("# edited" if made.__name__ == f"problems.{module}" else "")
+
+    monkeypatch.setattr(inspect, "getsource", edited)
+    assert build.cache_key(SCENE) != key
+
+
+def test_a_folder_that_cannot_be_made(root: Path) -> None:
+    root.write_text("a file where the folder should be")
+    with pytest.raises(InputError, match="RIVETBENCH_CACHE"):
+        build.prepared(SCENE)

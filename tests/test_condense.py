@@ -1,0 +1,220 @@
+"""Condensation against a dense Schur complement and a full solve, and contact against beam theory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from joints import dof, make_joint, make_scene
+from numpy.typing import NDArray
+from scipy.sparse.linalg import spsolve
+
+from harness.active_set import contact_set
+from problems.assembly import LoadCase, Prepared
+from problems.build import load_case, prepared
+from problems.condense import NotPositiveDefinite, condense
+from problems.effect import StiffnessEffect
+from problems.effects.fasteners import Fasteners
+from problems.effects.initial_gap import InitialGap
+from problems.effects.pressure import Pressure
+from problems.effects.ribs import Ribs
+from problems.effects.stringers import Stringers
+from problems.effects.supports import Supports
+from problems.errors import InputError
+from problems.scene import Scene
+
+SHORT, LONG = {"length": 90.0, "elements": 2}, {"length": 250.0, "elements": 4}
+PARTS: list[dict[str, Any]] = [
+    {"north": SHORT, "clamped": ["north"]},
+    {"south": SHORT, "clamped": ["south"]},
+    {"south": LONG, "north": SHORT, "clamped": ["north"]},
+    {"south": SHORT, "north": LONG, "clamped": ["south", "north"]},
+    {"south": LONG},
+    {},
+]
+
+
+def stiffeners(part: dict[str, Any]) -> list[StiffnessEffect]:
+    points = ((30.0, 20.0), (350.0, 35.0), (170.0, 110.0), (399.0, 3.0))
+    effects: list[StiffnessEffect] = [
+        Supports(kind="supports", part="a", points=points, stiffness_per_point=4e3),
+        Stringers(kind="stringers", part="a", pitch=130.0, start=-50.0, stop=95.0, I=2e4, J=3e3),
+    ]
+    if "south" in part:
+        effects.append(Ribs(kind="ribs", part="a", lines=(-15.0,), I=1e5, J=1e4))
+    return effects
+
+
+def full_stiffness(part: dict[str, Any]) -> tuple[sp.csc_array, NDArray[np.int_]]:
+    """K without the clamped unknowns, and where the junction's deflections stand in it, x fastest."""
+    joint = make_joint(part, contacts=[["a", "tool"]])
+    plate = joint.plate(joint.part[0])
+    K = plate.stiffness()
+    for effect in stiffeners(part):
+        K = K + effect.stiffness(plate)
+    nx, clamped = 5, part.get("clamped", [])
+    rows = [iy for iy, y in enumerate(plate.y) if -1e-6 < y < 120 + 1e-6]
+    held = {"south": 0, "north": len(plate.y) - 1}
+    lines = [iy for iy in range(len(plate.y)) if iy not in [held[edge] for edge in clamped]]
+    derivatives = [(0, 0), (1, 0), (0, 1), (1, 1)]
+    free = np.sort([dof(nx, ix, iy, dx, dy) for iy in lines for ix in range(nx) for dx, dy in derivatives])
+    wanted = np.array([dof(nx, ix, iy) for iy in rows for ix in range(nx)])
+    return sp.csc_array(K.tocsr()[free][:, free]), np.searchsorted(free, wanted)
+
+
+@pytest.mark.parametrize("part", PARTS, ids=str)
+def test_equals_the_dense_schur_complement(part: dict[str, Any]) -> None:
+    joint = make_joint(part, contacts=[["a", "tool"]])
+    found = prepared(make_scene(joint, *stiffeners(part))).assembly.blocks[0]
+    sparse, keep = full_stiffness(part)
+    K, other = sparse.toarray(), np.setdiff1d(np.arange(sparse.shape[0]), keep)
+    expected = K[np.ix_(keep, keep)] - K[np.ix_(keep, other)] @ np.linalg.solve(
+        K[np.ix_(other, other)], K[np.ix_(other, keep)]
+    )
+    np.testing.assert_allclose(found, expected, atol=1e-10 * abs(expected).max())
+
+
+@pytest.mark.parametrize("part", PARTS, ids=str)
+def test_solution_equals_that_of_the_whole_plate(part: dict[str, Any]) -> None:
+    joint = make_joint(part, contacts=[["a", "tool"]])
+    made = prepared(make_scene(joint, *stiffeners(part)))
+    K, keep = full_stiffness(part)
+    load = np.random.default_rng(0).normal(0, 100, made.assembly.n)
+    f = np.zeros(K.shape[0])
+    f[keep] = load
+    whole = spsolve(K, f)[keep]
+    np.testing.assert_allclose(made.solve_K(load), whole, atol=1e-9 * abs(whole).max())
+
+
+def test_nodes_stand_in_the_order_of_the_unknowns() -> None:
+    """By lines of ascending y, whichever the direction of elimination."""
+    for part in PARTS[:3]:
+        joint = make_joint(part, contacts=[["a", "tool"]], nodes=(7, 5))
+        made = prepared(make_scene(joint))
+        nodes = [(400.0 * ix / 6, 120.0 * iy / 4) for iy in range(5) for ix in range(7)]
+        np.testing.assert_allclose(made.assembly.nodes, nodes)
+        flexibility = made.solve_K(np.eye(35))
+        # the part is built in at one edge: the mean flexibility falls towards it
+        by_line = np.diag(flexibility).reshape(5, 7).mean(axis=1)
+        assert (by_line[0] > by_line[-1]) == ("north" in part["clamped"])
+
+
+def test_progress_ends_at_one() -> None:
+    seen: list[float] = []
+    condense(sp.csr_array(np.eye(6)), [np.arange(3), np.arange(3, 6)], np.arange(6) % 3 == 0, seen.append)
+    assert seen == [0.5, 1.0]
+
+
+def test_a_motion_without_energy_is_refused() -> None:
+    spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    K = sp.csr_array(sp.block_diag([spring, np.eye(2)]))
+    with pytest.raises(NotPositiveDefinite):
+        condense(K, [np.array([0, 1]), np.array([2, 3])], np.array([False, False, False, True]))
+
+
+FLOATING = [
+    (),
+    ((30.0, 20.0),),
+    ((30.0, 20.0), (350.0, 35.0)),
+    ((30.0, 20.0), (130.0, 40.0), (330.0, 80.0)),  # on one line
+]
+
+
+@pytest.mark.parametrize("points", FLOATING)
+def test_a_part_that_floats_is_refused(points: tuple[tuple[float, float], ...]) -> None:
+    joint = make_joint({"south": LONG}, contacts=[["a", "tool"]])
+    effects = [Supports(kind="supports", part="a", points=points)] if points else []
+    with pytest.raises(InputError, match="held against every rigid motion"):
+        prepared(make_scene(joint, *effects))
+
+
+# --- A narrow clamped strip along y, pressed on a flat obstacle -----------------------------------------
+
+LENGTH, ELEMENTS, WIDTH, GAP = 1000.0, 100, 20.0, 1.0
+H = LENGTH / ELEMENTS
+EI = 70e3 * WIDTH * 6.0**3 / 12
+FIRST_TOUCH = 384 * EI * GAP / LENGTH**4
+
+
+@pytest.fixture(scope="module")
+def strip() -> Prepared:
+    end = {"length": H, "elements": 1}
+    joint = make_joint(
+        {"poisson": 0.0, "south": end, "north": end, "clamped": ["south", "north"]},
+        contacts=[["a", "tool"]],
+        length=WIDTH,
+        width=LENGTH - 2 * H,
+        nodes=(2, ELEMENTS - 1),
+    )
+    return prepared(make_scene(joint))
+
+
+def pressed(strip: Prepared, q: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Deflection and contact force of each node line under q N/mm."""
+    load = LoadCase(np.full(strip.assembly.n, q * H / 2), np.full(strip.assembly.m, GAP))
+    active = contact_set(strip.Q, strip.dual_load(load))
+    p, lam = strip.dual_load(load), np.zeros(strip.assembly.m)
+    lam[active] = np.linalg.solve(strip.Q[np.ix_(active, active)], p[active])
+    x = strip.recover(lam, load)
+    assert (lam >= 0).all()
+    assert (load.g - strip.assembly.A.T @ x >= -1e-9).all()
+    return x.reshape(-1, 2).mean(axis=1), lam.reshape(-1, 2).sum(axis=1)
+
+
+def test_strip_touches_at_the_load_of_beam_theory(strip: Prepared) -> None:
+    w, force = pressed(strip, 0.995 * FIRST_TOUCH)
+    assert force.max() == 0
+    assert w.max() == pytest.approx(0.995 * GAP, rel=1e-3)
+    _, force = pressed(strip, 1.005 * FIRST_TOUCH)
+    assert np.flatnonzero(force).tolist() == [ELEMENTS // 2 - 1]
+
+
+@pytest.mark.parametrize("times", [1.2, 2.0, 2.9])
+def test_reaction_in_point_contact(strip: Prepared, times: float) -> None:
+    q = times * FIRST_TOUCH
+    _, force = pressed(strip, q)
+    assert np.flatnonzero(force).tolist() == [ELEMENTS // 2 - 1]
+    assert force.sum() == pytest.approx(q * LENGTH / 2 - 192 * EI * GAP / LENGTH**3, rel=2e-3)
+
+
+@pytest.mark.parametrize("times", [6.0, 30.0, 100.0])
+def test_lift_off_and_reaction_in_wide_contact(strip: Prepared, times: float) -> None:
+    q = times * FIRST_TOUCH
+    lift_off = (72 * EI * GAP / q) ** 0.25
+    _, force = pressed(strip, q)
+    y = H * (1 + np.arange(ELEMENTS - 1))
+    closed = y[force > 0]
+    assert closed[0] == pytest.approx(lift_off, abs=1.01 * H)
+    assert LENGTH - closed[-1] == pytest.approx(lift_off, abs=1.01 * H)
+    assert force.sum() == pytest.approx(q * (LENGTH - 2 * lift_off) + 2 * q * lift_off / 3, rel=3e-3)
+
+
+def test_two_equal_parts_are_one_part_on_a_tool_at_half_the_gap() -> None:
+    part = {"north": SHORT, "clamped": ["north"]}
+    one = make_joint(part, contacts=[["a", "tool"]], nodes=(9, 5))
+    two = make_joint(part, part | {"name": "b"}, nodes=(9, 5))
+    press = Pressure(kind="pressure", part="a", value=0.02)
+    rivets = Fasteners(kind="fasteners", preload=300.0, points=((50.0, 10.0), (310.0, 55.0)))
+
+    def gap(mean: float) -> InitialGap:
+        return InitialGap(kind="initial_gap", mean=mean)
+
+    against = press.model_copy(update={"part": "b", "value": -0.02})
+    x_one, lam_one = solve(make_scene(one, press, rivets, gap(0.4)))
+    x_two, lam_two = solve(make_scene(two, press, against, rivets, gap(0.8)))
+    assert 3 < sum(lam_one > 0) < 42
+    np.testing.assert_allclose(x_two[:45], x_one, atol=1e-10)
+    np.testing.assert_allclose(x_two[45:], -x_one, atol=1e-10)
+    np.testing.assert_allclose(lam_two, lam_one, atol=1e-7)
+
+
+def solve(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    made = prepared(scene)
+    load = load_case(scene, made)
+    p = made.dual_load(load)
+    active = contact_set(made.Q, p)
+    lam = np.zeros(len(p))
+    lam[active] = np.linalg.solve(made.Q[np.ix_(active, active)], p[active])
+    return made.recover(lam, load), lam

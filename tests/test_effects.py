@@ -1,0 +1,177 @@
+"""Each effect's one term, and that an effect which no scene names takes no part."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from joints import make_joint, make_scene
+from pydantic import ValidationError
+
+from problems.build import load_case, prepared
+from problems.effects.fasteners import Fasteners
+from problems.effects.initial_gap import InitialGap
+from problems.effects.pressure import Pressure
+from problems.joint import Joint
+
+ROOT = Path(__file__).parents[1]
+PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
+JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
+POINT = st.tuples(st.floats(0, 400), st.floats(0, 120))
+
+
+def field_of(seed: int, joint: Joint = JOINT, sd: float = 0.2, length: float = 150.0) -> np.ndarray:
+    random = {"sd": sd, "correlation_length": length, "seed": seed}
+    return InitialGap.model_validate({"kind": "initial_gap", "mean": 0.6, "random": random}).gap(joint)
+
+
+@given(st.lists(POINT, min_size=1, max_size=6))
+@settings(deadline=None)
+def test_fastener_acts_on_the_nearest_node(points: list[tuple[float, float]]) -> None:
+    f = Fasteners(kind="fasteners", preload=700.0, points=tuple(points)).force(JOINT)
+    on_a, on_b = f[:45], f[45:]
+    assert on_a.sum() == pytest.approx(700.0 * len(points))
+    np.testing.assert_array_equal(on_b, -on_a)  # equilibrium, node for node
+    nodes = np.array([(50.0 * ix, 30.0 * iy) for iy in range(5) for ix in range(9)])
+    loaded = nodes[on_a > 0]
+    for point in points:
+        nearest = np.linalg.norm(nodes - point, axis=1).min()
+        assert np.linalg.norm(loaded - point, axis=1).min() <= nearest + 1e-9
+        assert nearest <= np.hypot(25.0, 15.0)
+
+
+def test_two_fasteners_on_one_node_add_up() -> None:
+    f = Fasteners(kind="fasteners", preload=10.0, points=((101.0, 29.0), (99.0, 31.0), (300.0, 0.0))).force(
+        JOINT
+    )
+    assert {int(i): float(f[i]) for i in np.flatnonzero(f)} == {11: 20.0, 6: 10.0, 56: -20.0, 51: -10.0}
+
+
+def test_fastener_closes_the_gap() -> None:
+    """The sign: without contact the parts come closer, x_a − x_b > 0."""
+    scene = make_scene(JOINT, Fasteners(kind="fasteners", preload=10.0, points=((200.0, 60.0),)))
+    made = prepared(scene)
+    approach = made.assembly.A.T @ made.solve_K(load_case(scene, made).f)
+    assert (approach > 0).all()
+
+
+def test_fastener_on_a_tool_has_no_counterpart() -> None:
+    joint = make_joint(PART, contacts=[["a", "tool"]], nodes=(9, 5))
+    f = Fasteners(kind="fasteners", preload=10.0, points=((0.0, 0.0),)).force(joint)
+    assert f.tolist() == [10.0] + 44 * [0.0]
+
+
+def test_pattern_spreads_evenly_up_to_the_edge() -> None:
+    made = Fasteners.model_validate(
+        {"kind": "fasteners", "preload": 1.0, "pattern": {"columns": 4, "rows": 3, "edge": 20.0}}
+    )
+    expected = [(x, y) for y in (20.0, 60.0, 100.0) for x in (20.0, 140.0, 260.0, 380.0)]
+    np.testing.assert_allclose(made.marks(JOINT), expected)
+    single = Fasteners.model_validate(
+        {"kind": "fasteners", "preload": 1.0, "pattern": {"columns": 1, "rows": 1, "edge": 20.0}}
+    )
+    np.testing.assert_allclose(single.marks(JOINT), [(200.0, 60.0)])
+
+
+@pytest.mark.parametrize("extra", [{}, {"points": [[1.0, 1.0]], "pattern": {"columns": 1, "rows": 1}}])
+def test_fasteners_by_points_or_by_a_pattern(extra: dict[str, object]) -> None:
+    with pytest.raises(ValidationError, match="either points or a pattern"):
+        Fasteners.model_validate({"kind": "fasteners", "preload": 1.0} | extra)
+
+
+def test_pressure_sums_to_value_times_area() -> None:
+    f = Pressure(kind="pressure", part="b", value=-0.003).force(JOINT)
+    assert f[:45].tolist() == 45 * [0.0]
+    assert f[45:].sum() == pytest.approx(-0.003 * 400 * 120, rel=1e-12)
+    grid = f[45:].reshape(5, 9)
+    cell = -0.003 * 50 * 30
+    assert grid[2, 4] == pytest.approx(cell)
+    assert grid[0, 4] == grid[2, 0] == pytest.approx(cell / 2)
+    assert grid[-1, -1] == pytest.approx(cell / 4)
+
+
+def test_constant_gap() -> None:
+    assert InitialGap(kind="initial_gap", mean=0.6).gap(JOINT).tolist() == 45 * [0.6]
+
+
+def test_random_gap_is_that_of_its_seed() -> None:
+    np.testing.assert_array_equal(field_of(3), field_of(3))
+    assert abs(field_of(3) - field_of(4)).max() > 0.05
+
+
+def test_random_gap_scales_with_its_deviation() -> None:
+    np.testing.assert_allclose(field_of(3, sd=0.4) - 0.6, 2 * (field_of(3, sd=0.2) - 0.6), rtol=1e-12)
+
+
+@pytest.mark.parametrize("nodes", [(9, 5), (25, 9)])
+def test_random_gap_has_its_mean_deviation_and_correlation(nodes: tuple[int, int]) -> None:
+    """2000 fields: the mean, the deviation at every node, and exp(−r² / 2ℓ²) along x, y and both."""
+    joint = make_joint(PART, PART | {"name": "b"}, nodes=nodes)
+    samples = np.array([field_of(seed, joint, length=100.0) for seed in range(2000)])
+    assert samples.mean() == pytest.approx(0.6, abs=0.01)
+    deviation = samples.std(axis=0)
+    assert deviation.min() > 0.2 * 0.92
+    assert deviation.max() < 0.2 * 1.08
+    grid = ((samples - 0.6) / 0.2).reshape(len(samples), nodes[1], nodes[0])
+    along_x, along_y = (nodes[0] - 1) // 4, (nodes[1] - 1) // 2  # 100 mm and 60 mm
+    pairs = [
+        (grid[:, :, :-along_x], grid[:, :, along_x:], 100.0),
+        (grid[:, :-along_y], grid[:, along_y:], 60.0),
+        (grid[:, :-along_y, :-along_x], grid[:, along_y:, along_x:], np.hypot(100.0, 60.0)),
+    ]
+    for one, other, distance in pairs:
+        assert (one * other).mean() == pytest.approx(np.exp(-((distance / 100) ** 2) / 2), abs=0.03)
+
+
+def test_each_contact_pair_has_a_field_of_its_own() -> None:
+    joint = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, nodes=(9, 5))
+    g = field_of(1, joint)
+    assert len(g) == 90
+    assert abs(g[:45] - g[45:]).max() > 0.05
+
+
+def test_terms_add_up() -> None:
+    press, rivets = (
+        Pressure(kind="pressure", part="a", value=0.1),
+        Fasteners(kind="fasteners", preload=5.0, points=((0.0, 0.0),)),
+    )
+    gap = InitialGap(kind="initial_gap", mean=0.25)
+    scene = make_scene(JOINT, press, gap, rivets, gap)
+    load = load_case(scene, prepared(scene))
+    np.testing.assert_array_equal(load.f, press.force(JOINT) + rivets.force(JOINT))
+    assert load.g.tolist() == 45 * [0.5]
+
+
+@pytest.mark.parametrize("named", ["initial_gap", "pressure"])
+def test_an_effect_that_is_not_named_is_not_imported(named: str, tmp_path: Path) -> None:
+    parameters = {"initial_gap": "mean = 0.6", "pressure": 'part = "a"\nvalue = 1.0'}[named]
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f"""
+[[effect]]
+kind = "{named}"
+{parameters}
+
+[joint]
+contacts = [["a", "tool"]]
+junction = {{ length = 100.0, width = 50.0, nodes = [3, 3] }}
+
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = {{ length = 40.0, elements = 2 }}
+clamped = ["north"]
+""")
+    code = (
+        "import sys; from problems.build import load_case, prepared; from problems.scene import read_scene;"
+        "s = read_scene(sys.argv[1]); load_case(s, prepared(s));"
+        "print(*[m for m in sys.modules if m.startswith('problems.effects.')])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(scene)], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == [f"problems.effects.{named}"]

@@ -1,0 +1,60 @@
+"""A measurement that cannot end in time is not run, and only such a one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from harness.plan import expand
+from harness.run import out_of_time_before
+from harness.suite import checked
+
+
+def plan(**changes):
+    data = {
+        "scenes": ["4386/0107", "6112/0600"],
+        "time_limit_s": 30,
+        "time_limit_by_size_s": {"6112": 40},
+        "solver": [{"name": "piqp"}],
+    }
+    return expand(checked(data | changes, Path("suite.toml")))
+
+
+def row(scene, n, status="time_limit", limit=30.0, **changes):
+    same = {"solver": "piqp", "form": "primal", "variant": "", "tolerance": 1e-9, "options": {}}
+    facts = {"scene": scene, "n": n, "status": status, "time_limit_s": limit, "threads_asked": 2}
+    return same | facts | changes
+
+
+@pytest.fixture
+def large():
+    return next(m for m in plan() if m.scene == "6112/0600" and m.form == "primal")
+
+
+def test_limits_go_by_size(large):
+    assert large.time_limit_s == 40
+    assert {m.time_limit_s for m in plan() if m.scene == "4386/0107"} == {30}
+    assert {m.time_limit_s for m in plan(time_limit_by_size_s={}, time_limit_s=7)} == {7}
+
+
+def test_too_slow_on_every_smaller_scene_is_not_run(large):
+    rows = [row("4386/0107", 4386), row("4386/1471", 4386)]
+    assert out_of_time_before(large, 6112, rows) == "4386/0107, 4386/1471"
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [],
+        [row("4386/0107", 4386), row("4386/1471", 4386, "solved")],  # in time on one of them
+        [row("6112/2300", 6112)],  # another scene of the same size says nothing
+        [row("11308/0220", 11308)],  # nor does a larger one
+        [row("4386/0107", 4386, limit=20.0)],  # 20 s · (6112/4386)² is less than 40 s
+        [row("4386/0107", 4386, form="dual")],
+        [row("4386/0107", 4386, options={"backend": "sparse"})],
+        [row("4386/0107", 4386, tolerance=1e-8)],
+    ],
+)
+def test_anything_else_is_run(large, rows):
+    assert out_of_time_before(large, 6112, rows) == ""

@@ -1,0 +1,214 @@
+"""A user's own K, A, f, g: both formats, the blocks found in K, and what is said of bad ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.linalg as sla
+import scipy.sparse as sp
+
+from problems.assembly import LoadCase, Prepared
+from problems.build import load_case, prepared
+from problems.errors import InputError
+from problems.scene import read_scene
+
+RNG = np.random.default_rng(11)
+BASIS = RNG.standard_normal((4, 4))
+K1 = BASIS @ BASIS.T + 4 * np.eye(4)
+DATA: dict[str, Any] = {
+    "K": sla.block_diag(K1, 3 * K1),
+    "A": np.vstack([np.eye(4), -np.eye(4)]),
+    "f": RNG.standard_normal(8),
+    "g": np.array([0.1, 0.2, 0.0, -0.1]),
+}
+
+
+def opened(path: Path) -> tuple[Prepared, LoadCase]:
+    scene = read_scene(str(path))
+    made = prepared(scene)
+    return made, load_case(scene, made)
+
+
+def write_npz(folder: Path, **changes: Any) -> Path:
+    path = folder / "mine.npz"
+    np.savez(path, **{key: value for key, value in (DATA | changes).items() if value is not None})
+    return path
+
+
+def write_mtx(folder: Path, **changes: Any) -> Path:
+    for key, value in (DATA | changes).items():
+        scipy.io.mmwrite(folder / f"{key}.mtx", value[:, None] if value.ndim == 1 else value, precision=17)
+    path = folder / "mine.toml"
+    path.write_text("[matrices]\n" + "".join(f'{key} = "{key}.mtx"\n' for key in DATA))
+    return path
+
+
+def check_data(made: Prepared, load: LoadCase) -> None:
+    assert [block.shape for block in made.assembly.blocks] == [(4, 4), (4, 4)]
+    np.testing.assert_allclose(sla.block_diag(*made.assembly.blocks), DATA["K"], rtol=1e-15)
+    np.testing.assert_array_equal(made.assembly.A.toarray(), DATA["A"])
+    np.testing.assert_array_equal(load.f, DATA["f"])
+    np.testing.assert_array_equal(load.g, DATA["g"])
+    np.testing.assert_allclose(made.Q, DATA["A"].T @ np.linalg.solve(DATA["K"], DATA["A"]), rtol=1e-12)
+    values = np.linalg.eigvalsh(DATA["K"])
+    assert made.facts["cond_K"] == pytest.approx(values[-1] / values[0], rel=1e-6)
+
+
+def test_npz(tmp_path: Path) -> None:
+    made, load = opened(write_npz(tmp_path))
+    check_data(made, load)
+    assert made.assembly.nodes is None
+
+
+def test_npz_with_nodes(tmp_path: Path) -> None:
+    nodes = np.arange(16.0).reshape(8, 2)
+    made, _ = opened(write_npz(tmp_path, nodes=nodes))
+    np.testing.assert_array_equal(made.assembly.nodes, nodes)
+
+
+def test_matrix_market_dense(tmp_path: Path) -> None:
+    check_data(*opened(write_mtx(tmp_path)))
+
+
+def test_matrix_market_sparse(tmp_path: Path) -> None:
+    sparse = {key: sp.coo_array(DATA[key].reshape(8, -1)) for key in ("K", "A", "f")}
+    check_data(*opened(write_mtx(tmp_path, **sparse)))
+
+
+def test_a_named_npz_in_a_scene(tmp_path: Path) -> None:
+    write_npz(tmp_path)
+    path = tmp_path / "mine.toml"
+    path.write_text('title = "my own"\n[matrices]\nproblem = "mine.npz"\n')
+    check_data(*opened(path))
+    assert read_scene(str(path)).title == "my own"
+
+
+def test_interleaved_blocks_become_one(tmp_path: Path) -> None:
+    order = np.array([0, 4, 1, 5, 2, 6, 3, 7])
+    K = DATA["K"][np.ix_(order, order)]
+    made, load = opened(write_npz(tmp_path, K=K, A=DATA["A"][order], f=DATA["f"][order]))
+    assert [block.shape for block in made.assembly.blocks] == [(8, 8)]
+    np.testing.assert_allclose(made.solve_K(load.f), np.linalg.solve(K, load.f), rtol=1e-12)
+
+
+def test_blocks_of_different_sizes(tmp_path: Path) -> None:
+    K = sla.block_diag(K1[:1, :1], K1, K1[:3, :3])
+    made, _ = opened(write_npz(tmp_path, K=K))
+    assert [len(block) for block in made.assembly.blocks] == [1, 4, 3]
+    np.testing.assert_array_equal(sla.block_diag(*made.assembly.blocks), K)
+
+
+def test_rounding_in_the_symmetry_of_K_is_taken_out(tmp_path: Path) -> None:
+    K = DATA["K"].copy()
+    K[0, 1] += 1e-13
+    made, _ = opened(write_npz(tmp_path, K=K))
+    np.testing.assert_array_equal(made.assembly.blocks[0], made.assembly.blocks[0].T)
+
+
+@pytest.mark.parametrize("key", ["K", "A", "f", "g"])
+def test_a_changed_entry_makes_another_problem(tmp_path: Path, key: str) -> None:
+    before = read_scene(str(write_npz(tmp_path))).key
+    changed = DATA[key].copy()
+    changed.flat[0] *= 1.5
+    assert read_scene(str(write_npz(tmp_path, **{key: changed}))).key != before
+
+
+def changed(key: str, index: Any, value: float) -> dict[str, Any]:
+    array = DATA[key].copy()
+    array[index] = value
+    return {key: array}
+
+
+BAD: dict[str, tuple[dict[str, Any], str]] = {
+    "NaN in K": (changed("K", (2, 2), np.nan), "K = 'NaN or infinity'"),
+    "infinity in g": (changed("g", 1, np.inf), "g = 'NaN or infinity'"),
+    "NaN in A": (changed("A", (0, 0), np.nan), "A = 'NaN or infinity'"),
+    "asymmetric": (changed("K", (0, 1), 9.0), "max|K − Kᵀ|"),
+    "indefinite": (changed("K", (5, 5), -1.0), "K of part 2"),
+    "negative": ({"K": -DATA["K"]}, "K of part 1"),
+    "singular": ({"K": sla.block_diag(K1, np.ones((4, 4)))}, "positive definite"),
+    "ill-conditioned": ({"K": np.diag([1e-8, 1, 1, 1, 1, 1, 1, 1e8])}, "cond(K) = 1e+16"),
+    "K of one dimension": ({"K": np.ones(8)}, "K = 'float64 array of shape (8,)'"),
+    "K of three dimensions": ({"K": np.ones((1, 8, 8))}, "shape (1, 8, 8)"),
+    "A too short": ({"A": DATA["A"][:5]}, "A.shape = (5, 4): must be (8, 4)"),
+    "A of one dimension": ({"A": np.ones(8)}, "A = 'float64 array of shape (8,)'"),
+    "f too short": ({"f": np.ones(7)}, "f.shape = (7,): must be (8,)"),
+    "g too long": ({"g": np.ones(5)}, "g.shape = (5,): must be (4,)"),
+    "nodes": ({"nodes": np.ones((4, 2))}, "nodes.shape = (4, 2): must be (8, 2)"),
+    "complex": ({"K": DATA["K"] * (1 + 0j)}, "complex128"),
+    "text": ({"f": np.array(["a"] * 8)}, "f = '<U1 array"),
+    "objects": ({"f": np.array([None] * 8)}, "Object arrays"),
+    "missing g": ({"g": None}, "g = None: is missing"),
+    "a contact of nothing": (changed("A", (slice(None), 2), 0.0), "A[:, 2]"),
+    "a contact twice": ({"A": DATA["A"][:, [0, 1, 2, 1]]}, "A[:, 3]"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_arrays_are_named_with_their_file(tmp_path: Path, case: str) -> None:
+    changes, said = BAD[case]
+    path = write_npz(tmp_path, **changes)
+    with pytest.raises(InputError) as error:
+        opened(path)
+    assert len(error.value.faults) == 1
+    assert error.value.faults[0].where == str(path)
+    assert said in str(error.value)
+
+
+def test_several_wrong_shapes_at_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as error:
+        opened(write_npz(tmp_path, K=DATA["K"][:, :5], f=np.ones(3), g=changed("g", 0, np.nan)["g"]))
+    assert [fault.key for fault in error.value.faults] == ["K.shape", "f.shape", "g"]
+
+
+@pytest.mark.parametrize("size", [0, 3, 300, -40, -1])
+def test_truncated_npz(tmp_path: Path, size: int) -> None:
+    path = write_npz(tmp_path)
+    path.write_bytes(path.read_bytes()[:size])
+    with pytest.raises(InputError) as error:
+        opened(path)
+    assert len(error.value.faults) == 1
+    assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"no matrix\n1 2 3\n", bytes(range(256)), None])
+def test_unreadable_matrix_market(tmp_path: Path, content: bytes | None) -> None:
+    path = write_mtx(tmp_path)
+    K = tmp_path / "K.mtx"
+    K.write_bytes(K.read_bytes()[:400] if content is None else content)
+    with pytest.raises(InputError) as error:
+        opened(path)
+    assert [(fault.where, fault.key) for fault in error.value.faults] == [(str(K), "K")]
+
+
+@pytest.mark.parametrize("key", ["K", "A", "f", "g"])
+@pytest.mark.parametrize("form", ["dense", "sparse"])
+def test_truncated_matrix_market(tmp_path: Path, key: str, form: str) -> None:
+    """A line less than there should be, also where mmread would take it for zeros."""
+    value = DATA[key].reshape(len(DATA[key]), -1)
+    path = write_mtx(tmp_path, **{key: sp.coo_array(value) if form == "sparse" else value})
+    file = tmp_path / f"{key}.mtx"
+    file.write_text("\n".join(file.read_text().strip().splitlines()[:-1]))
+    with pytest.raises(InputError) as error:
+        opened(path)
+    assert [(fault.where, fault.key) for fault in error.value.faults] == [(str(file), key)]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("K", DATA["K"] - 9 * np.eye(8), "positive definite"),
+        ("K", changed("K", (0, 1), 9.0)["K"], "max|K − Kᵀ|"),
+        ("A", DATA["A"][:, [0, 1, 2, 1]], "A[:, 3]"),
+        ("f", np.ones(7), "f.shape"),
+    ],
+)
+def test_bad_matrix_market_names_its_file(tmp_path: Path, key: str, value: Any, said: str) -> None:
+    with pytest.raises(InputError) as error:
+        opened(write_mtx(tmp_path, **{key: value}))
+    assert [fault.where for fault in error.value.faults] == [str(tmp_path / f"{key}.mtx")]
+    assert said in str(error.value)

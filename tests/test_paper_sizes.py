@@ -1,0 +1,63 @@
+"""The paper's test problems: sizes and condition of Table 4, active constraints of Table 2."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from harness.active_set import contact_set
+from problems.assembly import Prepared
+from problems.build import load_case, prepared
+from problems.scene import read_scene, scene_names
+
+TABLE_2 = (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592)
+TABLE_4 = {4386: (2193, 2.63e6), 6112: (3056, 1.11e7), 11308: (5654, 1.77e7)}
+
+
+@pytest.mark.parametrize("n", TABLE_4)
+def test_sizes(n: int) -> None:
+    for name in scene_names():
+        if name.startswith(f"{n}/"):
+            scene = read_scene(name)
+            assert scene.expected_size == (n, TABLE_4[n][0])
+            assert scene.joint is not None
+            assert scene.joint.contact_matrix().shape == (n, TABLE_4[n][0])
+
+
+@pytest.mark.parametrize("n", TABLE_4)
+def test_every_size_has_from_few_to_many_active_constraints(n: int) -> None:
+    counts = [int(name.split("/")[1]) for name in scene_names() if name.startswith(f"{n}/")]
+    m = TABLE_4[n][0]
+    assert len(counts) >= 4
+    assert min(counts) < 0.05 * m
+    assert max(counts) > 0.7 * m
+    if n == 4386:
+        assert tuple(counts) == TABLE_2
+
+
+@pytest.fixture(scope="module")
+def smallest() -> Prepared:
+    return prepared(read_scene("4386/0052"))
+
+
+@pytest.mark.slow
+def test_condition_of_the_smallest_problem(smallest: Prepared) -> None:
+    """By all eigenvalues of both blocks, where the build takes a few by Lanczos."""
+    assert (smallest.assembly.n, smallest.assembly.m) == (4386, 2193)
+    values = np.concatenate([np.linalg.eigvalsh(K) for K in smallest.assembly.blocks])
+    condition = values.max() / values.min()
+    assert condition == pytest.approx(2.63e6, rel=0.01)
+    assert smallest.facts["cond_K"] == pytest.approx(condition, rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", TABLE_2)
+def test_active_constraints_of_the_paper(smallest: Prepared, count: int) -> None:
+    scene = read_scene(f"4386/{count:04}")
+    p = smallest.dual_load(load_case(scene, smallest))
+    active = contact_set(smallest.Q, p)
+    assert abs(int(active.sum()) - count) <= 22  # 1 % of m
+    lam = np.zeros(len(p))
+    lam[active] = np.linalg.solve(smallest.Q[np.ix_(active, active)], p[active])
+    assert lam.min() > -1e-6
+    assert (smallest.Q @ lam - p).min() > -1e-9

@@ -1,0 +1,277 @@
+"""The plate element against closed forms, beam theory and another code."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import skfem
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from joints import degrees, dof
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+from scipy.sparse.linalg import spsolve
+from skfem.helpers import dd, ddot, eye, trace
+
+from problems.effects.ribs import Ribs
+from problems.effects.stringers import Stringers
+from problems.hermite import line_matrices
+from problems.plate import Plate
+
+SIDE = 1000.0
+UNEVEN_X = np.array([0.0, 70.0, 110.0, 260.0, 300.0])
+UNEVEN_Y = np.array([-90.0, 0.0, 35.0, 50.0])
+
+
+def square(elements: int) -> Plate:
+    grid = np.linspace(0, SIDE, elements + 1)
+    return Plate(grid, grid, thickness=6.0, young=70e3, poisson=0.3)
+
+
+def centre_deflection(plate: Plate, edges: str, load: str) -> float:
+    """w D / q a⁴ or w D / P a² at the centre of a square plate."""
+    n = len(plate.x)
+    fixed = set()
+    for ix in range(n):
+        for iy in range(n):
+            along_y, along_x = ix in (0, n - 1), iy in (0, n - 1)
+            if edges == "clamped" and (along_x or along_y):
+                fixed |= {dof(n, ix, iy, dx, dy) for dx in (0, 1) for dy in (0, 1)}
+            elif along_x or along_y:  # w = 0 along the edge, and so its derivative along the edge
+                fixed.add(dof(n, ix, iy))
+            if edges == "supported" and along_x:
+                fixed.add(dof(n, ix, iy, dx=1))
+            if edges == "supported" and along_y:
+                fixed.add(dof(n, ix, iy, dy=1))
+    free = np.setdiff1d(np.arange(plate.size), list(fixed))
+    centre = dof(n, n // 2, n // 2)
+    f = np.zeros(plate.size)
+    if load == "point":
+        f[centre] = 1 / SIDE**2
+    else:
+        # ∫φ over the two elements at a point: h for the value; the slopes cancel inside, and are fixed
+        # or loaded by ±h²/12 at the ends.
+        h = SIDE / (n - 1)
+        line = np.zeros(2 * n)
+        line[::2] = h
+        line[[0, -2]] = h / 2
+        line[1], line[-1] = h**2 / 12, -(h**2) / 12
+        f = np.kron(line, line) / SIDE**4
+    w = np.zeros(plate.size)
+    w[free] = spsolve(plate.stiffness()[free][:, free].tocsc(), f[free])
+    return float(w[centre] * plate.rigidity)
+
+
+def navier(load: str) -> float:
+    """The same for simply supported edges: Navier's double sine series."""
+    odd = np.arange(1, 2001, 2)
+    m, n = np.meshgrid(odd, odd)
+    if load == "point":
+        return float(4 / np.pi**4 * np.sum(1.0 / (m**2 + n**2) ** 2))
+    signs = np.where((m + n) // 2 % 2, 1.0, -1.0)
+    return float(16 / np.pi**6 * np.sum(signs / (m * n * (m**2 + n**2) ** 2.0)))
+
+
+@pytest.mark.parametrize(
+    ("edges", "load", "expected", "digits"),
+    [
+        ("clamped", "uniform", 0.00126532, 1e-5),
+        ("supported", "uniform", 0.00406235, 1e-5),
+        ("clamped", "point", 0.00561, 1e-3),
+        ("supported", "point", 0.01160, 3e-4),
+    ],
+)
+def test_square_plate(edges: str, load: str, expected: float, digits: float) -> None:
+    assert centre_deflection(square(32), edges, load) == pytest.approx(expected, rel=digits)
+
+
+@pytest.mark.parametrize(("load", "digits"), [("uniform", 1e-6), ("point", 3e-4)])
+def test_supported_plate_against_its_series(load: str, digits: float) -> None:
+    assert centre_deflection(square(32), "supported", load) == pytest.approx(navier(load), rel=digits)
+
+
+def test_deflection_converges_with_the_fourth_power() -> None:
+    exact = navier("uniform")
+    errors = [abs(centre_deflection(square(n), "supported", "uniform") - exact) for n in (4, 8, 16)]
+    for coarse, fine in pairwise(errors):
+        assert 3.7 < np.log2(coarse / fine) < 4.3
+
+
+@given(
+    st.lists(st.floats(-2, 2), min_size=4, max_size=4),
+    st.lists(st.floats(-2, 2), min_size=4, max_size=4),
+    st.floats(-1.5, 3.5),
+    st.floats(-1.5, 3.5),
+)
+@settings(max_examples=60, deadline=None)
+def test_line_integrals_of_cubics(u: list[float], v: list[float], a: float, b: float) -> None:
+    grid = np.array([-1.0, -0.4, 0.3, 1.0, 2.5])
+    start, stop = min(a, b), max(a, b)
+    low, high = np.clip([start, stop], grid[0], grid[-1])
+    U, V = Polynomial(u), Polynomial(v)
+    u_dofs, v_dofs = (np.column_stack([P(grid), P.deriv()(grid)]).ravel() for P in (U, V))
+    line = line_matrices(grid, start, stop)
+    for matrix, product in [
+        (line.M, U * V),
+        (line.G, U.deriv() * V.deriv()),
+        (line.H, U.deriv(2) * V.deriv(2)),
+        (line.B, U.deriv(2) * V),
+    ]:
+        integral = product.integ()
+        assert u_dofs @ (matrix @ v_dofs) == pytest.approx(integral(high) - integral(low), rel=1e-9, abs=1e-9)
+
+
+def test_rigid_motions_cost_nothing() -> None:
+    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
+    K = plate.stiffness()
+    for a, b, c in np.eye(3):
+        w = degrees(plate.x, plate.y, lambda x, y, a=a, b=b, c=c: (a + b * x + c * y, b, c, 0.0))
+        assert abs(K @ w).max() < 1e-12 * (abs(K) @ abs(w)).max()
+    scale = 1 / np.sqrt(K.diagonal())
+    energies = np.linalg.eigvalsh(scale[:, None] * K.toarray() * scale)
+    assert (abs(energies[:3]) < 1e-12).all()
+    assert energies[3] > 1e-7  # and nothing else does
+
+
+@pytest.mark.parametrize("curvature", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0.3, -0.7, 0.4)])
+def test_energy_of_constant_curvature(curvature: tuple[float, float, float]) -> None:
+    """w = a x² + b xy + c y² has the energy density D [(w_xx + w_yy)² − 2(1−ν)(w_xx w_yy − w_xy²)] / 2."""
+    a, c, b = (1e-4 * value for value in curvature)
+    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
+    w = degrees(
+        plate.x,
+        plate.y,
+        lambda x, y: (a * x**2 + b * x * y + c * y**2, 2 * a * x + b * y, b * x + 2 * c * y, b),
+    )
+    D = 70e3 * 6.0**3 / 12 / (1 - 0.33**2)
+    density = D * ((2 * a + 2 * c) ** 2 - 2 * (1 - 0.33) * (4 * a * c - b**2))
+    assert w @ (plate.stiffness() @ w) == pytest.approx(density * 300 * 140, rel=1e-10)
+
+
+def test_patch_of_uneven_elements_reproduces_constant_curvature() -> None:
+    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
+    w = degrees(
+        plate.x, plate.y, lambda x, y: (x**2 + 3 * x * y - 2 * y**2, 2 * x + 3 * y, 3 * x - 4 * y, 3.0)
+    )
+    K = plate.stiffness()
+    inside = np.array(
+        [dof(5, ix, iy, a, b) for ix in (1, 2, 3) for iy in (1, 2) for a in (0, 1) for b in (0, 1)]
+    )
+    known = w.copy()
+    known[inside] = 0.0
+    found = spsolve(K[inside][:, inside].tocsc(), -(K @ known)[inside])
+    np.testing.assert_allclose(found, w[inside], rtol=1e-8)
+
+
+def test_stiffness_equals_that_of_scikit_fem() -> None:
+    """Entry by entry; on coordinates near one, since scikit-fem inverts an unscaled Vandermonde matrix."""
+    x, y = np.array([0.0, 0.3, 0.5, 1.0]), np.array([0.0, 0.4, 0.7])
+    plate = Plate(x, y, thickness=0.5, young=30.0, poisson=0.3)
+    basis = skfem.Basis(skfem.MeshQuad.init_tensor(x, y), skfem.ElementQuadBFS(), intorder=8)
+
+    @skfem.BilinearForm  # type: ignore[untyped-decorator]
+    def bending(u, v, w):  # type: ignore[no-untyped-def]
+        kappa = dd(u)
+        moment = plate.rigidity * ((1 - 0.3) * kappa + 0.3 * eye(trace(kappa), 2))
+        return ddot(moment, dd(v))
+
+    theirs = bending.assemble(basis).toarray()
+    order = np.zeros(plate.size, dtype=int)
+    for node, (px, py) in enumerate(basis.mesh.p.T):
+        ix, iy = abs(x - px).argmin(), abs(y - py).argmin()
+        for k, name in enumerate(basis.elem.dofnames):
+            dx, dy = {"u": (0, 0), "u_x": (1, 0), "u_y": (0, 1), "u_xy": (1, 1)}[name]
+            order[dof(len(x), int(ix), int(iy), dx, dy)] = basis.nodal_dofs[k, node]
+    ours = plate.stiffness().toarray()
+    np.testing.assert_allclose(ours, theirs[np.ix_(order, order)], atol=1e-9 * abs(theirs).max())
+
+
+def test_cantilever_strip() -> None:
+    """ν = 0: P L³ / 3EI at the end of a strip of width b, I = b t³/12, exact for cubic elements."""
+    plate = Plate(np.array([0.0, 15.0, 40.0]), np.array([0.0, 100.0, 350.0, 500.0]), 5.0, 70e3, 0.0)
+    free = np.arange(plate.line_dofs(0)[-1] + 1, plate.size)
+    f = np.zeros(plate.size)
+    f[[dof(3, 0, 3), dof(3, 1, 3), dof(3, 2, 3)]] = 10.0 * np.array([7.5, 20.0, 12.5]) / 40.0
+    # ∫φ of the slope functions, so that the load is uniform over the edge
+    f[[dof(3, 0, 3, 1), dof(3, 1, 3, 1), dof(3, 2, 3, 1)]] = (
+        10.0 / 40.0 * np.array([15.0**2, 25.0**2 - 15.0**2, -(25.0**2)]) / 12
+    )
+    w = np.zeros(plate.size)
+    w[free] = spsolve(plate.stiffness()[free][:, free].tocsc(), f[free])
+    EI = 70e3 * 40 * 5.0**3 / 12
+    for ix in range(3):
+        assert w[dof(3, ix, 3)] == pytest.approx(10 * 500.0**3 / (3 * EI), rel=1e-9)
+
+
+def cubic(x: float, y: float) -> tuple[float, float, float, float]:
+    """w = 1e-6 (x²y² + 2 x y³ − x³)."""
+    return (
+        1e-6 * (x**2 * y**2 + 2 * x * y**3 - x**3),
+        1e-6 * (2 * x * y**2 + 2 * y**3 - 3 * x**2),
+        1e-6 * (2 * x**2 * y + 6 * x * y**2),
+        1e-6 * (4 * x * y + 6 * y**2),
+    )
+
+
+def test_energy_of_stringers_that_end_between_grid_lines() -> None:
+    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
+    w = degrees(plate.x, plate.y, cubic)
+    effect = Stringers(kind="stringers", part="a", pitch=130.0, start=-60.0, stop=42.0, I=3e4, J=2e3)
+    expected = 0.0
+    for x in (0.0, 130.0, 260.0):
+        bend = Polynomial([2 * x**2, 12 * x]) * 1e-6  # w_yy
+        twist = Polynomial([0, 4 * x, 6]) * 1e-6  # w_xy
+        for stiffness, rate in [(70e3 * 3e4, bend), (70e3 / (2 * 1.33) * 2e3, twist)]:
+            integral = (rate**2).integ()
+            expected += stiffness * (integral(42.0) - integral(-60.0))
+    assert w @ (effect.stiffness(plate) @ w) == pytest.approx(expected, rel=1e-10)
+
+
+def test_energy_of_ribs_between_grid_lines() -> None:
+    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
+    w = degrees(plate.x, plate.y, cubic)
+    expected = 0.0
+    for y in (-20.0, 40.0):
+        bend = Polynomial([2 * y**2, -6]) * 1e-6  # w_xx
+        twist = Polynomial([6 * y**2, 4 * y]) * 1e-6
+        for stiffness, rate in [(70e3 * 5e4, bend), (70e3 / (2 * 1.33) * 1e3, twist)]:
+            integral = (rate**2).integ()
+            expected += stiffness * (integral(300.0) - integral(0.0))
+    effect = Ribs(kind="ribs", part="a", lines=(-20.0, 40.0), I=5e4, J=1e3)
+    assert w @ (effect.stiffness(plate) @ w) == pytest.approx(expected, rel=1e-10)
+
+
+def bare_beam(torque: bool) -> NDArray[np.float64]:
+    """A stringer at x = 50 on a skin of no stiffness to speak of, held at y = 0, loaded at y = 400.
+
+    The rate of twist w_xy stays free at y = 0, as in a shaft without warping restraint.
+    """
+    plate = Plate(np.array([0.0, 50.0, 90.0]), np.linspace(0, 400, 5), 1e-3, 70e3, 0.33)
+    K = plate.stiffness() + plate.beam_along_y(50.0, EI=70e3 * 2e4, GJ=26e3 * 3e3, start=0.0, stop=400.0)
+    held = [dof(3, ix, 0, dx, dy) for ix in range(3) for dx, dy in [(0, 0), (1, 0), (0, 1)]]
+    free = np.setdiff1d(np.arange(plate.size), held)
+    f = np.zeros(plate.size)
+    f[dof(3, 1, 4, dx=int(torque))] = 1000.0
+    w = np.zeros(plate.size)
+    w[free] = np.linalg.solve(K.toarray()[np.ix_(free, free)], f[free])
+    return w
+
+
+def test_stringer_bends_as_a_beam() -> None:
+    assert bare_beam(torque=False)[dof(3, 1, 4)] == pytest.approx(
+        1000 * 400.0**3 / (3 * 70e3 * 2e4), rel=1e-4
+    )
+
+
+def test_stringer_twists_as_a_shaft() -> None:
+    assert bare_beam(torque=True)[dof(3, 1, 4, dx=1)] == pytest.approx(1000 * 400.0 / (26e3 * 3e3), rel=1e-4)
+
+
+@pytest.mark.parametrize("at", [(0.0, -90.0), (300.0, 50.0), (110.0, 0.0), (151.0, 17.0)])
+def test_a_point_is_read_from_the_unknowns(at: tuple[float, float]) -> None:
+    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
+    w = degrees(plate.x, plate.y, cubic)
+    for value, order in zip(cubic(*at), [(0, 0), (1, 0), (0, 1), (1, 1)], strict=True):
+        assert (plate.evaluate(*at, *order) @ w)[0] == pytest.approx(value, rel=1e-9, abs=1e-12)

@@ -1,0 +1,314 @@
+"""Scene files: those of the package, what a key depends on, and what is said of bad input."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from problems.build import prepared
+from problems.errors import Fault, InputError
+from problems.scene import ASSEMBLIES, SCENES, read_scene, scene_names
+
+SCENE = """
+title = "a strip"
+[joint]
+contacts = [["a", "tool"]]
+junction = { length = 100.0, width = 50.0, nodes = [5, 3] }
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+[[effect]]
+kind = "initial_gap"
+mean = 0.6
+random = { sd = 0.1, correlation_length = 30.0, seed = 7 }
+[[effect]]
+kind = "fasteners"
+preload = 1000.0
+points = [[10.0, 20.0], [90.0, 30.0]]
+[[effect]]
+kind = "ribs"
+part = "a"
+lines = [60.0]
+I = 2e3
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "scene.toml"
+
+
+def faults(path: Path, text: str | bytes) -> list[Fault]:
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError) as error:
+        read_scene(str(path))
+    assert len(str(error.value).splitlines()) == len(error.value.faults)
+    return error.value.faults
+
+
+def swapped(*pairs: tuple[str, str]) -> str:
+    text = SCENE
+    for old, new in pairs:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_scene_of_the_package_reads(name: str) -> None:
+    scene = read_scene(name)
+    n = int(name.split("/")[0])
+    assert scene.name == name
+    assert scene.expected_size == (n, n // 2)
+    assert {type(effect).__name__ for effect in scene.effects} >= {"InitialGap", "Fasteners"}
+
+
+def test_names_are_unique_and_the_smallest_problem_stands_first() -> None:
+    names = scene_names()
+    assert len(set(names)) == len(names) == len(list(SCENES.rglob("*.toml")))
+    sizes = [int(name.split("/")[0]) for name in names]
+    assert sizes == sorted(sizes)
+    assert len({read_scene(name).key for name in names}) == len(names)
+
+
+def test_a_scene_by_name_and_by_path_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(SCENES.parents[1])
+    named = read_scene("4386/0107")
+    assert read_scene("problems/scenes/4386/0107.toml") == named
+    assert read_scene(str(SCENES / "4386" / "0107.toml")) == named
+
+
+def test_scenes_of_one_size_share_their_matrices() -> None:
+    keys = {name.split("/")[0]: set() for name in scene_names()}
+    for name in scene_names():
+        keys[name.split("/")[0]].add(read_scene(name).assembly_key)
+    assert all(len(found) == 1 for found in keys.values())
+    assert len(set.union(*keys.values())) == len(keys)
+
+
+# --- keys ---------------------------------------------------------------------------------------------
+
+
+def key_of(path: Path, text: str) -> tuple[str, str]:
+    path.write_text(text)
+    scene = read_scene(str(path))
+    return scene.key, scene.assembly_key
+
+
+def test_key_does_not_depend_on_how_the_file_is_written(path: Path) -> None:
+    other = swapped(
+        ('title = "a strip"', "# a comment\n"),
+        ("thickness = 2.0", "thickness=2  # mm"),
+        ("I = 2e3", "\n\nJ = 0\nI = 2000.0"),
+        (
+            'north = { length = 40.0, elements = 2 }\nclamped = ["north"]',
+            'clamped = ["north"]\nnorth = { elements = 2, length = 40 }',
+        ),
+    )
+    assert key_of(path, SCENE) == key_of(path.with_name("b.toml"), other)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("mean = 0.6", "mean = 0.60001"),
+        ("seed = 7", "seed = 8"),
+        ("preload = 1000.0", "preload = 999.0"),
+        ("[10.0, 20.0]", "[10.0, 21.0]"),
+    ],
+)
+def test_a_load_changes_the_key_of_the_scene_alone(path: Path, old: str, new: str) -> None:
+    (key, assembly_key), (other, other_assembly) = key_of(path, SCENE), key_of(path, swapped((old, new)))
+    assert key != other
+    assert assembly_key == other_assembly
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("thickness = 2.0", "thickness = 2.1"),
+        ("length = 100.0", "length = 100.5"),
+        ("nodes = [5, 3]", "nodes = [5, 4]"),
+        ("elements = 2", "elements = 3"),
+        ("I = 2e3", "I = 2e3\nJ = 1.0"),
+        ("lines = [60.0]", "lines = [61.0]"),
+        ("thickness = 2.0", "thickness = 2.0\npoisson = 0.3"),
+    ],
+)
+def test_the_structure_changes_both_keys(path: Path, old: str, new: str) -> None:
+    (key, assembly_key), (other, other_assembly) = key_of(path, SCENE), key_of(path, swapped((old, new)))
+    assert key != other
+    assert assembly_key != other_assembly
+
+
+# --- bad input ----------------------------------------------------------------------------------------
+
+BAD = [
+    (("thickness = 2.0", "thickness = -2.0"), "part.0.thickness", -2.0, "greater than 0"),
+    (("thickness = 2.0", "thickness = nan"), "part.0.thickness", None, ""),
+    (("thickness = 2.0", "thikness = 2.0\nthickness = 2.0"), "part.0.thikness", 2.0, "unknown key"),
+    (("thickness = 2.0", ""), "part.0.thickness", None, "required"),
+    (("thickness = 2.0", "thickness = 2.0\npoisson = 0.5"), "part.0.poisson", 0.5, "less than 0.5"),
+    (("mean = 0.6", 'mean = "wide"'), "effect[0] (initial_gap).mean", "wide", "number"),
+    (("mean = 0.6", "mean = 0.6\nmedian = 3"), "effect[0] (initial_gap).median", 3, "unknown key"),
+    (("sd = 0.1", "sd = -0.1"), "effect[0] (initial_gap).random.sd", -0.1, "greater than 0"),
+    (('kind = "ribs"', 'kind = "rbis"'), "effect[2].kind", "rbis", "ribs"),
+    (("[90.0, 30.0]", "[100.1, 30.0]"), "effect[1] (fasteners).points[1]", [100.1, 30.0], "0 … 100"),
+    (("[90.0, 30.0]", "[90.0, -0.1]"), "effect[1] (fasteners).points[1]", [90.0, -0.1], "0 … 50"),
+    (("lines = [60.0]", "lines = [90.5]"), "effect[2] (ribs).lines[0]", 90.5, "0 … 90"),
+    (('part = "a"', 'part = "c"'), "effect[2] (ribs).part", "c", "['a']"),
+    (("I = 2e3", "I = 2e3\nJ = inf"), "effect[2] (ribs).J", float("inf"), "finite"),
+    (('[["a", "tool"]]', '[["a", "b"]]'), "contacts", ["a", "b"], "two different parts"),
+    (('[["a", "tool"]]', '[["tool", "a"]]'), "contacts", ["tool", "a"], "two different parts"),
+    (('contacts = [["a", "tool"]]\n', ""), "contacts", [], "at least one pair"),
+    (('[["a", "tool"]]', '[["a", "tool"], ["a", "tool"]]'), "contacts", None, "no pair twice"),
+    (
+        ('clamped = ["north"]', 'clamped = ["south", "north"]'),
+        "part.a.clamped",
+        "south",
+        "extension to the south",
+    ),
+    (('clamped = ["north"]', 'clamped = ["west"]'), "part.0.clamped.0", "west", "south"),
+    (('clamped = ["north"]', ""), "part.a", "no support", "clamped edge"),
+    (('title = "a strip"', 'titel = "a strip"'), "titel", "a strip", "unknown key"),
+    (
+        ('title = "a strip"', 'assembly = "wing-fragment-4387"'),
+        "assembly",
+        "wing-fragment-4387",
+        "wing-fragment-4386",
+    ),
+    (('title = "a strip"', 'assembly = "wing-fragment-4386"'), "joint", None, "either joint or assembly"),
+    (('title = "a strip"', "assembly = 3"), "assembly", 3, "wing-fragment-4386"),
+]
+
+
+@pytest.mark.parametrize(("change", "key", "value", "allowed"), BAD, ids=[case[1] for case in BAD])
+def test_one_fault_names_file_key_value_and_what_is_allowed(
+    path: Path, change: tuple[str, str], key: str, value: object, allowed: str
+) -> None:
+    found = [fault for fault in faults(path, swapped(change)) if fault.key == key]
+    assert len(found) == 1
+    assert found[0].where == str(path)
+    assert allowed.lower() in found[0].allowed.lower()
+    if value is not None:
+        assert found[0].value == value
+    assert str(path) in str(found[0])
+    assert key in str(found[0])
+
+
+def test_several_faults_are_reported_at_once(path: Path) -> None:
+    text = swapped(
+        ("thickness = 2.0", "thickness = -2.0\ncolour = 1"),
+        ("mean = 0.6", "mean = nan"),
+        ('kind = "ribs"', 'kind = "keel"'),
+        ("preload = 1000.0", "preload = 0"),
+    )
+    assert {fault.key for fault in faults(path, "speed = 3\n" + text)} == {
+        "speed",
+        "part.0.thickness",
+        "part.0.colour",
+        "effect[0] (initial_gap).mean",
+        "effect[1] (fasteners).preload",
+        "effect[2].kind",
+    }
+
+
+@pytest.mark.parametrize(
+    "points", ["[[10.0, 10.0]]", "[[10.0, 10.0], [80.0, 20.0]]", "[[10.0, 10.0], [30.0, 20.0], [70.0, 40.0]]"]
+)
+def test_supports_on_a_line_let_a_part_float(path: Path, points: str) -> None:
+    supports = f'\n[[effect]]\nkind = "supports"\npart = "a"\npoints = {points}\n'
+    (fault,) = faults(path, swapped(('clamped = ["north"]', "")) + supports)
+    assert fault.key == "part.a"
+    assert "off a line" in fault.allowed
+
+
+def test_supports_at_three_corners_hold_a_part(path: Path) -> None:
+    supports = '\n[[effect]]\nkind = "supports"\npart = "a"\npoints = [[0, 0], [100, 0], [0, 50]]\n'
+    path.write_text(swapped(('clamped = ["north"]', "")) + supports)
+    assert float(str(prepared(read_scene(str(path))).facts["lambda_min"])) > 1
+
+
+def test_a_stringer_that_ends_before_it_starts(path: Path) -> None:
+    stringers = (
+        '\n[[effect]]\nkind = "stringers"\npart = "a"\npitch = 10.0\nstart = 40.0\nstop = 20.0\nI = 1.0\n'
+    )
+    (fault,) = faults(path, SCENE + stringers)
+    assert fault.key == "effect[3] (stringers).start, stop"
+
+
+def test_a_closed_chain_of_contacts(path: Path) -> None:
+    parts = SCENE[SCENE.index("[[joint.part]]") : SCENE.index("[[effect]]")].replace('"a"', '"b"')
+    text = swapped(
+        ('[["a", "tool"]]', '[["a", "tool"], ["b", "tool"], ["a", "b"]]'),
+        ('[[effect]]\nkind = "ini', parts + '[[effect]]\nkind = "ini'),
+    )
+    (fault,) = faults(path, text)
+    assert fault.key == "contacts"
+    assert "closed chain" in fault.allowed
+
+
+def test_a_fault_in_the_assembly_names_the_assembly_file(path: Path) -> None:
+    text = (
+        (ASSEMBLIES / "wing-fragment-4386.toml").read_text().replace("thickness = 6.0 ", "thickness = 0 ", 1)
+    )
+    (path.parent / "mine.toml").write_text(text)
+    (fault,) = faults(path, 'assembly = "mine.toml"')
+    assert fault.where == str(path.parent / "mine.toml")
+    assert fault.key == "part.0.thickness"
+
+
+@pytest.mark.parametrize("text", ["a = = 3", '[effect\nkind="x"', b"\xff\xfe\x00", 'title = "no end'])
+def test_malformed_toml(path: Path, text: str | bytes) -> None:
+    (fault,) = faults(path, text)
+    assert (fault.where, fault.key) == (str(path), "TOML")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['[effect]\nkind = "initial_gap"\n', "effect = 3\n", 'effect = ["initial_gap"]\n', "effect = [3]\n"],
+)
+def test_effect_must_be_tables(path: Path, text: str) -> None:
+    (fault,) = faults(
+        path,
+        text + 'assembly = "wing-fragment-4386"\n'
+        if "[effect]" not in text
+        else 'assembly = "wing-fragment-4386"\n' + text,
+    )
+    assert fault.key == "effect"
+    assert "[[effect]]" in fault.allowed
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "matrices = 3",
+        "[matrices]",
+        '[matrices]\nproblem = "scene.toml"\nK = "scene.toml"',
+        '[matrices]\nK = "scene.toml"',
+    ],
+)
+def test_matrices_must_be_complete(path: Path, text: str) -> None:
+    (fault,) = faults(path, text)
+    assert (fault.where, fault.key) == (str(path), "matrices")
+
+
+def test_matrices_with_an_unknown_key_and_a_missing_file(path: Path) -> None:
+    found = faults(path, '[matrices]\nproblem = "none.npz"\nQ = "q.mtx"\n[joint]\n')
+    assert {fault.key for fault in found} == {"joint", "matrices.problem", "matrices.Q"}
+
+
+def test_an_empty_file(path: Path) -> None:
+    assert {fault.key for fault in faults(path, "")} == {"junction", "part"}
+
+
+def test_unknown_names_and_missing_files(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=re.escape("4386/0107")):
+        read_scene("4386/0108")
+    for name in ("none.toml", "none.npz"):
+        with pytest.raises(InputError, match=name):
+            read_scene(str(tmp_path / name))
