@@ -17,6 +17,7 @@ from skfem.helpers import dd, ddot, eye, trace
 
 from problems.effects.ribs import Ribs
 from problems.effects.stringers import Stringers
+from problems.effects.supports import Supports
 from problems.hermite import line_matrices
 from problems.plate import Plate
 
@@ -240,6 +241,15 @@ def test_energy_of_ribs_between_grid_lines() -> None:
             integral = (rate**2).integ()
             expected += stiffness * (integral(300.0) - integral(0.0))
     effect = Ribs(kind="ribs", part="a", lines=(-20.0, 40.0), I=5e4, J=1e3)
+    assert w @ (effect.stiffness(plate) @ w) == pytest.approx(expected, rel=1e-10)
+
+
+def test_energy_of_supports_between_grid_points() -> None:
+    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
+    w = degrees(plate.x, plate.y, cubic)
+    points = ((10.0, -80.0), (151.0, 17.0), (300.0, 50.0))
+    expected = sum(2e4 * cubic(*point)[0] ** 2 for point in points)
+    effect = Supports(kind="supports", part="a", points=points, stiffness_per_point=2e4)
     assert w @ (effect.stiffness(plate) @ w) == pytest.approx(expected, rel=1e-10)
 
 

@@ -103,6 +103,37 @@ def test_set_is_found_on_a_plate_with_weakly_active_contacts(weak: float) -> Non
     assert abs(found.x - x).max() < 1e-8
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_wrong_set_is_corrected(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One closed contact taken for open and one open contact taken for closed."""
+    made = make_prepared(seed, 25, 10)
+    load, x, lam = chosen(made, seed, 0.4, 0.0)
+    wrong = lam > 0
+    wrong[[np.flatnonzero(lam > 0)[0], np.flatnonzero(lam == 0)[0]]] ^= True
+    monkeypatch.setattr(module, "contact_set", lambda *_: wrong)
+    found = refined_active_set(made, load)
+    np.testing.assert_array_equal(found.active, lam > 0)
+    np.testing.assert_allclose(found.x, x, atol=1e-10)
+    assert found.bound_mm < 1e-12
+
+
+def test_a_set_that_does_not_settle_has_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = make_prepared(1, 25)
+    load, _, lam = chosen(made, 1, 0.4, 0.0)
+    monkeypatch.setattr(module, "contact_set", lambda *_: lam == 0)
+    monkeypatch.setattr(module, "MAX_SET_CORRECTIONS", 1)
+    assert refined_active_set(made, load).bound_mm == np.inf
+
+
+def test_recovered_displacements_are_refined_once() -> None:
+    """Factors that are wrong by 1e-4 leave an error of its square."""
+    made = make_prepared(1, 25)
+    load, x, lam = chosen(made, 1, 0.4, 0.0)
+    blunt = replace(made, factors=tuple(U * (1 + 1e-4) for U in made.factors))
+    error = abs(blunt.recover(lam, load) - x).max() / abs(x).max()
+    assert 1e-9 < error < 1e-7
+
+
 def test_no_load_is_no_displacement() -> None:
     made, load = conditioned(1e3, 0)
     found = refined_active_set(made, replace(load, f=np.zeros(10)))
