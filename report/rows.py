@@ -70,8 +70,8 @@ class Results:
 
     @property
     def tightest(self) -> pd.DataFrame:
-        """The attempted cells at the tightest tolerance of each series: one line of a figure each."""
-        tried = self.cells[self.cells["status"] != "unsupported"]
+        """The cells that were run, at the tightest tolerance of each series: one line of a figure each."""
+        tried = self.cells[~self.cells["status"].isin(["unsupported", "not_run"])]
         least = tried.groupby("series")["tolerance"].transform("min")
         return tried[(tried["tolerance"] == least) | least.isna()]
 
@@ -142,6 +142,10 @@ def _json_lines(path: Path) -> tuple[list[dict[str, Any]], list[str]]:
     return records, warnings
 
 
+#: How the message of a row begins that was written without running the solver.
+NOT_RUN = "not run:"
+
+
 def _frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
     """Rows with the contract's columns always present and of one type each, the last of equal keys."""
     rows = pd.DataFrame(records)
@@ -151,6 +155,7 @@ def _frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[st
     for name in TEXTS:
         column = rows[name] if name in rows else pd.Series(None, index=rows.index, dtype=object)
         rows[name] = column.map(_text)
+    rows.loc[rows["message"].str.startswith(NOT_RUN, na=False), "status"] = "not_run"
     if "scene" in problems:
         known = problems.drop_duplicates("scene", keep="last").set_index("scene")
         for name in {"n", "m", "active"} & set(known):

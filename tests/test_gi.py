@@ -1,0 +1,106 @@
+"""Goldfarb–Idnani: its factor, its pivots, and its answers on both forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+from scipy.optimize import nnls
+
+from solvers.goldfarb_idnani import goldfarb_idnani
+from solvers.growing_factor import BLOCK, GrowingFactor
+
+
+def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    W, _ = np.linalg.qr(rng.standard_normal((size, size)))
+    return (W * np.geomspace(1.0, condition, size)) @ W.T
+
+
+def grow(G: np.ndarray, members: list[int]) -> GrowingFactor:
+    factor = GrowingFactor(len(G))
+    for count, k in enumerate(members):
+        d = factor.solve_transposed(G[members[:count], k])
+        factor.append(d, float(np.sqrt(G[k, k] - d @ d)))
+    return factor
+
+
+def assert_is_factor(factor: GrowingFactor, G: np.ndarray, members: list[int]) -> None:
+    wanted = G[np.ix_(members, members)]
+    np.testing.assert_allclose(factor.R.T @ factor.R, wanted, atol=1e-10 * abs(G).max())
+    assert not np.tril(factor.R, -1).any()
+    b = np.arange(1.0, len(members) + 1)
+    np.testing.assert_allclose(factor.R @ factor.solve(b), b, atol=1e-8)
+    np.testing.assert_allclose(factor.R.T @ factor.solve_transposed(b), b, atol=1e-8)
+
+
+@pytest.mark.parametrize("size", [1, BLOCK, BLOCK + 1, 2 * BLOCK + 30])
+def test_a_factor_that_grows_is_the_cholesky_factor(size: int) -> None:
+    G = definite(size, seed=size)
+    factor = grow(G, list(range(size)))
+    np.testing.assert_allclose(factor.R, sla.cholesky(G), atol=1e-9 * abs(G).max())
+
+
+@pytest.mark.parametrize("gone", [0, 5, BLOCK - 1, BLOCK, 2 * BLOCK + 29])
+def test_a_member_can_leave_from_anywhere(gone: int) -> None:
+    G = definite(2 * BLOCK + 30, seed=1)
+    members = list(range(len(G)))
+    factor = grow(G, members)
+    factor.delete(gone)
+    del members[gone]
+    assert_is_factor(factor, G, members)
+
+
+def test_members_come_and_go_many_times() -> None:
+    G = definite(200, seed=2)
+    rng = np.random.default_rng(3)
+    members = [int(k) for k in rng.permutation(200)[:150]]
+    factor = grow(G, members)
+    for _ in range(120):
+        outside = sorted(set(range(200)) - set(members))
+        if rng.random() < 0.5 and outside:
+            k = int(rng.choice(outside))
+            d = factor.solve_transposed(G[members, k])
+            factor.append(d, float(np.sqrt(G[k, k] - d @ d)))
+            members.append(k)
+        else:
+            position = int(rng.integers(len(members)))
+            factor.delete(position)
+            del members[position]
+    assert_is_factor(factor, G, members)
+
+
+def by_nnls(G: np.ndarray, s0: np.ndarray) -> np.ndarray:
+    """u ≥ 0 with s0 + Gu ≥ 0 and uᵀ(s0 + Gu) = 0 minimises ½uᵀGu + s0ᵀu = ½‖Uu + U⁻ᵀs0‖² + const."""
+    U = sla.cholesky(G)
+    return nnls(U, -sla.solve_triangular(U, s0, trans=1))[0]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_pivots_lead_to_the_solution(seed: int) -> None:
+    size = [3, 40, 150][seed % 3]
+    G = definite(size, seed)
+    s0 = np.random.default_rng(seed).standard_normal(size)
+
+    result = goldfarb_idnani(G, lambda u: (s0 + G @ u, abs(s0)), 1e-12, 1000)
+    s = s0 + G @ result.u
+
+    assert result.status == "solved"
+    assert (result.u >= 0).all()
+    assert s.min() >= -1e-10
+    assert abs(s[result.active]).max(initial=0) <= 1e-10
+    np.testing.assert_allclose(result.u, by_nnls(G, s0), atol=1e-9)
+    assert result.pivots == len(result.active) + 2 * result.drops
+
+
+def test_nothing_violated_needs_no_pivot() -> None:
+    G = definite(10, seed=0)
+    result = goldfarb_idnani(G, lambda u: (np.ones(10) + G @ u, np.ones(10)), 1e-12, 100)
+    assert (result.status, result.pivots, result.u.tolist()) == ("solved", 0, [0.0] * 10)
+
+
+def test_the_limit_on_pivots_is_kept_and_said() -> None:
+    G = definite(50, seed=4)
+    result = goldfarb_idnani(G, lambda u: (-np.ones(50) + G @ u, np.ones(50)), 1e-12, 5)
+    assert result.status == "iteration_limit"
+    assert result.pivots == 5
