@@ -49,9 +49,9 @@ def section(results: Results) -> Section | None:
             "summary",
             f"*Every solver on every scene, the best at the top.* Blue: within {limit}, seconds a load case; "
             "the darker, the nearer to the fastest of the scene (palest: 100 times as long). Hatched: "
-            "outside the limit, with its error in mm. Grey: no answer, and why (not run: out of time already on "
-            "every scene of the next smaller size). Empty: not in the suite. At the "
-            "right, the number of scenes within the limit.",
+            "outside the limit, with its error in mm. Grey: no answer, and why (not run: out of time "
+            "already on every scene of the next smaller size). Empty: not in the suite. At the right, the "
+            "number of scenes within the limit.",
             scoreboard(results.cells, table),
         ),
         Text("### Answers within the limit, then time"),
