@@ -76,10 +76,7 @@ class Worker:
         job = {
             "events": theirs,
             "answer": str(answer),
-            **{
-                k: getattr(measurement, k)
-                for k in ("source", "solver", "options", "plugin", "form", "tolerance")
-            },
+            **{name: getattr(measurement, name) for name in JOB},
         }
         try:
             self.process = subprocess.Popen(
