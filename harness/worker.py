@@ -110,7 +110,7 @@ class Run:
         for array in (load.f, load.g, load.p):
             array.flags.writeable = False
 
-        self.tell(phase="solve")
+        self.tell(phase="solve", data_mib=resident_mib("VmRSS"))
         problem, tolerance = Problem(data, job["form"]), job["tolerance"]
         converted = self.timed("convert_s", lambda: solver.convert(problem))
         state = self.timed("prepare_s", lambda: solver.prepare(converted))
@@ -121,7 +121,7 @@ class Run:
         if job["form"] == "dual" and lam is not None:
             with self.lap("form_s", form_s):
                 x = data.recover(np.asarray(lam, dtype=float), case)
-        self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=peak_rss_mib())
+        self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
@@ -183,13 +183,16 @@ def threads_in_effect() -> Row:
     }
 
 
-def peak_rss_mib() -> float | None:
-    """Highest resident memory of this process. (ru_maxrss also counts the one before exec on Linux.)"""
+def resident_mib(name: str) -> float | None:
+    """Resident memory of this process, now (VmRSS) or at its highest (VmHWM), MiB.
+
+    (ru_maxrss also counts the process before exec on Linux.)
+    """
     try:
         status = Path("/proc/self/status").read_text()
     except OSError:
         return None
-    return int(status.partition("VmHWM:")[2].split()[0]) / 1024
+    return int(status.partition(f"{name}:")[2].split()[0]) / 1024
 
 
 if __name__ == "__main__":

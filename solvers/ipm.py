@@ -1,56 +1,40 @@
 """The paper's primal–dual interior-point method on the dual form min ½λᵀQλ − pᵀλ, λ ≥ 0.
 
-Algorithm 3 as printed: a full predictor step (σ = 0), then a second Newton system at the new point
-with σ = (μᵖ/μ)³; so two matrices H an iteration. The systems are solved by conjugate gradients
-preconditioned with V = U + √D (eq. 15), from the start of Algorithm 5.
-
-With A = I the unknowns are λ, its slack w and the multiplier y = Qλ − p (the gaps). w = λ holds at
-the start and every step keeps it, so w is not stored.
+As it comes: Algorithm 3 as printed (a full predictor step, then a second Newton system at the new
+point; so two matrices H an iteration), the systems solved by conjugate gradients preconditioned with
+V = U + √D (eq. 15), from the start of Algorithm 5. The options change one ingredient at a time.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
-import scipy.linalg as sla
 
-from problems.assembly import Matrix, Vector
-from problems.errors import InputError
+from problems.assembly import LoadCase, Vector
+from problems.errors import Fault, InputError
 
 from .base import Answer, Form, Load, Problem, Solver, Status
-from .conjugate_gradients import conjugate_gradients
-from .preconditioner import CholeskyPlusRoot
-from .start import NoStart, algorithm_5
+from .infeasible_start import mehrotra_start, stp1, stp2
+from .newton_system import SYSTEMS, Direct, OpenLast, Pcg
+from .schemes import SCHEMES, CgExhausted, Newton, Point
+from .start import NoStart, Start, algorithm_4, algorithm_5
 
 STALLED = 10  # iterations without progress before the method gives up
 
+StartName = Literal["algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra"]
+Ordering = Literal["lexicographic", "open_last"]
+
 
 @dataclass(frozen=True)
-class _Point:
-    """λ and y with the residual s1 = −(Qλ − p − y) and the gap μ = λᵀy/m."""
-
-    lam: Vector
-    y: Vector
-    s1: Vector
-
-    @property
-    def mu(self) -> float:
-        return float(self.lam @ self.y) / len(self.lam)
-
-    @property
-    def infeasibility(self) -> float:
-        """The larger of the overlap max(p − Qλ) and the force-weighted mean λᵀ|s1| / Σλ, mm.
-
-        Where a gap is open, λ → 0 and s1 is of no consequence while the gap stays open.
-        """
-        overlap = float((self.s1 - self.y).max())
-        return max(overlap, float(self.lam @ abs(self.s1)) / float(self.lam.sum()))
+class _Ready:
+    problem: Problem
+    system: Direct | Pcg
 
 
 class Ipm(Solver):
-    """Primal–dual interior point, Algorithm 3, with PCG(V).
+    """Primal–dual interior point.
 
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ feasibility with
     s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance asked for; the paper tests μ alone, because it
@@ -58,10 +42,16 @@ class Ipm(Solver):
 
     Options
     -------
+    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra.
+    scheme : algorithm_3 as printed; algorithm_2, with a fixed σ; mehrotra, the textbook's.
+    preconditioner : V, U, none, splitting; direct is a Cholesky factorisation of every H instead.
+    ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by growing D.
     theta : share of the step to the boundary, in (0, 1).
+    sigma : the centring of algorithm_2, in [0, 1].
+    rho : of stp1 and stp2, the residual allowed as a share of λᵀy. epsilon : of stp2, its least gap, mm.
     cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
     feasibility : mm; what inexact systems may leave in y = Qλ − p.
-    max_iterations : of Algorithm 3.
+    max_iterations : of the scheme. max_cg : of the conjugate gradients in all.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
@@ -69,85 +59,122 @@ class Ipm(Solver):
     def __init__(
         self,
         *,
+        start: StartName = "algorithm_5",
+        scheme: str = "algorithm_3",
+        preconditioner: str = "V",
+        ordering: Ordering = "lexicographic",
         theta: float = 0.995,
+        sigma: float = 0.1,
+        rho: float = 0.1,
+        epsilon: float = 0.01,
         cg_tolerance: float = 1e-3,
         feasibility: float = 1e-10,
         max_iterations: int = 200,
+        max_cg: float = np.inf,
     ) -> None:
-        if not 0 < theta < 1:
-            raise InputError.one("ipm", "theta", theta, "must lie in (0, 1)")
-        if not 0 < cg_tolerance < 1:
-            raise InputError.one("ipm", "cg_tolerance", cg_tolerance, "must lie in (0, 1)")
-        if not feasibility > 0:
-            raise InputError.one("ipm", "feasibility", feasibility, "must be positive, mm")
-        if max_iterations < 1:
-            raise InputError.one("ipm", "max_iterations", max_iterations, "must be at least 1")
+        one_of = "one of "
+        rules: list[tuple[str, Any, bool, str]] = [
+            ("start", start, start in get_args(StartName), one_of + ", ".join(get_args(StartName))),
+            ("scheme", scheme, scheme in SCHEMES, one_of + ", ".join(SCHEMES)),
+            ("preconditioner", preconditioner, preconditioner in SYSTEMS, one_of + ", ".join(SYSTEMS)),
+            ("ordering", ordering, ordering in get_args(Ordering), one_of + ", ".join(get_args(Ordering))),
+            ("ordering", ordering, ordering != "open_last" or preconditioner == "V", "open_last is for V"),
+            ("theta", theta, 0 < theta < 1, "must lie in (0, 1)"),
+            ("sigma", sigma, 0 <= sigma <= 1, "must lie in [0, 1]"),
+            ("rho", rho, rho > 0, "must be positive"),
+            ("epsilon", epsilon, epsilon > 0, "must be positive, mm"),
+            ("cg_tolerance", cg_tolerance, 0 < cg_tolerance < 1, "must lie in (0, 1)"),
+            ("feasibility", feasibility, feasibility > 0, "must be positive, mm"),
+            ("max_iterations", max_iterations, max_iterations >= 1, "must be at least 1"),
+            ("max_cg", max_cg, max_cg >= 1, "must be at least 1"),
+        ]
+        faults = [Fault("ipm", key, value, allowed) for key, value, holds, allowed in rules if not holds]
+        if faults:
+            raise InputError(faults)
+        self.start = start
+        self.scheme = SCHEMES[scheme]
+        self.make_system = OpenLast if ordering == "open_last" else SYSTEMS[preconditioner]
         self.theta = theta
+        self.sigma = sigma
+        self.rho = rho
+        self.epsilon = epsilon
         self.cg_tolerance = cg_tolerance
         self.feasibility = feasibility
         self.max_iterations = max_iterations
+        self.max_cg = max_cg
 
-    def prepare(self, data: Problem) -> tuple[Matrix, CholeskyPlusRoot]:
-        """Q and the preconditioner on its Cholesky factor U."""
-        Q = data.Q
-        return Q, CholeskyPlusRoot(sla.cholesky(Q, check_finite=False))
+    def prepare(self, data: Problem) -> _Ready:
+        """What is factored of Q once."""
+        return _Ready(data, self.make_system(data.Q))
 
-    def solve(self, ready: tuple[Matrix, CholeskyPlusRoot], load: Load, tolerance: float) -> Answer:
-        Q, V = ready
+    def solve(self, ready: _Ready, load: Load, tolerance: float) -> Answer:
+        Q, system = ready.problem.Q, ready.system
+        system.begin()
+        newton = Newton(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
         try:
-            lam, y = algorithm_5(Q, load.p)  # Algorithm 3, step 2
+            start = self._start(ready.problem, load)  # Algorithm 3, step 2
         except NoStart as error:
             return Answer("failed", None, iterations=0, details={"cause": str(error)})
-        point = self._point(Q, load.p, lam, y)  # step 3
-        counts: dict[str, list[int]] = {"predictor": [], "corrector": []}
-        status: Status = "iteration_limit"
-        cause = None
+        point = newton.at(start.lam, start.y)  # step 3
+        details: dict[str, Any] = {"cg": newton.counts, "start": _about(start, point)}
+        status, cause, point = self._iterate(newton, point, tolerance)
+        if newton.unconverged:
+            details["cg_unconverged"] = newton.unconverged
+        details |= {"mu": point.mu, "infeasibility": point.infeasibility}
+        details |= {"factorisations": system.factorisations} | ({"cause": cause} if cause else {})
+        return Answer(
+            status,
+            point.lam if status != "failed" else None,
+            iterations=len(newton.counts["predictor"]),
+            inner_iterations=sum(map(sum, newton.counts.values())),
+            details=details,
+        )
+
+    def _start(self, problem: Problem, load: Load) -> Start:
+        match self.start:
+            case "algorithm_4":
+                return algorithm_4(problem.prepared, LoadCase(load.f, load.g))
+            case "stp1":
+                return stp1(problem.Q, load.p, self.rho)
+            case "stp2":
+                return stp2(problem.Q, load.p, self.rho, self.epsilon)
+            case "mehrotra":
+                return mehrotra_start(problem.Q, load.p)
+        return algorithm_5(problem.Q, load.p)
+
+    def _iterate(self, newton: Newton, point: Point, tolerance: float) -> tuple[Status, str, Point]:
+        """Algorithm 3, steps 4 to 8; the last finite point with what is to be said of it."""
         smallest, stalled = np.inf, 0
         for _ in range(self.max_iterations):  # step 4
             if point.mu <= tolerance and point.infeasibility <= self.feasibility:
-                status = "solved"
-                break
+                return "solved", "", point
             measure = max(point.mu / tolerance, point.infeasibility / self.feasibility)
             stalled = 0 if measure < smallest else stalled + 1
             smallest = min(smallest, measure)
             if stalled == STALLED:
-                status, cause = "inaccurate", f"rounding: {smallest:.1e} × what was asked for, and no less"
-                break
-            mu = point.mu
-            point = self._newton_step(Q, V, load.p, point, 0.0, counts["predictor"])  # step 5
-            sigma = (point.mu / mu) ** 3
-            point = self._newton_step(Q, V, load.p, point, sigma, counts["corrector"])  # step 6
-            if not np.isfinite(point.mu):
-                return Answer("failed", None, details={"cause": "λ or y is no longer finite"})
-        details = {"cg": counts, "mu": point.mu, "infeasibility": point.infeasibility}
-        return Answer(
-            status,
-            point.lam,
-            iterations=len(counts["predictor"]),
-            inner_iterations=sum(counts["predictor"]) + sum(counts["corrector"]),
-            details=details | ({"cause": cause} if cause else {}),
-        )
+                why = f"{newton.unconverged} systems of unconverged CG" if newton.unconverged else "rounding"
+                return "inaccurate", f"{why}: {smallest:.1e} × what was asked for, and no less", point
+            try:
+                following = self.scheme(newton, point)  # steps 5 to 7
+            except CgExhausted:
+                return "iteration_limit", f"all of max_cg = {self.max_cg:g} CG iterations are spent", point
+            except np.linalg.LinAlgError as error:
+                return "inaccurate", f"Q + D is no longer positive definite: {error}", point
+            if not _is_inside(following):
+                return "failed", "λ or y is no longer finite and positive", point
+            point = following
+        return "iteration_limit", f"max_iterations = {self.max_iterations}", point
 
-    def _newton_step(
-        self, Q: Matrix, V: CholeskyPlusRoot, p: Vector, point: _Point, sigma: float, counts: list[int]
-    ) -> _Point:
-        """Algorithm 2 for the dual problem, where (14) reads (Q + D) Δλ = s1 + Λ⁻¹s3, D = YΛ⁻¹."""
-        lam, y = point.lam, point.y
-        s3 = sigma * point.mu - lam * y  # Algorithm 2, step 1
-        V.update(y / lam)
-        b = V.to_transformed(point.s1 + s3 / lam)
-        cg = conjugate_gradients(V.multiply, b, self.cg_tolerance, 10 * len(lam))
-        counts.append(cg.iterations)
-        dlam = V.from_transformed(cg.z)
-        dy = (s3 - y * dlam) / lam
-        alpha = min(self._step(lam, dlam), self._step(y, dy))  # step 2
-        return self._point(Q, p, lam + alpha * dlam, y + alpha * dy)  # steps 3 and 4
 
-    def _step(self, v: Vector, dv: Vector) -> float:
-        """The largest α ≤ 1 with α ≤ θ (−v_i/Δv_i) wherever Δv_i < 0."""
-        falling = dv < 0
-        return min(1.0, self.theta * float(np.min(-v[falling] / dv[falling], initial=np.inf)))
+def _about(start: Start, point: Point) -> dict[str, float]:
+    return {
+        "mu": point.mu,
+        "infeasibility_mm": float(abs(point.s1).max()),
+        "corrections": start.corrections,
+        "multiplications": start.multiplications,
+    }
 
-    @staticmethod
-    def _point(Q: Matrix, p: Vector, lam: Vector, y: Vector) -> _Point:
-        return _Point(lam, y, y - (Q @ lam - p))
+
+def _is_inside(point: Point) -> bool:
+    values: Vector = np.concatenate([point.lam, point.y])
+    return bool(np.isfinite(values).all() and (values > 0).all())

@@ -1,26 +1,59 @@
-"""The scenes that come with the package."""
+"""The packaged scenes: problems/scenes/<n>/<active>.toml, problems/scenes/scaling/<n>.toml."""
 
 from __future__ import annotations
 
+import re
+import tomllib
+from typing import Any
+
+import numpy as np
 import pytest
 
-from problems.scene import SCENES, read_scene, scene_names
+from problems.effects.fasteners import Fasteners
+from problems.scene import SCENES, Scene, read_scene, scene_names
+
+SCALING = [name for name in scene_names() if name.startswith("scaling/")]
+
+
+def size(scene: Scene) -> int:
+    assert scene.expected_size is not None
+    return scene.expected_size[0]
 
 
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_of_the_package_reads(name: str) -> None:
     scene = read_scene(name)
-    n = int(name.split("/")[0])
+    folder, stem = name.split("/")
+    n = int(stem if folder == "scaling" else folder)
     assert scene.name == name
     assert scene.expected_size == (n, n // 2)
     assert {type(effect).__name__ for effect in scene.effects} >= {"InitialGap", "Fasteners"}
 
 
+@pytest.mark.parametrize("name", scene_names())
+def test_the_title_gives_the_active_count_and_the_pressure(name: str) -> None:
+    scene = read_scene(name)
+    count = re.search(r"about (\d+) active contacts", scene.title)
+    assert count is not None
+    assert 0 < int(count[1]) < size(scene) // 2
+    if name in SCALING:
+        assert scene.title.startswith(f"Scaling, n = {size(scene)}: ")
+    else:
+        assert int(count[1]) == int(name.split("/")[1])
+    pressures = {getattr(e, "value", 0.0) for e in scene.effects if type(e).__name__ == "Pressure"}
+    stated = re.search(r"pressure (\S+) MPa", scene.title)
+    value = float(stated[1]) if stated else 0.0
+    assert pressures == ({value, -value} if value else set())
+
+
 def test_names_are_unique_and_the_smallest_problem_stands_first() -> None:
+    """First the three problems of the paper, then the five of the scaling."""
     names = scene_names()
     assert len(set(names)) == len(names) == len(list(SCENES.rglob("*.toml")))
-    sizes = [int(name.split("/")[0]) for name in names]
-    assert sizes == sorted(sizes)
+    assert names[-len(SCALING) :] == SCALING
+    for group in (names[: -len(SCALING)], SCALING):
+        sizes = [size(read_scene(name)) for name in group]
+        assert sizes == sorted(sizes)
     assert len({read_scene(name).key for name in names}) == len(names)
 
 
@@ -32,8 +65,33 @@ def test_a_scene_by_name_and_by_path_are_the_same(monkeypatch: pytest.MonkeyPatc
 
 
 def test_scenes_of_one_size_share_their_matrices() -> None:
-    keys = {name.split("/")[0]: set() for name in scene_names()}
-    for name in scene_names():
-        keys[name.split("/")[0]].add(read_scene(name).assembly_key)
-    assert all(len(found) == 1 for found in keys.values())
-    assert len(set.union(*keys.values())) == len(keys)
+    scenes = [read_scene(name) for name in scene_names()]
+    keys = {(size(scene), scene.assembly_key) for scene in scenes}
+    assert len(keys) == len({n for n, _ in keys}) == len({key for _, key in keys}) == 6
+
+
+def test_scaling_scenes_differ_in_nothing_but_the_grid() -> None:
+    def file(folder: str, name: str) -> dict[str, Any]:
+        return tomllib.loads((SCENES.parent / folder / f"{name}.toml").read_text(encoding="utf-8"))
+
+    tables = [file("scenes", name) for name in SCALING]
+    assert [size(read_scene(name)) for name in SCALING] == [1170, 2522, 4386, 6762, 11308]
+    joints = [file("assemblies", table.pop("assembly")) for table in tables]
+    for table, joint in zip(tables, joints, strict=True):
+        del table["title"]
+        del joint["junction"]["nodes"]
+        for part in joint["part"]:
+            for side in {"south", "north"} & set(part):
+                del part[side]["elements"]
+    assert all(table == tables[0] for table in tables)
+    assert all(joint == joints[0] for joint in joints)
+
+
+@pytest.mark.parametrize("name", SCALING)
+def test_no_two_fasteners_of_the_scaling_meet_on_a_node(name: str) -> None:
+    scene = read_scene(name)
+    assert scene.joint is not None
+    (fasteners,) = (effect for effect in scene.effects if isinstance(effect, Fasteners))
+    force = fasteners.force(scene.joint)
+    assert np.array_equal(np.unique(force), [-fasteners.preload, 0.0, fasteners.preload])
+    assert np.count_nonzero(force) == 2 * len(fasteners.marks(scene.joint))
