@@ -33,8 +33,8 @@ DONE, NOTHING_JUDGED = 0, 3
 #: A row's fields that the worker tells of; null where it does not.
 TOLD = (
     *("status", "message", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
-    *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details", "stderr"),
-    "answer",
+    *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details"),
+    *("stderr", "answer"),
 )
 CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
 

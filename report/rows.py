@@ -26,16 +26,16 @@ NUMBERS = (
     *TIMES,
     *("solver_reported_s", "displacement_error_mm", "limit_mm", "reference_bound_mm", "contact_mismatch"),
     *("min_gap_mm", "primal_residual", "dual_residual", "duality_gap", "peak_rss_mib"),
-    *("threads_asked", "load_s", "overhead_s", "time_limit_s", "memory_limit_mib"),
+    *("threads_asked", "load_s", "overhead_s", "time_limit_s", "memory_limit_mib", "data_mib"),
 )
 TEXTS = (
-    *("suite", "scene", "solver", "form", "variant", "status", "verdict", "machine"),
+    *("key", "suite", "scene", "solver", "form", "variant", "status", "verdict", "machine"),
     *("message", "kernels", "solver_version", "rivetbench_version", "recorded_at"),
 )
 CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 
 MEDIANS = [*TIMES, "iterations", "inner_iterations", "solver_reported_s"]
-LARGEST = ["displacement_error_mm", "contact_mismatch", "peak_rss_mib"]
+LARGEST = ["displacement_error_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 #: From best to worst: a cell takes the worst verdict of its repeats.
 VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
@@ -163,6 +163,7 @@ def _frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[st
     for name in ("n", "m", "active"):
         rows[name] = rows[name].fillna(rows.groupby("scene")[name].transform("max"))
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
+    rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]  # what the solver adds to the data
     options = {solver.get("name"): solver for solver in suite.get("solver", [])}
     for name in ("time_limit_s", "memory_limit_mib"):
         asked = rows["solver"].map(lambda s, key=name: options.get(s, {}).get(key, suite.get(key)))

@@ -160,7 +160,8 @@ def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
 def test_conjugate_gradients_that_stagnate_are_named() -> None:
     """Asked for more than rounding allows, it says what held it up and does not call itself solved."""
     Q = definite(40, 0, condition=1e8)
-    answer = solved(Q, np.ones(40), start="stp1", preconditioner="none", cg_tolerance=1e-15, feasibility=1e-18)
+    without = {"start": "stp1", "preconditioner": "none"}
+    answer = solved(Q, np.ones(40), **without, cg_tolerance=1e-15, feasibility=1e-18)
     assert answer.status == "inaccurate"
     assert answer.details["cg_unconverged"] > 0
     assert "unconverged CG" in answer.details["cause"]
@@ -170,7 +171,14 @@ def test_conjugate_gradients_that_stagnate_are_named() -> None:
     ("option", "value"),
     [
         *(("theta", 0.0), ("theta", 1.0), ("cg_tolerance", 0.0), ("cg_tolerance", 1.0), ("feasibility", 0.0)),
-        *(("sigma", -0.1), ("sigma", 1.1), ("rho", 0.0), ("epsilon", 0.0), ("max_cg", 0), ("max_iterations", 0)),
+        *(
+            ("sigma", -0.1),
+            ("sigma", 1.1),
+            ("rho", 0.0),
+            ("epsilon", 0.0),
+            ("max_cg", 0),
+            ("max_iterations", 0),
+        ),
         *(("start", "nowhere"), ("scheme", "algorithm_9"), ("preconditioner", "W"), ("ordering", "best")),
     ],
 )

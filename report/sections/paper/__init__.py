@@ -1,0 +1,1 @@
+"""The paper's tables and figures beside ours, and its claims: shown for the suite `paper` alone."""

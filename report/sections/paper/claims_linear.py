@@ -1,0 +1,151 @@
+"""Claims of section 5.3: the linear systems and the preconditioner."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from ...numbers import significant
+from ...standings import TIE
+from .cg import SYSTEMS, counts
+from .selection import ipm, records, timed
+from .targets import LATE, ORDERINGS, RATIO, largest_late, ratios
+from .verdict import Claim, Measured, Verdict, decided
+
+HUNDREDS = 100
+
+
+def _few_instead_of_thousands(measured: Measured) -> Verdict:
+    outcomes: dict[str, bool | None] = {}
+    words, keys = [], []
+    for ordering in ORDERINGS:
+        for ratio in ratios(measured.cells, ordering):
+            holds = None if ratio.met is None else ratio.met and ratio.none.largest >= HUNDREDS
+            outcomes[f"{ordering}, scene {ratio.scene}"] = holds
+            words.append(f"{ordering}, {ratio}, {ratio.none.largest} and {ratio.V.largest} at most a system")
+            keys += ratio.keys
+    return decided(outcomes, "the ordering or the scene", "; ".join(words), keys)
+
+
+def _few_to_the_end(measured: Measured) -> Verdict:
+    outcomes: dict[str, bool | None] = {}
+    words, keys = [], []
+    for ordering, of_sizes in largest_late(measured.cells).items():
+        for n, (count, scene, key) in sorted(of_sizes.items()):
+            outcomes[f"{ordering}, n = {n}"] = count <= LATE
+            words.append(f"{ordering}, n = {n}: {count} (scene {scene})")
+            keys.append(key)
+    return decided(outcomes, "the ordering or the size", "; ".join(words), keys)
+
+
+def _needs_a_preconditioner(measured: Measured) -> Verdict:
+    return _faster(measured, ["V = U + √D"], "V = I", "the scene")
+
+
+def _diagonal_matters(measured: Measured) -> Verdict:
+    """U alone against V: CG iterations of a solve."""
+    outcomes: dict[str, bool | None] = {}
+    words, keys = [], []
+    V, U = (ipm(measured.cells, **SYSTEMS[name]) for name in ("V = U + √D", "U alone"))
+    for scene in [s for s in U["scene"] if s in set(V["scene"])]:
+        rows = [r[r["scene"] == scene].iloc[0].to_dict() for r in (V, U)]
+        with_d, without = (counts(row) for row in rows)
+        if not with_d or not without:
+            continue
+        more = without.total > with_d.total
+        outcomes[f"scene {scene}"] = None if (without.cut and not more) or (with_d.cut and more) else more
+        bound = "≥ " if without.cut else ""
+        words.append(f"scene {scene}: U {bound}{without.total}, V {with_d.total}")
+        keys += [row["key"] for row in rows]
+    return decided(outcomes, "the scene", "; ".join(words), keys)
+
+
+def _better_than_splitting(measured: Measured) -> Verdict:
+    return _faster(measured, list(ORDERINGS), "splitting", "the ordering or the scene")
+
+
+def _iterative_beats_direct(measured: Measured) -> Verdict:
+    return _faster(measured, list(ORDERINGS), "direct Cholesky", "the ordering or the scene")
+
+
+def _faster(measured: Measured, mine: list[str], rival: str, on: str) -> Verdict:
+    """Seconds a load case, by scene; less than TIE apart decides nothing."""
+    outcomes: dict[str, bool | None] = {}
+    words, keys = [], []
+    for name in mine:
+        for pair in pairs(ipm(measured.cells, **SYSTEMS[name]), ipm(measured.cells, **SYSTEMS[rival])):
+            outcomes[f"{name}, scene {pair['scene']}"] = is_faster(pair)
+            words.append(f"{name}, scene {pair['scene']}: {times_text(pair)} s with {rival}")
+            keys += [pair["key_a"], pair["key_b"]]
+    return decided(outcomes, on, "; ".join(words), keys)
+
+
+def pairs(a: pd.DataFrame, b: pd.DataFrame) -> list[dict[str, Any]]:
+    """Two lines scene by scene, where both have a time or a lower bound of it."""
+    names = ["scene", "n", "at_least", "cut", "key"]
+    both = timed(a)[names].merge(timed(b)[names], on=["scene", "n"], suffixes=("_a", "_b"))
+    return records(both.dropna(subset=["at_least_a", "at_least_b"]))
+
+
+def is_faster(pair: dict[str, Any]) -> bool | None:
+    """Whether a is clearly faster than b; None where they are nearly equal or a bound leaves it open."""
+    a, b = pair["at_least_a"], pair["at_least_b"]
+    if TIE * a < b:
+        return None if pair["cut_a"] else True
+    if TIE * b < a:
+        return None if pair["cut_b"] else False
+    return None
+
+
+def times_text(pair: dict[str, Any]) -> str:
+    a, b = (f"{'> ' if pair[f'cut_{k}'] else ''}{significant(pair[f'at_least_{k}'])}" for k in "ab")
+    return f"{a} against {b}"
+
+
+FASTER = f"Seconds a load case on each scene with both; less than {TIE - 1:.0%} apart decides nothing."
+
+CLAIMS = [
+    Claim(
+        "few CG iterations",
+        "5.3, Table 1",
+        "V = U + √D brings the CG iterations of a system from hundreds or thousands down to a few.",
+        f"V = I takes {HUNDREDS} or more for some system, and V at most 1/{RATIO} of its sum over a solve.",
+        _few_instead_of_thousands,
+    ),
+    Claim(
+        "few to the end",
+        "5.3, Table 1",
+        "With V a few CG iterations are enough up to the last outer iterations.",
+        f"No system of the second half of any solve takes more than {LATE} (printed: 23).",
+        _few_to_the_end,
+    ),
+    Claim(
+        "no preconditioner",
+        "5.3",
+        "Without a preconditioner an iterative method is not efficient on these systems.",
+        "V = U + √D is faster than V = I. " + FASTER,
+        _needs_a_preconditioner,
+    ),
+    Claim(
+        "U alone",
+        "5.3",
+        "U alone is not enough, because it knows nothing of the diagonal D.",
+        "U alone takes more CG iterations, summed over a solve, than V.",
+        _diagonal_matters,
+    ),
+    Claim(
+        "splitting",
+        "5.3",
+        "V is an efficient choice, and easier to build than a splitting preconditioner.",
+        "V is faster than the splitting preconditioner. " + FASTER,
+        _better_than_splitting,
+    ),
+    Claim(
+        "iterative or direct",
+        "5.3",
+        "Only an iterative method solves the system in less than O(n³).",
+        "At these sizes that would show as V faster than a Cholesky factor of every H. " + FASTER,
+        _iterative_beats_direct,
+    ),
+]

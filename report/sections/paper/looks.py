@@ -1,0 +1,29 @@
+"""How the paper's methods look in every figure: hollow what is the second of a kind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ... import style
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "IPM": {"color": style.BLUE, "marker": "o", "linestyle": "-", "markerfacecolor": style.BLUE},
+    "IPM, open gaps last": {
+        "color": style.BLUE,
+        "marker": "D",
+        "linestyle": (0, (1, 1.2)),
+        "markerfacecolor": "white",
+    },
+    "GI dual": {
+        "color": style.VERMILLION,
+        "marker": "s",
+        "linestyle": "-",
+        "markerfacecolor": style.VERMILLION,
+    },
+    "GI primal": {
+        "color": style.VERMILLION,
+        "marker": "s",
+        "linestyle": (0, (4, 2)),
+        "markerfacecolor": "white",
+    },
+}

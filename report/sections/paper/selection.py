@@ -1,0 +1,127 @@
+"""Which rows are which of the paper's methods: found by what was run (solver, form, options)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...numbers import MISSING, significant
+from ...rows import ANSWERED, Results
+
+SUITE = "paper"
+SCALING = "scaling/"  # scenes of one joint at several sizes; all others belong to the paper's problems
+
+#: What `ipm` does when an option is not named.
+DEFAULTS: dict[str, Any] = {
+    "start": "algorithm_5",
+    "scheme": "algorithm_3",
+    "preconditioner": "V",
+    "ordering": "lexicographic",
+    "cg_tolerance": 1e-3,
+    "theta": 0.995,
+    "sigma": 0.1,
+}
+
+#: The four methods that the paper's section 6 is about: name → solver, form, options.
+METHODS: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "IPM": ("ipm", "dual", {}),
+    "IPM, open gaps last": ("ipm", "dual", {"ordering": "open_last"}),
+    "GI dual": ("gi", "dual", {}),
+    "GI primal": ("gi", "primal", {}),
+}
+
+
+def is_paper(results: Results) -> bool:
+    return results.suite.get("name") == SUITE and not results.cells.empty
+
+
+def asked(options: object) -> dict[str, Any]:
+    """All options that decide what the interior-point method does, those not named by their default."""
+    given = options if isinstance(options, Mapping) else {}
+    return {key: given.get(key, default) for key, default in DEFAULTS.items()}
+
+
+def cells_of_paper(results: Results) -> pd.DataFrame:
+    """The cells that were in the plan, of several tolerances or thread counts of a line the tightest and
+    the highest: one cell a scene, solver, form and variant, always with `options` and `details`.
+    """
+    cells = results.cells[results.cells["status"] != "unsupported"]
+    cells = cells.assign(options=_dicts(cells, "options"), details=_dicts(cells, "details"))
+    ordered = cells.sort_values(["tolerance", "threads"], ascending=[True, False], kind="stable")
+    single = ordered.drop_duplicates(["scene", "solver", "form", "variant"])
+    return single.sort_values(["n", "active", "scene"], kind="stable").reset_index(drop=True)
+
+
+def _dicts(cells: pd.DataFrame, name: str) -> pd.Series[Any]:
+    """A column of dictionaries, empty ones where there is none."""
+    column = cells[name] if name in cells else [None] * len(cells)
+    found = [value if isinstance(value, dict) else {} for value in column]
+    return pd.Series(found, index=cells.index, dtype=object)
+
+
+def ipm(cells: pd.DataFrame, **changed: Any) -> pd.DataFrame:
+    """The interior-point cells whose options are the defaults but for `changed`, one a scene."""
+    wanted = DEFAULTS | changed
+    chosen = [
+        s == "ipm" and asked(o) == wanted for s, o in zip(cells["solver"], cells["options"], strict=True)
+    ]
+    return cells[np.array(chosen, dtype=bool)].drop_duplicates("scene")
+
+
+def method(cells: pd.DataFrame, name: str) -> pd.DataFrame:
+    """The cells of one of METHODS, one a scene."""
+    solver, form, options = METHODS[name]
+    if solver == "ipm":
+        return ipm(cells, **options)
+    return cells[(cells["solver"] == solver) & (cells["form"] == form)].drop_duplicates("scene")
+
+
+def of_scaling(cells: pd.DataFrame) -> pd.DataFrame:
+    return cells[cells["scene"].str.startswith(SCALING)]
+
+
+def of_problems(cells: pd.DataFrame) -> pd.DataFrame:
+    """The cells of the paper's three problems."""
+    return cells[~cells["scene"].str.startswith(SCALING)]
+
+
+def timed(cells: pd.DataFrame) -> pd.DataFrame:
+    """With `at_least`: seconds a load case where the answer is within the limit; for a run that the time
+    limit or an iteration limit ended, what it had taken by then; else missing. `cut`: it is only that
+    lower bound.
+    """
+    within = cells["verdict"] == "within"
+    late = (cells["status"] == "time_limit") & ~within
+    spent = (cells["status"] == "iteration_limit") & ~within
+    at_least = cells["load_case_s"].where(within | spent, cells["time_limit_s"].where(late))
+    return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
+
+
+def seconds_text(cell: Mapping[str, Any]) -> str:
+    """The seconds a load case, or for a run without an answer within the limit, why there is none."""
+    if cell["verdict"] == "within":
+        return significant(cell["load_case_s"])
+    if cell["verdict"] in ANSWERED:
+        return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
+    if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
+        return f"> {cell['time_limit_s']:.4g}"
+    return str(cell["status"]).replace("_", " ") or MISSING
+
+
+def figures_of(cell: Mapping[str, Any] | None, name: str) -> dict[str, Any]:
+    """A dictionary within the details of a cell; empty where there is none."""
+    found = cell["details"].get(name) if cell is not None else None
+    return found if isinstance(found, dict) else {}
+
+
+def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The lines of a frame as dictionaries."""
+    return frame.to_dict("records")  # type: ignore[return-value]
+
+
+def first(cells: pd.DataFrame) -> dict[str, Any] | None:
+    """The first cell as a dictionary."""
+    return records(cells[:1])[0] if len(cells) else None

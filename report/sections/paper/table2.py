@@ -1,0 +1,142 @@
+"""Table 2: the starting points on the ten loads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pandas as pd
+
+from ...blocks import Column, Section, Table, Text, number, word
+from ...numbers import MISSING, as_number, counted, power, significant, tidy_power, whole
+from ...printed import TABLE_2
+from ...rows import ANSWERED, Results
+from .selection import cells_of_paper, figures_of, first, ipm, is_paper, records, seconds_text
+
+STARTS = {"stp1": "STP1", "stp2": "STP2", "algorithm_5": "Algorithm 5", "mehrotra": "Mehrotra"}
+RIVALS = ("stp1", "stp2")
+N = 4386
+
+
+def section(results: Results) -> Section | None:
+    if not is_paper(results):
+        return None
+    cells = cells_of_paper(results)
+    lines = loads(cells)
+    if not any(line[f"{start}_key"] for line in lines for start in RIVALS):
+        return None
+    return Section("Table 2: starting points", [_table(lines, cells), Text(_counted(lines)), _starts(cells)])
+
+
+def scene_of(active: int) -> str:
+    return f"{N}/{active:04d}"
+
+
+def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
+    """One record a load of Table 2: iterations, seconds and key of every start, ours and as printed."""
+    lines = []
+    for active, printed in TABLE_2.items():
+        of_scene = cells[cells["scene"] == scene_of(active)]
+        reached = of_scene["active"].max()
+        line: dict[str, Any] = {"scene": scene_of(active), "active_printed": active, "active": reached}
+        for start in STARTS:
+            row = first(ipm(of_scene, start=start))
+            answered = row is not None and row["verdict"] in ANSWERED
+            line[f"{start}_iterations"] = row["iterations"] if row and answered else None
+            line[f"{start}_s"] = row["load_case_s"] if row and answered else None
+            line[f"{start}_says"] = seconds_text(row) if row else "not measured"
+            line[f"{start}_key"] = row["key"] if row else ""
+            line[f"{start}_iterations_printed"], line[f"{start}_s_printed"] = printed.get(start, (None, None))
+        lines.append(line)
+    return lines
+
+
+def no_more(line: Mapping[str, Any], suffix: str = "") -> bool | None:
+    """Whether Algorithm 5 needed no more iterations than STP1 and STP2; None where a number is missing."""
+    mine, *others = [
+        as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)
+    ]
+    if mine is None or not all(other is not None for other in others):
+        return None
+    return all(mine <= other for other in others if other is not None)
+
+
+def _table(lines: list[dict[str, Any]], cells: pd.DataFrame) -> Table:
+    columns = [number("active, printed", "active_printed", whole), number("ours", "active", whole)]
+    for start, name in STARTS.items():
+        columns += [
+            Column(f"{name}: iterations", _pair(f"{start}_iterations", whole)),
+            Column(f"{name}: s", _pair(f"{start}_s", lambda s: significant(s), f"{start}_says")),
+        ]
+    mu = sorted(ipm(cells)["tolerance"].dropna().unique())
+    caption = (
+        "*The starting points on the ten loads, ours | printed.* Ours: interior-point iterations to ε_μ = "
+        f"{' / '.join(map(tidy_power, mu))} N·mm (the paper does not state its own) and seconds a load case; "
+        "printed: Table 2 of the paper, seconds of its machine. STP1 and STP2 are as read from a secondary "
+        "source. Mehrotra's start is not in the paper."
+    )
+    return Table("paper-table2", caption, pd.DataFrame(lines), columns)
+
+
+def _pair(name: str, style: Callable[[object], str], says: str = "") -> Callable[[Mapping[str, Any]], str]:
+    def text(row: Mapping[str, Any]) -> str:
+        ours = row[says] if says else style(row[name])
+        printed = style(row[f"{name}_printed"])
+        return ours if printed == MISSING else f"{ours} \\| {printed}"
+
+    return text
+
+
+def _counted(lines: list[dict[str, Any]]) -> str:
+    ours = [no_more(line) for line in lines]
+    printed = [no_more(line, "_printed") for line in lines]
+    known = [o for o in ours if o is not None]
+    missing = len(ours) - len(known)
+    where = [f"{line['active_printed']}" for line, o in zip(lines, ours, strict=True) if o is False]
+    words = (
+        f"Algorithm 5 needs no more iterations than STP1 and STP2 on **{sum(known)} of "
+        f"{counted(len(known), 'load')}** here"
+        + (f" ({missing} without an answer of all three)" if missing else "")
+        + f", and on {sum(map(bool, printed))} of {len(printed)} in the printed table."
+    )
+    return words + (f" It needs more at {', '.join(where)} active (printed count)." if where else "")
+
+
+def _starts(cells: pd.DataFrame) -> Table:
+    """Where each start lies, over the ten loads: why one needs more iterations than another."""
+    scenes = [scene_of(active) for active in TABLE_2]
+    of_loads = cells[cells["scene"].isin(scenes)]
+    lines = []
+    for start, name in STARTS.items():
+        rows = records(ipm(of_loads, start=start))
+        where = [figures_of(row, "start") for row in rows]
+        line: dict[str, Any] = {"start": name, "loads": len(rows)}
+        for what in ("mu", "infeasibility_mm", "corrections", "multiplications"):
+            values = [float(w[what]) for w in where if as_number(w.get(what)) is not None]
+            line |= {f"{what}_least": min(values, default=None), f"{what}_most": max(values, default=None)}
+        iterations = [r["iterations"] for r in rows if r["verdict"] in ANSWERED]
+        line |= {"iterations_least": min(iterations, default=None)}
+        line |= {"iterations_most": max(iterations, default=None)}
+        lines.append(line)
+    columns = [
+        word("start", "start"),
+        number("loads", "loads", whole),
+        Column("μ₀, N·mm", _range("mu", power)),
+        Column("infeasibility, mm", _range("infeasibility_mm", power)),
+        Column("row corrections", _range("corrections", whole)),
+        Column("multiplications", _range("multiplications", whole)),
+        Column("iterations", _range("iterations", whole)),
+    ]
+    caption = (
+        "*Where the starts lie*, least to most over the ten loads: the gap μ₀ from which the iteration has "
+        "to come down, and by how much y = Qλ − p is violated."
+    )
+    return Table("paper-starts", caption, pd.DataFrame(lines), columns)
+
+
+def _range(name: str, style: Callable[[object], str]) -> Callable[[Mapping[str, Any]], str]:
+    def text(row: Mapping[str, Any]) -> str:
+        least, most = style(row[f"{name}_least"]), style(row[f"{name}_most"])
+        return least if least == most else f"{least} to {most}"
+
+    return text

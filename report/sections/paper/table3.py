@@ -1,0 +1,129 @@
+"""Table 3: complexities and memory, measured over several sizes of one joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from ... import style
+from ...blocks import Block, Column, Figure, Section, Table, number, word
+from ...numbers import MISSING, whole
+from ...rows import Results
+from .looks import LOOKS
+from .scaling import QUANTITIES, fitted, measured
+from .selection import METHODS, is_paper, records, seconds_text
+
+PANELS = (
+    ("preparation_s", "data preparation, s"),
+    ("working_s", "working time, s"),
+    ("s_per_step", "s a CG iteration or pivot"),
+    ("working_mib", "working memory, MiB"),
+)
+
+
+def section(results: Results) -> Section | None:
+    if not is_paper(results):
+        return None
+    lines = measured(results)
+    if lines.empty or lines["n"].nunique() < 2:
+        return None
+    blocks: list[Block] = [_exponents(lines), _absolute(lines), _figure(lines)]
+    return Section("Table 3: complexity and memory", blocks)
+
+
+def _exponents(lines: pd.DataFrame) -> Table:
+    records = []
+    for quantity in QUANTITIES:
+        record: dict[str, Any] = {"quantity": quantity.name.removesuffix(", s").removesuffix(", MiB")}
+        record["theory"] = _theory(quantity.ipm, quantity.gi)
+        for name in METHODS:
+            fit = fitted(lines, name, quantity.key)
+            record[name] = fit.slope if fit else None
+            record[f"{name}, standard error"] = fit.error if fit else None
+            record[f"{name}, sizes"] = fit.points if fit else 0
+            record[f"{name}, shown"] = str(fit) if fit else MISSING
+        records.append(record)
+    columns = [word("quantity", "quantity"), word("order in n, paper", "theory")]
+    columns += [Column(name, _shown(name)) for name in METHODS]
+    sizes = ", ".join(f"{n:.0f}" for n in sorted(lines["n"].unique()))
+    caption = (
+        "*Exponents in n, measured*, with the standard error of the fit: least squares in log–log over the "
+        f"scenes of one joint at n = {sizes}. Data preparation: the Cholesky factor of K, Q, and what the "
+        "solver itself prepares once (the inverse or factor of Q). Working time: seconds a load case. The "
+        "paper's order of the interior-point method's working time is n^2.5 times the CG iterations of "
+        "a system, that is √m outer iterations of n² a CG iteration; Goldfarb–Idnani's is n_act·n², n³ where "
+        "the share of active contacts stays the same. Runs that were not answered within the limit "
+        "take no part in the times; the table below names them."
+    )
+    return Table("paper-table3", caption, pd.DataFrame(records), columns)
+
+
+def _theory(ipm: float | None, gi: float | None) -> str:
+    if ipm == gi:
+        return MISSING if ipm is None else f"{ipm:g}"
+    words = [f"{name} {value:g}" for name, value in (("IPM", ipm), ("GI", gi)) if value is not None]
+    return ", ".join(words)
+
+
+def _shown(name: str) -> Callable[[Mapping[str, Any]], str]:
+    return lambda row: row[f"{name}, shown"]
+
+
+def _absolute(lines: pd.DataFrame) -> Table:
+    table = lines.sort_values(["n", "method"], key=lambda c: c.map(_place) if c.name == "method" else c)
+    table = table.assign(
+        full_mib=8 * table["n"] ** 2 / 2**20, seconds=[seconds_text(r) for r in records(table)]
+    )
+    columns = [
+        number("n", "n", whole),
+        Column("active", lambda row: _active(row)),
+        word("method", "method"),
+        number("data preparation, s", "preparation_s"),
+        number("of it prepare", "prepare_s"),
+        word("working time, s", "seconds"),
+        number("outer iterations", "iterations", whole),
+        number("CG", "cg", whole),
+        number("pivots", "pivots", whole),
+        number("working memory, MiB", "working_mib", whole),
+        number("peak, MiB", "peak_rss_mib", whole),
+        number("an n × n matrix, MiB", "full_mib", whole),
+    ]
+    caption = (
+        "*The figures behind the exponents.* Working memory: the largest resident memory less what was "
+        "resident when the solver's work began, the interpreter and the data. > : stopped by the time limit."
+    )
+    return Table("paper-scaling", caption, table, columns)
+
+
+def _place(name: str) -> int:
+    return list(METHODS).index(name)
+
+
+def _active(row: Mapping[str, Any]) -> str:
+    share = f" ({100 * row['active'] / row['m']:.0f} %)" if row["m"] > 0 else ""
+    return whole(row["active"]) + share
+
+
+def _figure(lines: pd.DataFrame) -> Figure:
+    lines = lines.assign(s_per_step=lines["s_per_cg"].fillna(lines["s_per_pivot"]).astype(float))
+    drawing = style.figure(5.6)
+    panels: list[Axes] = list(drawing.subplots(2, 2, sharex=True).ravel())
+    for axes, (key, title) in zip(panels, PANELS, strict=True):
+        for name, look in LOOKS.items():
+            of_method = lines[lines["method"] == name].dropna(subset=[key]).sort_values("n")
+            axes.plot(of_method["n"], of_method[key].astype(float), label=name, **look)
+        axes.set(xscale="log", yscale="log", ylabel=title)
+        ticks = sorted(lines["n"].unique())
+        axes.set_xticks(ticks, [f"{n:.0f}" for n in ticks], rotation=30)
+        axes.minorticks_off()
+    for axes in panels[2:]:
+        axes.set_xlabel("n")
+    drawing.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", handlelength=3.2)
+    caption = (
+        "*The same on logarithmic axes*, on which a power of n is a straight line: a fit's slope is the "
+        "exponent of the table. Runs without an answer within the limit have no point."
+    )
+    return Figure("paper-table3", caption, drawing)

@@ -1,0 +1,149 @@
+"""The proven bounds against answers that are known exactly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+import scipy.sparse as sp
+
+from harness.certificate import certify
+from harness.definite import smallest_eigenvalue
+from harness.exact_residual import Double
+from harness.reference import refined_active_set
+from problems.assembly import Assembly, LoadCase, Prepared
+
+GROUPS, EACH = 40, 75  # random problems in all: their product
+
+
+def whole(rng: np.random.Generator, *shape: int, low: int = -3, high: int = 4) -> np.ndarray:
+    return rng.integers(low, high, shape).astype(float)
+
+
+def manufactured(rng: np.random.Generator) -> tuple[Prepared, LoadCase, np.ndarray, np.ndarray]:
+    """K, x*, λ*, y* in small dyadic numbers, so that f = Kx* + Aλ* and g = Aᵀx* + y* are exact.
+
+    Of the contacts a random share has λ* = y* = 0. Two parts or three in a stack, some contacts against a
+    rigid tool, and the stiffness of one part scaled by up to 2²⁰.
+    """
+    parts, size = int(rng.integers(2, 4)), int(rng.integers(1, 6))
+    blocks = []
+    for _ in range(parts):
+        B = whole(rng, size, size)
+        blocks.append(np.asfortranarray((B @ B.T + np.eye(size)) * 2.0 ** rng.integers(-10, 11)))
+    columns = []
+    for below in range(parts - 1):
+        for k in range(size):
+            column = np.zeros(parts * size)
+            column[below * size + k] = 1.0
+            column[(below + 1) * size + k] = -1.0
+            columns.append(column)
+    if rng.random() < 0.5:
+        columns.append(np.eye(parts * size)[0])
+    A = np.column_stack(columns)[:, : parts * size]
+    m = A.shape[1]
+    kind = rng.integers(0, 3, m)  # closed, weakly active, open
+    lam = np.where(kind == 0, whole(rng, m, low=1, high=5), 0.0)
+    y = np.where(kind == 2, whole(rng, m, low=1, high=5) / 8, 0.0)
+    x = whole(rng, parts * size) / 16
+    K = sla.block_diag(*blocks)
+    load = LoadCase(K @ x + A @ lam, A.T @ x + y)
+    factors = tuple(sla.cholesky(block) for block in blocks)
+    Q = A.T @ np.linalg.solve(K, A)
+    prepared = Prepared(Assembly(tuple(blocks), sp.csc_array(A)), factors, np.asfortranarray((Q + Q.T) / 2))
+    return prepared, load, x, lam
+
+
+@pytest.mark.parametrize("group", range(GROUPS))
+def test_the_bound_holds_on_every_problem_with_a_known_answer(group: int) -> None:
+    """Dyadic data make the answer exact, and degenerate contacts are made to order."""
+    rng = np.random.default_rng(group)
+    for _ in range(EACH):
+        prepared, load, x, _ = manufactured(rng)
+        found = refined_active_set(prepared, load)
+        assert abs(found.x - x).max() <= found.bound_mm  # both sides are exact: x is dyadic and small
+        assert found.bound_mm < 1e-10
+
+
+@pytest.mark.parametrize("group", range(8))
+def test_the_bound_of_any_point_holds(group: int) -> None:
+    """x and λ far from the answer, infeasible and of the wrong sign: certify makes of them what it can."""
+    rng = np.random.default_rng(100 + group)
+    for _ in range(25):
+        prepared, load, x, lam = manufactured(rng)
+        kappa = 0.999 * min(np.linalg.eigvalsh(block)[0] for block in prepared.assembly.blocks)
+        zero_x, zero_lam = np.zeros(len(x)), np.zeros(len(lam))
+        for size in (1.0, 1e-3, 1e-9):
+            near = Double(x + size * rng.standard_normal(len(x)), zero_x)
+            forces = Double(lam + size * rng.standard_normal(len(lam)), zero_lam)
+            active = rng.random(len(lam)) < 0.5
+            proof = certify(prepared.assembly, load, near, forces, active, kappa)
+            assert abs(proof.x.hi - x).max() <= proof.bound_mm
+
+
+@pytest.mark.parametrize("group", range(8))
+def test_what_is_proven_closed_or_open_is(group: int) -> None:
+    rng = np.random.default_rng(200 + group)
+    decided = 0
+    for _ in range(25):
+        prepared, load, x, lam = manufactured(rng)
+        kappa = 0.999 * min(np.linalg.eigvalsh(block)[0] for block in prepared.assembly.blocks)
+        y = load.g - prepared.assembly.A.T @ x
+        proof = certify(prepared.assembly, load, Double(x, 0 * x), Double(lam, 0 * lam), lam > 0, kappa)
+        assert (lam[proof.closed] > 0).all()
+        assert (y[proof.open] > 0).all()
+        assert not (proof.closed & proof.open).any()
+        decided += int((proof.closed | proof.open).sum())
+        assert (proof.closed | proof.open)[y > 0].all()
+    assert decided > 50
+
+
+def test_without_a_proof_of_definiteness_there_is_no_bound() -> None:
+    prepared, load, x, lam = manufactured(np.random.default_rng(0))
+    proof = certify(prepared.assembly, load, Double(x, 0 * x), Double(lam, 0 * lam), lam > 0, 0.0)
+    assert proof.bound_mm == np.inf
+    assert not (proof.closed | proof.open).any()
+
+
+@pytest.mark.parametrize("condition", [1e1, 1e4, 1e8, 1e12])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_smallest_eigenvalue_is_bounded_from_below(condition: float, seed: int) -> None:
+    """K − κI is positive definite in rational arithmetic, and κ is not far below the estimate."""
+    rng = np.random.default_rng(seed)
+    size = 8
+    basis = np.linalg.qr(rng.standard_normal((size, size)))[0]
+    K = (basis * np.geomspace(1, condition, size)) @ basis.T
+    K = (K + K.T) / 2
+    kappa = smallest_eigenvalue(K, 1.0)
+    assert kappa > (0.8 if condition < 1e11 else 0.05)
+    rows = [[Fraction(float(v)) for v in row] for row in K]
+    for i in range(size):
+        rows[i][i] -= Fraction(kappa)
+    for j in range(size):  # the pivots of an exact elimination
+        assert rows[j][j] > 0
+        for i in range(j + 1, size):
+            factor = rows[i][j] / rows[j][j]
+            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[j], strict=True)]
+
+
+def test_an_indefinite_matrix_has_no_positive_bound() -> None:
+    assert smallest_eigenvalue(np.diag([1.0, -1e-3]), 1.0) == 0.0
+    assert smallest_eigenvalue(np.diag([1.0, 0.0]), 1.0) == 0.0
+
+
+def test_a_bad_estimate_does_no_harm() -> None:
+    K = np.diag([2.0, 5.0])
+    assert 0 <= smallest_eigenvalue(K, 1e6) <= 2.0
+    assert 0 < smallest_eigenvalue(K, 1e-9) <= 2.0
+
+
+def test_the_bound_grows_with_the_residual() -> None:
+    """A mutation of the load by δ is seen as a bound of at least the shift that it makes."""
+    prepared, load, x, lam = manufactured(np.random.default_rng(5))
+    kappa = 0.999 * min(np.linalg.eigvalsh(block)[0] for block in prepared.assembly.blocks)
+    wrong = replace(load, f=load.f + 1.0)
+    proof = certify(prepared.assembly, wrong, Double(x, 0 * x), Double(lam, 0 * lam), lam > 0, kappa)
+    assert proof.bound_mm >= np.sqrt(len(x)) / np.sqrt(kappa * abs(prepared.assembly.blocks[0]).sum())
