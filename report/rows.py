@@ -69,19 +69,6 @@ class Results:
         """The cells of one size that were attempted (a form that a solver does not take is not)."""
         return self.cells[(self.cells["n"] == n) & (self.cells["status"] != "unsupported")]
 
-    @property
-    def tightest(self) -> pd.DataFrame:
-        """The cells that were run, at the tightest tolerance of each series: one line of a figure each."""
-        tried = self.cells[~self.cells["status"].isin(["unsupported", "not_run"])]
-        least = tried.groupby("series")["tolerance"].transform("min")
-        return tried[(tried["tolerance"] == least) | least.isna()]
-
-    def middle_scene(self, n: int) -> str | None:
-        """Of the scenes of a size, the one with the middle number of active contacts."""
-        cells = self.of_size(n)
-        scenes = cells.drop_duplicates("scene").sort_values(["active", "scene"])["scene"].tolist()
-        return scenes[len(scenes) // 2] if scenes else None
-
     def scene_arrays(self, scene: str) -> dict[str, NDArray[np.float64]] | None:
         """The arrays of a scene's file; empty where it is damaged, None without a file or contact nodes."""
         path = self.directory / "scenes" / (scene.replace("/", "_") + ".npz")

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from ...blocks import Column, Section, Table, Text, number, word
-from ...numbers import MISSING, as_number, counted, power, significant, tidy_power, whole
+from ...numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
 from ...printed import TABLE_2
 from ...rows import ANSWERED, Results
 from .selection import cells_of_paper, figures_of, first, ipm, is_paper, records, seconds_text
@@ -134,7 +134,6 @@ def _starts(cells: pd.DataFrame) -> Table:
 
 def _range(name: str, style: Callable[[object], str]) -> Callable[[Mapping[str, Any]], str]:
     def text(row: Mapping[str, Any]) -> str:
-        least, most = style(row[f"{name}_least"]), style(row[f"{name}_most"])
-        return least if least == most else f"{least} to {most}"
+        return span(style(row[f"{name}_least"]), style(row[f"{name}_most"]))
 
     return text
