@@ -206,6 +206,12 @@ def test_only_runs_called_solved_can_break_their_word(tmp_path: Path) -> None:
     assert "liar (dual)" not in trust.index
 
 
+def test_what_the_reference_leaves_open_is_in_the_solvers_favour(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", k, 1.0, 10.0**-k + 5e-11, reference_bound_mm=6e-11) for k in (6, 8, 10)]
+    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("series")
+    assert trust.loc["a (dual)", "above_tolerance"] == 0
+
+
 def test_small_residuals_beside_a_large_error_are_named(tmp_path: Path) -> None:
     tiny = {"primal_residual": 1e-15, "dual_residual": 1e-12, "duality_gap": 1e-13}
     section = residual_error.section(results(tmp_path, changed(sweep(), "coarse", **tiny)))
@@ -225,6 +231,12 @@ def test_residuals_that_do_tell_are_said_to(tmp_path: Path) -> None:
     ]
     section = residual_error.section(results(tmp_path, rows))
     assert "did tell the two apart" in text(section)
+
+
+def test_one_small_residual_beside_a_large_one_deceives_nobody(tmp_path: Path) -> None:
+    rows = [answer(LOW, "good", k, 1.0, 1e-9, primal_residual=1e-9, dual_residual=1e-9) for k in (5, 7, 9)]
+    rows.append(answer(LOW, "bad", 7, 1.0, 1e-5, primal_residual=1e-12, dual_residual=1e-3))
+    assert "did tell the two apart" in text(residual_error.section(results(tmp_path, rows)))
 
 
 def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
