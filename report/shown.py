@@ -8,7 +8,7 @@ import pandas as pd
 
 from . import style
 from .labels import in_order
-from .numbers import counted
+from .numbers import counted, listed
 from .rows import Results
 from .standings import standings
 
@@ -58,7 +58,7 @@ def left_out(results: Results) -> str:
     missing = sidelined(results)
     if missing.empty:
         return ""
-    solvers = " and ".join(in_order(missing.assign(line=missing["solver"]), "line"))
+    solvers = listed(in_order(missing, "solver"))
     count = counted(missing["series"].nunique(), "variant")
     return f" Not drawn: {count} of {solvers} run on fewer than half of its scenes; the tables have them."
 

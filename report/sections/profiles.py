@@ -71,8 +71,8 @@ def _drawing(results: Results, times: pd.DataFrame) -> Drawing:
     drawing = style.figure(3.6)
     axes = drawing.subplots()
     for series, look in styles.items():
-        met = np.sort(times[series][np.isfinite(times[series])])
-        shares = np.arange(1, len(met) + 1) / len(times)
+        met, counts = np.unique(times[series][np.isfinite(times[series])], return_counts=True)
+        shares = counts.cumsum() / len(times)
         axes.plot(met, shares, **style.marker_only(look))
         taus, steps = np.array([1.0, *met, max(right, 2.0)]), np.array([0.0, *shares, shares.max(initial=0)])
         axes.plot(taus, steps, drawstyle="steps-post", **style.line_only(look))
