@@ -174,10 +174,12 @@ def cells_of(rows: pd.DataFrame) -> pd.DataFrame:
     """One line a scene and solver. Of its repeats: the worst verdict with its status, the largest error
     and memory, the median of each time over those that have it.
 
-    Adds `load_case_s` = setup + solve + form, what one load case costs; `once_s` = convert + prepare,
-    paid once an assembly; `total_s`, both; `repeats`; `label`, the name of the line; and `series`,
-    that name without the tolerance.
+    Adds `load_case_s` = setup + solve + form, what one load case costs, with its `least_s` and `most_s`
+    over the repeats; `once_s` = convert + prepare, paid once an assembly; `total_s`, both; `repeats`;
+    `label`, the name of the line; and `series`, that name without the tolerance.
     """
+    timed = rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()
+    rows = rows.assign(load_case_s=rows[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(timed))
     cell = rows.groupby(CELL, dropna=False, sort=False).ngroup()
     severity = rows["verdict"].map({verdict: i for i, verdict in enumerate(VERDICTS)}).fillna(len(VERDICTS))
     ranked = rows.assign(cell=cell, severity=severity).sort_values("severity", ascending=False, kind="stable")
@@ -188,7 +190,8 @@ def cells_of(rows: pd.DataFrame) -> pd.DataFrame:
     cells["repeats"] = repeats.size()
     cells["verdict"] = cells["verdict"].where(cells["verdict"].isin(VERDICTS), "no_answer")
     answered = cells["verdict"].isin(ANSWERED) & cells["solve_s"].notna()
-    cells["load_case_s"] = cells[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(answered)
+    for name, figure in (("load_case_s", "median"), ("least_s", "min"), ("most_s", "max")):
+        cells[name] = repeats["load_case_s"].agg(figure).where(answered)
     cells["once_s"] = cells[["convert_s", "prepare_s"]].sum(axis=1).where(answered)
     cells["total_s"] = cells["load_case_s"] + cells["once_s"]
     return named(cells)

@@ -8,8 +8,9 @@ import pandas as pd
 
 from . import style
 from .labels import in_order
-from .numbers import counted
+from .numbers import counted, listed
 from .rows import Results
+from .standings import standings
 
 #: Of a solver and form with more variants than this, those that were run on few scenes are not drawn.
 VARIANTS = 3
@@ -39,11 +40,17 @@ def styles_of(results: Results, cells: pd.DataFrame) -> dict[str, dict[str, Any]
     return {series: styles[series] for series in in_order(cells, "series")}
 
 
-def tightest(results: Results) -> pd.DataFrame:
-    """The cells drawn, at the tightest tolerance of each series: one line of a figure each."""
-    cells = drawn(results)
-    least = cells.groupby("series")["tolerance"].transform("min")
-    return cells[(cells["tolerance"] == least) | least.isna()]
+def best(results: Results) -> pd.DataFrame:
+    """The cells drawn, of several tolerances of a series those of the one that stands best."""
+    cells, table = drawn(results), standings(results)
+    return cells[cells["label"].isin(table["label"][~table["series"].duplicated()] if len(table) else [])]
+
+
+def of_tolerances(results: Results) -> str:
+    """A sentence for the captions of figures of the `best`, empty where every series has one tolerance."""
+    several = drawn(results).groupby("series")["tolerance"].nunique() > 1
+    words = " Of several tolerances, the one within the limit on most scenes, then the fastest."
+    return words if several.any() else ""
 
 
 def left_out(results: Results) -> str:
@@ -51,23 +58,29 @@ def left_out(results: Results) -> str:
     missing = sidelined(results)
     if missing.empty:
         return ""
-    solvers = " and ".join(in_order(missing.assign(line=missing["solver"]), "line"))
+    solvers = listed(in_order(missing, "solver"))
     count = counted(missing["series"].nunique(), "variant")
     return f" Not drawn: {count} of {solvers} run on fewer than half of its scenes; the tables have them."
 
 
+def sizes(results: Results) -> list[int]:
+    """The sizes drawn: one of a single scene is left out beside sizes of more than two."""
+    most = max((len(scenes(results, n)) for n in results.sizes), default=0)
+    return [n for n in results.sizes if len(scenes(results, n)) > 1 or most < 3]
+
+
+def scenes(results: Results, n: int) -> list[str]:
+    """The scenes of a size, by their active contacts."""
+    of_size = results.of_size(n).drop_duplicates("scene")
+    return of_size.sort_values(["active", "scene"])["scene"].tolist()
+
+
 def middle_scene(results: Results, n: int) -> str | None:
     """Of the scenes of a size, the one with the middle number of active contacts."""
-    scenes = _scenes(results.of_size(n))
-    return scenes[len(scenes) // 2] if scenes else None
+    of_size = scenes(results, n)
+    return of_size[len(of_size) // 2] if of_size else None
 
 
 def middle_scenes(results: Results) -> list[str]:
-    """The middle scene of each size; a size of one scene is left out beside sizes of more than two."""
-    by_size = [_scenes(results.of_size(n)) for n in results.sizes]
-    most = max(map(len, by_size), default=0)
-    return [scenes[len(scenes) // 2] for scenes in by_size if len(scenes) > 1 or (scenes and most < 3)]
-
-
-def _scenes(cells: pd.DataFrame) -> list[str]:
-    return cells.drop_duplicates("scene").sort_values(["active", "scene"])["scene"].tolist()
+    """The middle scene of each size drawn."""
+    return [scene for n in sizes(results) if (scene := middle_scene(results, n))]

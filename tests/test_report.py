@@ -17,9 +17,9 @@ from synthetic_results import everything, no_answer, row, write_rows
 from report import style
 from report.build import write
 from report.numbers import power, significant
+from report.precision import pareto
 from report.rows import read
 from report.scoreboard import scoreboard
-from report.sections.accuracy import pareto
 from report.shown import drawn, left_out, middle_scenes
 from report.standings import compare, standings
 
@@ -111,6 +111,7 @@ def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> N
     rows += [row(HIGH, "a", repeat=0, **times(solve_s=1.0)), row(HIGH, "a", repeat=1, **no_answer("crashed"))]
     cells = read(write_rows(tmp_path, rows)).cells.set_index("scene")
     assert cells.loc[LOW, ["load_case_s", "verdict", "repeats"]].tolist() == [2.0, "within", 3]
+    assert cells.loc[LOW, ["least_s", "most_s"]].tolist() == [1.0, 3.0]
     assert cells.loc[HIGH, ["verdict", "status"]].tolist() == ["no_answer", "crashed"]
     assert math.isnan(cells.loc[HIGH, "load_case_s"])
 

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from .. import marks, style
 from ..blocks import Figure, Section
 from ..rows import ANSWERED, Results
-from ..shown import left_out, styles_of, tightest
+from ..shown import best, left_out, of_tolerances, styles_of
 
 PANEL = 3.0  # inches
 OUTSIDE: dict[str, Any] = {
@@ -33,7 +33,7 @@ MARKS = (
 
 
 def section(results: Results) -> Section | None:
-    cells = tightest(results)
+    cells = best(results)
     cells = cells[cells.groupby("n")["active"].transform("nunique") > 1]
     if cells["load_case_s"].notna().sum() == 0:
         return None
@@ -49,16 +49,10 @@ def section(results: Results) -> Section | None:
     axes.set_xlabel("active contacts")
     handles = [*style.legend_entries(styles), *entries(cells)]
     drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
-    several = (
-        " Of several tolerances, the tightest."
-        if results.cells["series"].nunique() < results.cells["label"].nunique()
-        else ""
-    )
     caption = (
         "*Seconds a load case (set-up + solve + the dual form's own cost) against the active contacts*, "
-        f"below in number, above in % of m.{several} Solid and filled: dual form; dashed and hollow: primal. "
-        + MARKS.format(limit=results.limit)
-        + left_out(results)
+        f"below in number, above in % of m.{of_tolerances(results)} Solid and filled: dual form; dashed "
+        "and hollow: primal. " + MARKS.format(limit=results.limit) + left_out(results)
     )
     return Section("Time against active contacts", [Figure("time-active", caption, drawing)])
 
