@@ -75,7 +75,8 @@ def frame(*d: Vector, A: sp.csc_array | None = None) -> Frame:
 def solved(base: Frame, seed: int, shares: Shares | None = None) -> Made:
     """A load whose answer is chosen: forces of one size in all modes, gaps up to about 0.5 mm."""
     random = np.random.default_rng(seed)
-    x, Kx = (np.concatenate(parts) for parts in zip(*(_modes(random, d, base.largest) for d in base.d)))
+    parts = [_modes(random, d, base.largest) for d in base.d]
+    x, Kx = np.concatenate([x for x, _ in parts]), np.concatenate([Kx for _, Kx in parts])
     lam, y = _contacts(random, base, shares or Shares())
     return from_answer(base, x, Kx, lam, y)
 

@@ -27,7 +27,8 @@ def _singular() -> Rung:
     d = spectrum(16, 1e4)
     made = solved(frame(d, d), seed=13)
     free = np.concatenate([[0.0], d[1:]])
-    return Rung("A part that can move without strain", made=Made(frame(d, free).assembly(), made.load), refused=REFUSED)
+    made = Made(frame(d, free).assembly(), made.load)
+    return Rung("A part that can move without strain", made=made, refused=REFUSED)
 
 
 RUNGS: Ladder = {"on-a-part": _on_a_part, "on-a-tool": _on_a_tool, "matrix": _singular}

@@ -17,4 +17,6 @@ def _rung(stiffness: float) -> Rung:
     return plates(title, {"junction": JUNCTION, "part": parts}, springs, GAP, FASTENERS)
 
 
-RUNGS: Ladder = {f"{stiffness:.0e}": partial(_rung, stiffness) for stiffness in (1e6, 1e3, 1.0, 1e-2, 1e-4, 1e-6)}
+STIFFNESSES = (1e6, 1e3, 1.0, 1e-2, 1e-4, 1e-6)  # N/mm
+
+RUNGS: Ladder = {f"{stiffness:.0e}": partial(_rung, stiffness) for stiffness in STIFFNESSES}
