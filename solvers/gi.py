@@ -56,7 +56,7 @@ class GoldfarbIdnani(Solver):
         self.max_pivots = max_pivots
 
     def prepare(self, data: Problem) -> _Prepared | Answer:
-        """G: Q itself, or Q⁻¹ from the Cholesky factor of Q; where that cannot be, the answer that says so."""
+        """G: Q itself, or Q⁻¹ by the Cholesky factor of Q; where that cannot be, the answer that says so."""
         if data.form == "primal":
             return _Prepared(data, data.Q, None)
         try:
@@ -86,6 +86,8 @@ class GoldfarbIdnani(Solver):
             details["kkt_residual_mm"] = residual
             if status == "solved":
                 details.pop("cause", None)
+            else:
+                details.setdefault("cause", f"rounding: optimal to {residual:.1e} mm only")
             return Answer(status, lam, None, result.pivots, details=details)
         x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
         return Answer(result.status, result.u, x, result.pivots, details=details)

@@ -132,15 +132,13 @@ def test_the_textbook_corrector_meets_the_second_order_products() -> None:
     assert state.system.factorisations == 1  # one matrix for both directions
 
 
-JAMMED = np.array([[0.571432186, 8.92851495e-3], [8.92851495e-3, 1.39509811e-4]]), np.array([1.28726556, 0.02011341])
-
-
 @pytest.mark.parametrize("system", ["V", "direct"])
 def test_a_start_anew_with_shorter_steps_frees_what_has_jammed(
     system: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Algorithm 3 takes its predictor step to 0.5 % of the boundary, and here it cannot leave it again."""
-    Q, p = JAMMED
+    Q = np.array([[0.571432186, 8.92851495e-3], [8.92851495e-3, 1.39509811e-4]])
+    p = np.array([1.28726556, 0.02011341])
     answer = solved(Q, p, preconditioner=system)
     assert (answer.status, answer.details["restarts"]) == ("solved", 1)
     np.testing.assert_allclose(Q @ answer.lam, p, atol=1e-10)
