@@ -50,7 +50,8 @@ class Ipm(Solver):
 
     Options
     -------
-    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra.
+    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra. Where the first two find no
+        feasible point, Mehrotra's, which need not be one (details: start_instead).
     scheme : algorithm_3 as printed; algorithm_2, with a fixed σ; mehrotra, the textbook's.
     preconditioner : V, U, none, splitting; direct is a Cholesky factorisation of every H instead.
     ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by growing D.
@@ -124,12 +125,13 @@ class Ipm(Solver):
         Q, system = ready.problem.Q, ready.system
         system.begin()
         newton = Newton(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
+        details: dict[str, Any] = {"cg": newton.counts}
         try:
-            start = self._start(ready.problem, load)  # Algorithm 3, step 2
+            start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
         except (NoStart, np.linalg.LinAlgError) as error:
             return failed(str(error), iterations=0)
         first = newton.at(start.lam, start.y)  # step 3
-        details: dict[str, Any] = {"cg": newton.counts, "start": _about(start, first)}
+        details["start"] = _about(start, first)
         status, cause, point = self._iterate(newton, first, tolerance)
         for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
             if status != "inaccurate":
@@ -150,17 +152,21 @@ class Ipm(Solver):
             details=details,
         )
 
-    def _start(self, problem: Problem, load: Load) -> Start:
+    def _start(self, problem: Problem, load: Load, details: dict[str, Any]) -> Start:
         match self.start:
-            case "algorithm_4":
-                return algorithm_4(problem.prepared, LoadCase(load.f, load.g))
             case "stp1":
                 return stp1(problem.Q, load.p, self.rho)
             case "stp2":
                 return stp2(problem.Q, load.p, self.rho, self.epsilon)
             case "mehrotra":
                 return mehrotra_start(problem.Q, load.p)
-        return algorithm_5(problem.Q, load.p)
+        try:
+            if self.start == "algorithm_4":
+                return algorithm_4(problem.prepared, LoadCase(load.f, load.g))
+            return algorithm_5(problem.Q, load.p)
+        except NoStart as error:
+            details["start_instead"] = f"mehrotra, because {error}"
+            return mehrotra_start(problem.Q, load.p)
 
     def _iterate(self, newton: Newton, point: Point, tolerance: float) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8; the last finite point with what is to be said of it."""

@@ -37,16 +37,20 @@ def eigenvalues(prepared: Prepared) -> tuple[float, float]:
     return min(float(v[0]) for v in values), max(float(v[-1]) for v in values)
 
 
-def allowed(name: str, prepared: Prepared, x: Vector, lam: Vector) -> float:
+def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vector) -> float:
     """max|x − x*|, mm, that cond(K) and the solver's tolerance τ explain.
 
-    100 cond(K) 2⁻⁵³ max|x|, and besides (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and
-    sᵀλ ≤ τ(m + Σλ): the bound that harness/certificate.py derives.
+    100 cond(K) 2⁻⁵³ max(|x|, |K⁻¹f|), x being what is left of K⁻¹f − K⁻¹Aλ; and besides
+    (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and sᵀλ ≤ τ(m + Σλ): the bound that
+    harness/certificate.py derives. Clarabel's τ is a share of the data where that is above 1.
     """
     low, high = eigenvalues(prepared)
-    conditioning = 100 * high / low * 2.0**-53 * float(abs(x).max(initial=0.0))
+    size = max(float(abs(v).max(initial=0.0)) for v in (x, prepared.solve_K(case.f)))
+    conditioning = 100 * high / low * 2.0**-53 * size
     if name in ACTIVE_SET:
         return conditioning
     tau = 1e-10 if name == "ipm" else TOLERANCES.get(name, 1e-9)
+    if name == "clarabel":
+        tau *= max(1.0, float(abs(case.f).max()))
     residual = tau * np.sqrt(prepared.assembly.n / low)
     return conditioning + float((residual + np.sqrt(tau * (prepared.assembly.m + lam.sum()))) / np.sqrt(low))

@@ -182,7 +182,16 @@ def test_a_start_that_cannot_be_made_is_a_failure_that_says_so() -> None:
     answer = solved(-np.eye(4), np.ones(4), preconditioner="none")
     assert answer.status == "failed"
     assert answer.lam is None
-    assert "no λ > 0" in answer.details["cause"]
+    assert "definite" in answer.details["cause"]
+
+
+def test_where_no_feasible_start_is_found_another_is_taken() -> None:
+    """Two contacts that close each other's gap: Qλ > 0 only for λ₁ between 1.072 and 1.076 λ₂."""
+    Q = np.array([[0.00464895, -0.00498223], [-0.00498223, 0.00536092]])
+    answer = solved(Q, np.array([3.2364333, -3.81448455]))
+    assert answer.status == "solved"
+    assert "no λ > 0" in answer.details["start_instead"]
+    np.testing.assert_allclose(Q @ answer.lam, [3.2364333, -3.4684], atol=1e-3)
 
 
 @pytest.mark.parametrize("system", ["V", "direct"])

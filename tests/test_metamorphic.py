@@ -108,7 +108,7 @@ def solved(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[V
     assert answer.status == "solved"
     assert x is not None
     assert answer.lam is not None
-    return x, answer.lam, allowed(name, prepared, x, answer.lam)
+    return x, answer.lam, allowed(name, prepared, case, x, answer.lam)
 
 
 @pytest.mark.parametrize(("kind", "name", "form"), TRIED, ids=str)
