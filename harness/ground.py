@@ -5,17 +5,19 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from problems.assembly import LoadCase, Prepared
 from problems.build import Progress, load_case, prepared
 from problems.effect import ForceEffect
+from problems.errors import InputError
 from problems.scene import Scene, read_scene
 
 from . import records
-from .judge import Judgement, judge
-from .reference import Reference, reference
+from .judge import Judgement, conditioned_limit, judge
+from .reference import Reference, made_reference, reference
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,14 @@ class Ground:
     load: LoadCase
     reference: Reference
     reference_s: float
+
+    def limit_mm(self, asked: float) -> float:
+        """The limit on an answer: as asked for; on a rung of a ladder, no less than conditioning allows."""
+        if not self.scene.rung:
+            return asked
+        cond_K: Any = self.prepared.facts["cond_K"]
+        largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
+        return conditioned_limit(asked, cond_K, largest)
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""
@@ -45,7 +55,8 @@ def ground(source: str, progress: Progress = lambda text, fraction: None) -> Gro
     load = load_case(scene, data)
     progress("reference", 0.0)
     start = time.perf_counter()
-    return Ground(scene, data, load, reference(scene.key, data, load), time.perf_counter() - start)
+    known = made_reference(scene.made, data) if scene.made else reference(scene.key, data, load)
+    return Ground(scene, data, load, known, time.perf_counter() - start)
 
 
 def record(ground: Ground, directory: Path) -> None:
@@ -64,9 +75,7 @@ def record(ground: Ground, directory: Path) -> None:
         "reference_bound_mm": known.bound_mm,
         "reference_route": known.route,
     }
-    path = directory / "problems.jsonl"
-    others = [other for other in records.read_whole(path) if other["scene"] != scene.name]
-    records.rewrite(path, [*others, row])
+    _put(row, directory)
     arrays = {
         "gap_before": ground.load.g,
         "gap_after": ground.load.g - ground.prepared.assembly.A.T @ known.x,
@@ -79,3 +88,20 @@ def record(ground: Ground, directory: Path) -> None:
         marks = [effect.marks(scene.joint) for effect in scene.effects if isinstance(effect, ForceEffect)]
         arrays["fasteners"] = np.concatenate([np.zeros((0, 2)), *marks])
     np.savez(directory / "scenes" / (scene.name.replace("/", "_") + ".npz"), **arrays)
+
+
+def record_refusal(scene: Scene, directory: Path) -> None:
+    """Put into DIRECTORY/problems.jsonl by which words the model refuses a rung, "" where it does not."""
+    try:
+        prepared(scene)
+        words = ""
+    except InputError as error:
+        words = str(error)
+    n, m = scene.expected_size or (None, None)
+    _put({"scene": scene.name, "title": scene.title, "n": n, "m": m, "refused": words}, directory)
+
+
+def _put(row: dict[str, Any], directory: Path) -> None:
+    path = directory / "problems.jsonl"
+    others = [other for other in records.read_whole(path) if other["scene"] != row["scene"]]
+    records.rewrite(path, [*others, row])

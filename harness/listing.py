@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 from problems.errors import InputError
+from problems.ladder import rung_names
 from problems.scene import read_scene, scene_names
 from solvers.registry import SOLVERS, make_solver, solver_names, solver_version
 
@@ -29,7 +30,7 @@ def _solvers() -> Table:
 
 def _scenes() -> Table:
     table = Table("scene", "n", "m", "title")
-    for name in scene_names():
+    for name in [*scene_names(), *rung_names()]:
         scene = read_scene(name)
         table.add_row(name, *(str(size) for size in scene.expected_size or ("", "")), scene.title)
     return table

@@ -26,12 +26,14 @@ Row = dict[str, Any]
 
 ROOT = Path(__file__).parent.parent
 POLL_S = 0.05
-START_LIMIT_S = 300.0  # imports and opening the data
-END_LIMIT_S = 60.0  # saving the answer after the solve
+#: The seconds that each phase may take: imports and opening the data; the solver, as long as the
+#: measurement says; saving the answer.
+PHASES = {"start": 300.0, "solve": None, "save": 60.0}
 STDERR_TAIL = 2000  # bytes
 CHUNK = 2**16  # bytes
 LAST_WORDS = 64  # chunks read of what a dead worker wrote
 FAMILY_S = 0.5  # between two looks for processes that the worker forked
+LAST_FORKS_S = 10.0  # for killing what forks on
 
 JOB = ("source", "solver", "options", "plugin", "form", "tolerance")
 THREAD_VARIABLES = (
@@ -123,10 +125,17 @@ class Worker:
     def _take_events(self, chunk: bytes) -> None:
         *lines, self.pending = (self.pending + chunk).split(b"\n")
         for line in lines:
-            event = json.loads(line)
-            if "phase" in event:
-                self.phase, self.phase_started = event.pop("phase"), time.monotonic()
-            self.said |= event
+            try:
+                event = json.loads(line)
+            except ValueError:  # not the worker's: its solver wrote to every file it found open
+                continue
+            if isinstance(event, dict):
+                self._take_event(event)
+
+    def _take_event(self, event: Row) -> None:
+        if event.get("phase") in PHASES:
+            self.phase, self.phase_started = event.pop("phase"), time.monotonic()
+        self.said |= event
 
     def _take_stderr(self, chunk: bytes) -> None:
         self.stderr = (self.stderr + chunk)[-STDERR_TAIL:]
@@ -154,7 +163,7 @@ class Worker:
             self.verdict = {"status": "memory_limit", "message": f"{used:.0f} MiB, more than {limit} MiB"}
 
     def _look_at_the_clock(self, seconds: float) -> None:
-        limit = {"start": START_LIMIT_S, "solve": self.limits.time_limit_s, "save": END_LIMIT_S}[self.phase]
+        limit = PHASES[self.phase] or self.limits.time_limit_s
         if seconds > limit:
             status = "time_limit" if self.phase == "solve" else "failed"
             self.verdict = {"status": status, "message": f"{self.phase} took more than {limit:g} s"}
@@ -195,6 +204,9 @@ class Worker:
         if self.events.closed:
             return
         self._count_the_family()
+        if self.process.poll() is None:
+            os.kill(self.process.pid, signal.SIGSTOP)
+            end_children(self.process.pid)
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self.process.pid, signal.SIGKILL)
         for process in self.family:
@@ -205,3 +217,33 @@ class Worker:
         for stream in (self.events, self.process.stdin, self.process.stderr):
             if stream is not None:
                 stream.close()
+
+
+def end_children(pid: int) -> None:
+    """Linux: kill the children of a stopped process until none is left, however fast they fork on.
+
+    Orphans come to it too, since it is a subreaper.
+    """
+    deadline = time.monotonic() + LAST_FORKS_S
+    living = True
+    while living and time.monotonic() < deadline:
+        children = _children(pid)
+        for child in reversed(children):  # the youngest first: its parent has no time for another
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(child, signal.SIGKILL)
+        living = any(map(_is_living, children))
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        lists = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
+    except OSError:  # it is gone
+        return []
+    return [int(child) for text in lists for child in text.split()]
+
+
+def _is_living(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False

@@ -129,9 +129,11 @@ def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
 
 
 def expand(suite: Suite) -> list[Measurement]:
-    """All measurements of a suite, by scene. Repeats are interleaved, each round shuffled with a seed
-    of its own, so that a drift of the machine does not fall on one solver. What differs in the
-    tolerance alone keeps the suite's order, so that a loose one can tell that a tight one has no time.
+    """All measurements of a suite, by scene; none on a rung that the model is to refuse.
+
+    Repeats are interleaved, each round shuffled with a seed of its own, so that a drift of the machine
+    does not fall on one solver. What differs in the tolerance alone keeps the suite's order, so that a
+    loose one can tell that a tight one has no time.
 
     Raises InputError where nothing is left to measure or two files have the same scene name.
     """
@@ -139,13 +141,15 @@ def expand(suite: Suite) -> list[Measurement]:
     faults: list[Fault] = []
     for source in suite.scenes:
         try:
-            name = read_scene(source).name
+            scene = read_scene(source)
         except InputError as error:
             faults += error.faults
             continue
-        if name in names.values():
-            faults.append(Fault(suite.name, "scenes", source, f"another is called {name} too; rename it"))
-        names[source] = name
+        if scene.name in names.values():
+            allowed = f"another is called {scene.name} too; rename it"
+            faults.append(Fault(suite.name, "scenes", source, allowed))
+        if not scene.refused:
+            names[source] = scene.name
     if faults:
         raise InputError(faults)
     plan: dict[str, Measurement] = {}

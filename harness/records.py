@@ -50,11 +50,12 @@ def _plain(value: Any) -> Any:
 
 def append(path: Path, row: Row) -> None:
     """Append one line and force it to the disk; on a failure (a full disk) leave the file as it was."""
-    with path.open("ab") as file:
+    rest = memoryview(to_line(row).encode() + b"\n")
+    with path.open("ab", buffering=0) as file:  # a buffer would write what is left of it on closing
         size = file.seek(0, os.SEEK_END)
         try:
-            file.write(to_line(row).encode() + b"\n")
-            file.flush()
+            while rest:
+                rest = rest[file.write(rest) :]
             os.fsync(file.fileno())
         except OSError:
             os.truncate(path, size)

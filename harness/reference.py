@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from problems import cache
 from problems.assembly import LoadCase, Prepared, Vector
+from problems.ladder import Made
 
 from .active_set import contact_set
 from .certificate import certify
@@ -35,13 +36,26 @@ ENOUGH = 1e-20  # a correction so small, relative to x, was the last
 
 @dataclass(frozen=True)
 class Reference:
-    """x (n,) in mm, λ (m,) in N, the closed contacts, and a bound on max|x − x*| in mm."""
+    """x (n,) in mm, λ (m,) in N, the closed contacts, and a bound on max|x − x*| in mm.
+
+    unit_mm, gap_unit_mm : the lengths that 1 stands for in x and in the gaps, where those are not in mm.
+    """
 
     x: Vector
     lam: Vector
     active: NDArray[np.bool_]
     bound_mm: float
     route: str
+    unit_mm: Vector | float = 1.0
+    gap_unit_mm: Vector | float = 1.0
+
+
+def made_reference(made: Made, prepared: Prepared) -> Reference:
+    """The reference of a rung: the answer that it was made from, else the refined one."""
+    if made.x is None or made.lam is None:
+        return refined_active_set(prepared, made.load)
+    route = "chosen, exact"
+    return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
 
 
 def reference(scene_key: str, prepared: Prepared, load: LoadCase) -> Reference:

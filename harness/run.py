@@ -19,7 +19,7 @@ from problems.scene import read_scene
 
 from . import records
 from .describe import Description, describe
-from .ground import Ground, ground, record
+from .ground import Ground, ground, record, record_refusal
 from .judge import Judgement
 from .machine import installed_version, machine, physical_memory_mib
 from .measure import measure
@@ -55,6 +55,9 @@ def run(suite: Suite, directory: Path, console: Console) -> int:
     with records.held(directory):
         rows = resumed(directory, plan, solvers, console)
         records.replace_text(directory / "suite.toml", to_toml(suite))
+        for scene in map(read_scene, suite.scenes):
+            if scene.refused:
+                record_refusal(scene, directory)
         here = remember_machine(directory)
         made = {row["key"] for row in rows}
         left = [m for m in plan if m.key not in made]
@@ -109,7 +112,8 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
     One is m's own, where the solver ran out of as much time at this tolerance or a looser one. Else they
     are all those of the next smaller size n' that the same solver, form and settings were measured
     on, if it ran out of its time T' on each, and the time T that m has is at most (n/n')² T': every
-    solver here works with dense matrices, so its time grows with n² at least.
+    solver here works with dense matrices, so its time grows with n² at least. (Not for a rung of a
+    ladder: it is not size alone that makes it hard.)
     """
     same = ("solver", "form", "variant", "options", "threads_asked")
     mine = (m.solver, m.form, m.variant, m.options, m.threads)
@@ -118,6 +122,8 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
     for row in looser:
         if row["status"] == "time_limit" and m.time_limit_s <= row["time_limit_s"]:
             return f"{m.scene} at {row['tolerance']:g}"
+    if read_scene(m.source).rung:
+        return ""
     smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
     largest = max((row["n"] for row in smaller), default=0)
     there = [row for row in smaller if row["n"] == largest]
@@ -144,9 +150,9 @@ def one_row(
         told = {"status": "unsupported", "message": f"takes {' and '.join(solver.forms)} only"}
     if "cannot_save" in told:
         raise OSError(told["cannot_save"])
-    judgement = Judgement("no_answer", base.reference.bound_mm)
+    limit_mm, judgement = base.limit_mm(m.limit_mm), Judgement("no_answer", base.reference.bound_mm)
     if told.get("answer"):
-        judgement = base.judge_file(answer, m.limit_mm)
+        judgement = base.judge_file(answer, limit_mm)
     told = {name: told.get(name) for name in TOLD}
     known = [told[name] for name in CLOCKS if told[name] is not None]
     return {
@@ -155,7 +161,9 @@ def one_row(
         "n": base.prepared.assembly.n,
         "m": base.prepared.assembly.m,
         "active": int(base.reference.active.sum()),
-        **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated", "limit_mm")},
+        **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated")},
+        "limit_mm": limit_mm,
+        "limit_asked_mm": m.limit_mm,
         "threads_asked": m.threads,
         **told,
         **asdict(judgement),
@@ -198,7 +206,8 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
     """Whether a row is of another scene, solver or accuracy, or was ended by a limit that is wider now."""
     now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated)
-    before = tuple(row.get(k) for k in ("scene_key", "solver_version", "solver_code", "limit_mm", "gated"))
+    asked = row.get("limit_asked_mm", row.get("limit_mm"))  # rows once had the one limit alone
+    before = (*(row.get(k) for k in ("scene_key", "solver_version", "solver_code")), asked, row.get("gated"))
     out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
     return now != before or out_of_time or out_of_memory

@@ -21,6 +21,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
 
 from problems.errors import Fault, InputError
+from problems.ladder import PREFIX, rung_names
 from problems.scene import read_toml, scene_names, validation_faults
 from solvers.base import Form
 from solvers.registry import SOLVERS, solver_names
@@ -120,8 +121,10 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
 
 
 def found_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:
-    """The scenes that names, globs and paths (relative to `base`) stand for, each once, in their order."""
-    known = scene_names()
+    """The scenes that names, globs and paths (relative to `base`) stand for, each once, in their order.
+
+    The rungs of the ladders are meant by patterns that begin with "hard/" alone.
+    """
     found: dict[str, None] = {}
     for pattern in map(str, patterns):
         if Path(pattern).suffix in (".toml", ".npz"):
@@ -130,6 +133,7 @@ def found_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: 
                 faults.append(Fault(where, key, pattern, "no such file"))
             found[str(path)] = None
             continue
+        known = rung_names() if pattern.startswith(PREFIX) else scene_names()
         names = [name for name in known if fnmatchcase(name, pattern)]
         if not names:
             faults.append(unknown(where, key, pattern, "scene", known))

@@ -45,6 +45,8 @@ def prepared(scene: Scene, progress: Progress = lambda text, fraction: None) -> 
 
 def load_case(scene: Scene, prepared: Prepared) -> LoadCase:
     """f and g of a scene: the sum of its effects' terms."""
+    if scene.made:
+        return scene.made.load
     if scene.joint is None:
         return read_matrices(dict(scene.matrices))[1]
     f, g = np.zeros(prepared.assembly.n), np.zeros(prepared.assembly.m)
@@ -73,7 +75,9 @@ def _build(scene: Scene, progress: Progress) -> tuple[dict[str, Matrix], dict[st
         seconds[step] = time.perf_counter() - start
         start = time.perf_counter()
 
-    if scene.joint is None:
+    if scene.made:
+        made = scene.made.assembly
+    elif scene.joint is None:
         made = read_matrices(dict(scene.matrices))[0]
     else:
         made = _assemble(scene, scene.joint, progress)
@@ -173,7 +177,8 @@ def _check_independent(Q: Matrix, scene: Scene) -> None:
     if info != 0 or independence.min() < len(Q) * np.finfo(float).eps:
         column = info - 1 if info else int(independence.argmin())
         own = dict(scene.matrices)
-        where, allowed = own.get("problem") or own.get("A"), "must not depend on the columns before it"
+        where = own.get("problem") or own.get("A") or f"scene {scene.name}"
+        allowed = "must not depend on the columns before it"
         raise InputError.one(where, f"A[:, {column}]", "dependent", allowed)
 
 

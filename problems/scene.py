@@ -25,6 +25,7 @@ from .cache import digest
 from .effect import Effect, StiffnessEffect, effect_class, effect_kinds
 from .errors import Fault, InputError
 from .joint import Joint, Table
+from .ladder import PREFIX, Made, Rung, make_rung, rung_names
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE / "scenes"
@@ -34,13 +35,24 @@ MATRIX_KEYS = ("problem", "K", "A", "f", "g")
 
 @dataclass(frozen=True)
 class Scene:
-    """A checked scene: a joint with effects, or the files of a user's own matrices."""
+    """A checked scene: a joint with effects, the files of a user's own matrices, or a ladder's rung."""
 
     name: str
     title: str
     joint: Joint | None = None
     effects: tuple[Effect, ...] = ()
     matrices: tuple[tuple[str, Path], ...] = ()
+    rung: Rung | None = None
+
+    @property
+    def made(self) -> Made | None:
+        """The matrices of a rung that no plates make."""
+        return self.rung.made if self.rung else None
+
+    @property
+    def refused(self) -> str:
+        """Words of the InputError that building a rung is to end with, "" where it is not."""
+        return self.rung.refused if self.rung else ""
 
     @property
     def stiffness_effects(self) -> list[StiffnessEffect]:
@@ -49,6 +61,11 @@ class Scene:
     @property
     def assembly_key(self) -> str:
         """Hash of everything that determines K and A."""
+        if self.made:
+            assembly = self.made.assembly
+            A = assembly.A
+            arrays = (*assembly.blocks, A.data, A.indices, A.indptr)
+            return digest([assembly.n, assembly.m], *(array.tobytes() for array in arrays))
         if self.joint is None:
             keys = [key for key, _ in self.matrices]
             return digest(keys, *(path.read_bytes() for _, path in self.matrices))
@@ -57,12 +74,16 @@ class Scene:
     @property
     def key(self) -> str:
         """Hash of everything that determines K, A, f and g."""
+        if self.made:
+            return digest(self.assembly_key, self.made.load.f.tobytes(), self.made.load.g.tobytes())
         loads = [_plain(effect) for effect in self.effects if not isinstance(effect, StiffnessEffect)]
         return digest(self.assembly_key, loads)
 
     @property
     def expected_size(self) -> tuple[int, int] | None:
         """(n, m) without building anything; None for a user's own matrices."""
+        if self.made:
+            return self.made.assembly.n, self.made.assembly.m
         return self.joint.size if self.joint else None
 
 
@@ -77,6 +98,8 @@ def read_scene(name_or_path: str) -> Scene:
 
     Raises InputError naming the file, the key, the value and what is allowed, all faults at once.
     """
+    if name_or_path.startswith(PREFIX):
+        return _rung_scene(name_or_path)
     path = Path(name_or_path)
     if path.suffix == ".npz":
         if not path.is_file():
@@ -85,11 +108,22 @@ def read_scene(name_or_path: str) -> Scene:
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
-            near = get_close_matches(name_or_path, scene_names(), 3, 0.4) or scene_names()[:5]
-            raise InputError.one("scene", "name", name_or_path, f"no such scene; near it: {', '.join(near)}")
+            raise _no_such(name_or_path, scene_names())
     own = not path.resolve().is_relative_to(SCENES)
     name = path.stem if own else path.resolve().relative_to(SCENES).with_suffix("").as_posix()
     return _scene(name, path, read_toml(path))
+
+
+def _rung_scene(name: str) -> Scene:
+    if name not in rung_names():
+        raise _no_such(name, rung_names())
+    rung = make_rung(name)
+    return Scene(name, rung.title, rung.joint, rung.effects, rung=rung)
+
+
+def _no_such(name: str, known: list[str]) -> InputError:
+    near = get_close_matches(name, known, 3, 0.4) or known[:5]
+    return InputError.one("scene", "name", name, f"no such scene; near it: {', '.join(near)}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -76,6 +76,11 @@ class Answer:
     details: dict[str, Any] = field(default_factory=dict)
 
 
+def failed(cause: str, iterations: int | None = None) -> Answer:
+    """No answer, and why."""
+    return Answer("failed", None, iterations=iterations, details={"cause": cause})
+
+
 class Solver(ABC):
     """Base of all solvers. Options are keyword arguments of the constructor, checked there."""
 

@@ -17,13 +17,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg as sla
+from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from problems.assembly import LoadCase, Matrix, Vector
 from problems.errors import InputError
 
-from .base import FORMS, Answer, Form, Load, Problem, Solver, Status
+from .base import FORMS, Answer, Form, Load, Problem, Solver, Status, failed
 from .goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
+from .growing_factor import GrowingFactor
 
 
 @dataclass(frozen=True)
@@ -53,17 +55,26 @@ class GoldfarbIdnani(Solver):
             raise InputError.one("gi", "max_pivots", max_pivots, "must be positive")
         self.max_pivots = max_pivots
 
-    def prepare(self, data: Problem) -> _Prepared:
-        """G: Q itself, or Q⁻¹ from the Cholesky factor of Q."""
+    def prepare(self, data: Problem) -> _Prepared | Answer:
+        """G: Q itself, or Q⁻¹ by the Cholesky factor of Q; where that cannot be, the answer that says so."""
         if data.form == "primal":
             return _Prepared(data, data.Q, None)
-        U = sla.cholesky(data.Q, check_finite=False)
-        inverse, info = lapack.dpotri(U)
-        if info != 0:
-            raise np.linalg.LinAlgError(f"dpotri returned {info}")
+        try:
+            U = sla.cholesky(data.Q, check_finite=False)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+        inverse, _ = lapack.dpotri(U)
         return _Prepared(data, np.asfortranarray(np.triu(inverse) + np.triu(inverse, 1).T), U)
 
-    def solve(self, ready: _Prepared, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: _Prepared | Answer, load: Load, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
+        try:
+            return self._solved(ready, load, tolerance)
+        except np.linalg.LinAlgError as error:
+            return failed(str(error))
+
+    def _solved(self, ready: _Prepared, load: Load, tolerance: float) -> Answer:
         data = ready.problem
         slacks = _primal_slacks(ready, load) if ready.factor is None else _dual_slacks(ready, load)
         limit = int(self.max_pivots * len(ready.G)) + 10
@@ -75,6 +86,8 @@ class GoldfarbIdnani(Solver):
             details["kkt_residual_mm"] = residual
             if status == "solved":
                 details.pop("cause", None)
+            else:
+                details.setdefault("cause", f"rounding: optimal to {residual:.1e} mm only")
             return Answer(status, lam, None, result.pivots, details=details)
         x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
         return Answer(result.status, result.u, x, result.pivots, details=details)
@@ -84,9 +97,15 @@ def _primal_slacks(ready: _Prepared, load: Load) -> Slacks:
     prepared, A = ready.problem.prepared, ready.problem.assembly.A
 
     def slacks(u: Vector) -> tuple[Vector, Vector]:
-        """s = g − Aᵀx with x = K⁻¹(f − Au) refined, and its size T = |g| + |A|ᵀ|x|."""
-        x = prepared.recover(u, LoadCase(load.f, load.g))
-        return load.g - A.T @ x, abs(load.g) + abs(A).T @ abs(x)
+        """s = g − Aᵀx with x = K⁻¹(f − Au) refined by δ, and T = |g| + |A|ᵀ(|x| + max|δ|/ε).
+
+        δ, the rounding of the first solution, tells what that of the refined one may still be.
+        """
+        b = load.f - A @ u
+        x = prepared.solve_K(b)
+        delta = prepared.solve_K(b - prepared.assembly.multiply_K(x))
+        x = x + delta
+        return load.g - A.T @ x, abs(load.g) + abs(A).T @ (abs(x) + abs(delta).max() / EPS)
 
     return slacks
 
@@ -109,9 +128,22 @@ def _dual_slacks(ready: _Prepared, load: Load) -> Slacks:
 def _on_support(ready: _Prepared, load: Load, lam: Vector, result: GiResult) -> Vector:
     """λ with λ_C = 0 exactly and Q_SS λ_S = p_S refined on the rest S, so that no rounding of λ_C is left.
 
-    With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0).
+    With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). What is then negative, where a
+    contact is closed without a force, goes over to C.
     """
     C = result.active
+    while True:
+        lam = _refined(ready, load, lam, C, result.factor)
+        negative = np.flatnonzero(lam < 0)
+        if not negative.size:
+            return lam
+        for k in negative:
+            d = result.factor.solve_transposed(ready.G[C, k])
+            result.factor.append(d, float(np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))))
+            C = np.append(C, k)
+
+
+def _refined(ready: _Prepared, load: Load, lam: Vector, C: NDArray[np.intp], factor: GrowingFactor) -> Vector:
     lam = lam.copy()
     for _ in range(2):
         lam[C] = 0.0
@@ -119,10 +151,10 @@ def _on_support(ready: _Prepared, load: Load, lam: Vector, result: GiResult) -> 
         r[C] = 0.0
         v = sla.cho_solve((ready.factor, False), r, check_finite=False)
         u = np.zeros_like(v)
-        u[C] = result.factor.solve(result.factor.solve_transposed(v[C]))
+        u[C] = factor.solve(factor.solve_transposed(v[C]))
         lam += v - ready.G @ u
     lam[C] = 0.0
-    return np.maximum(lam, 0.0)
+    return lam
 
 
 def _checked(

@@ -23,6 +23,7 @@ Slacks = Callable[[Vector], tuple[Vector, Vector]]
 
 CANDIDATES = 64  # violated constraints looked at between two products with all of G
 MAX_REFINEMENTS = 20
+FAILED_REFINEMENTS = 2  # that do not help, before the method gives up
 EPS = float(np.finfo(float).eps)
 
 
@@ -43,34 +44,38 @@ class GiResult:
 def goldfarb_idnani(G: Matrix, slacks: Slacks, tolerance: float, max_pivots: int) -> GiResult:
     """Solve from u = 0.
 
-    A slack counts as violated when s_k < −max(tolerance, 4ε T_k). Stops when none is left after a
-    refinement; "inaccurate" when refinements no longer help, "iteration_limit" at max_pivots.
+    A slack counts as violated when s_k < −max(tolerance, 4ε T_k). Once none is after a refinement, and
+    |s_C| is as small, the pivots go on to what rounding alone explains, 4ε T_k, as long as that helps:
+    beside contacts that say nearly the same, a slack within the tolerance can hide a wrong set.
+    "inaccurate" when refinements no longer help, "iteration_limit" at max_pivots.
     """
     state = _State(G, max_pivots)
-    start, size = slacks(state.u)  # Algorithm 1, step 2
-    worst = np.inf
+    size = state.refer_to(slacks)  # Algorithm 1, step 2
+    asked, worst, chances = tolerance, np.inf, FAILED_REFINEMENTS
     for refinements in range(1, MAX_REFINEMENTS + 1):
-        state.pivot_until_feasible(start, np.maximum(tolerance, 4 * EPS * size))  # steps 3 to 12
+        state.pivot_until_feasible(np.maximum(asked, 4 * EPS * size))  # steps 3 to 12
         if state.pivots >= max_pivots:
             return state.result("iteration_limit", refinements - 1)
-        s, size = slacks(state.u)  # Powell: recompute from the original data
-        state.correct(s)
-        s, size = slacks(state.u)
-        start = s - G @ state.u  # carries the rounding of G, which later pivots must not see again
-        limit = np.maximum(tolerance, 4 * EPS * size)
-        violation = max(float((-s - limit).max()), 0.0)
-        if violation == 0.0 and not (state.u < 0).any():
-            return state.result("solved", refinements)
-        if violation >= worst:
-            cause = f"rounding: a slack of {float(s.min()):.1e} remains after refinement"
+        size = state.refine(slacks)
+        violation = state.violation(np.maximum(tolerance, 4 * EPS * size))
+        if violation == 0.0:
+            asked, violation = 0.0, state.violation(4 * EPS * size)
+            if violation == 0.0 or violation >= worst:
+                return state.result("solved", refinements)
+        elif violation >= worst and chances == 0:
+            cause = f"rounding: a slack of {float(state.base.min()):.1e} remains after refinement"
             return state.result("inaccurate", refinements, cause)
-        worst = violation if violation > 0 else worst
-        state.drop_negative()
+        chances -= violation >= worst
+        worst = min(worst, violation)
     return state.result("inaccurate", MAX_REFINEMENTS, "refinement does not settle the active set")
 
 
 class _State:
-    """Multipliers u, the active set C in the order of the factor, and the counts."""
+    """Multipliers u, the active set C in the order of the factor, and the counts.
+
+    base : the slacks of the multipliers u_base, from the original data; s = base + G(u − u_base), so that
+    the rounding of G weighs on what has changed since alone.
+    """
 
     def __init__(self, G: Matrix, max_pivots: int) -> None:
         self.G = G
@@ -87,10 +92,29 @@ class _State:
         u = np.maximum(self.u, 0.0)
         return GiResult(status, u, active, self.factor, self.pivots, self.drops, refinements, reason)
 
-    def pivot_until_feasible(self, start: Vector, limit: Vector) -> None:
-        """Add violated constraints, worst first, until s = start + Gu ≥ −limit."""
+    def refer_to(self, slacks: Slacks) -> Vector:
+        """Take the slacks of u from the original data; returns the size of their terms."""
+        self.base, size = slacks(self.u)
+        self.u_base = self.u.copy()
+        return size
+
+    def refine(self, slacks: Slacks) -> Vector:
+        """Powell: s from the original data, and u_C so that s_C = 0; drops what is then negative in u."""
+        while True:
+            self.correct(slacks(self.u)[0])
+            if not (self.u < 0).any():
+                return self.refer_to(slacks)
+            self.drop_negative()
+
+    def violation(self, limit: Vector) -> float:
+        """How far s_C from zero, or any other slack below it, is outside the limit."""
+        away = np.where(self.is_active, abs(self.base), -self.base) - limit
+        return max(float(away.max()), 0.0)
+
+    def pivot_until_feasible(self, limit: Vector) -> None:
+        """Add violated constraints, worst first, until s ≥ −limit."""
         while self.pivots < self.max_pivots:
-            s = start + self.G @ self.u
+            s = self.base + self.G @ (self.u - self.u_base)
             s[self.is_active] = 0.0
             violated = np.flatnonzero(s < -limit)
             if not violated.size:
@@ -98,7 +122,7 @@ class _State:
             worst = violated[np.argsort(s[violated])[:CANDIDATES]]
             rows = self.G[:, worst].T  # G is symmetric
             while self.pivots < self.max_pivots:
-                s = start[worst] + rows @ self.u
+                s = self.base[worst] + rows @ (self.u - self.u_base)
                 s[self.is_active[worst]] = 0.0
                 pick = int(np.argmin(s + limit[worst]))
                 if s[pick] >= -limit[worst[pick]]:

@@ -15,13 +15,16 @@ import numpy as np
 from problems.assembly import LoadCase, Vector
 from problems.errors import Fault, InputError
 
-from .base import Answer, Form, Load, Problem, Solver, Status
+from .base import Answer, Form, Load, Problem, Solver, Status, failed
 from .infeasible_start import mehrotra_start, stp1, stp2
 from .newton_system import SYSTEMS, Direct, OpenLast, Pcg
 from .schemes import SCHEMES, CgExhausted, Newton, Point
 from .start import NoStart, Start, algorithm_4, algorithm_5
 
 STALLED = 10  # iterations without progress before the method gives up
+RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
+TOUCH = 1e-9  # mm: so near is touching, where a contact closes without a force
+EPS = float(np.finfo(float).eps)
 
 StartName = Literal["algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra"]
 Ordering = Literal["lexicographic", "open_last"]
@@ -38,11 +41,17 @@ class Ipm(Solver):
 
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ feasibility with
     s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance asked for; the paper tests μ alone, because it
-    solves its systems exactly.
+    solves its systems exactly. No feasibility is asked for below the rounding of Qλ − p, which is at most
+    4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). And it goes on until each contact is closed or open to
+    that or 1e-9 mm, min(y_i, q_ii λ_i): one that touches without a force stands off by √(μ q_ii).
+
+    Where the iteration stalls, because what inexact systems leave in s1 outlasts y or because a step ended
+    too near to the boundary, it begins anew with a smaller cg_tolerance and theta (details: restarts).
 
     Options
     -------
-    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra.
+    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra. Where the first two find no
+        feasible point, Mehrotra's, which need not be one (details: start_instead).
     scheme : algorithm_3 as printed; algorithm_2, with a fixed σ; mehrotra, the textbook's.
     preconditioner : V, U, none, splitting; direct is a Cholesky factorisation of every H instead.
     ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by growing D.
@@ -103,21 +112,34 @@ class Ipm(Solver):
         self.max_iterations = max_iterations
         self.max_cg = max_cg
 
-    def prepare(self, data: Problem) -> _Ready:
-        """What is factored of Q once."""
-        return _Ready(data, self.make_system(data.Q))
+    def prepare(self, data: Problem) -> _Ready | Answer:
+        """What is factored of Q once; where that cannot be, the answer that says so."""
+        try:
+            return _Ready(data, self.make_system(data.Q))
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
 
-    def solve(self, ready: _Ready, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
         Q, system = ready.problem.Q, ready.system
         system.begin()
         newton = Newton(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
+        details: dict[str, Any] = {"cg": newton.counts}
         try:
-            start = self._start(ready.problem, load)  # Algorithm 3, step 2
-        except NoStart as error:
-            return Answer("failed", None, iterations=0, details={"cause": str(error)})
-        point = newton.at(start.lam, start.y)  # step 3
-        details: dict[str, Any] = {"cg": newton.counts, "start": _about(start, point)}
-        status, cause, point = self._iterate(newton, point, tolerance)
+            start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
+        except (NoStart, np.linalg.LinAlgError) as error:
+            return failed(str(error), iterations=0)
+        first = newton.at(start.lam, start.y)  # step 3
+        details["start"] = _about(start, first)
+        status, cause, point = self._iterate(newton, first, tolerance)
+        for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
+            if status != "inaccurate":
+                break
+            newton.cg_tolerance = min(newton.cg_tolerance, cg_tolerance)
+            newton.theta = min(newton.theta, theta)
+            status, cause, point = self._iterate(newton, first, tolerance)
+            details["restarts"] = restart
         if newton.unconverged:
             details["cg_unconverged"] = newton.unconverged
         details |= {"mu": point.mu, "infeasibility": point.infeasibility}
@@ -130,28 +152,37 @@ class Ipm(Solver):
             details=details,
         )
 
-    def _start(self, problem: Problem, load: Load) -> Start:
+    def _start(self, problem: Problem, load: Load, details: dict[str, Any]) -> Start:
         match self.start:
-            case "algorithm_4":
-                return algorithm_4(problem.prepared, LoadCase(load.f, load.g))
             case "stp1":
                 return stp1(problem.Q, load.p, self.rho)
             case "stp2":
                 return stp2(problem.Q, load.p, self.rho, self.epsilon)
             case "mehrotra":
                 return mehrotra_start(problem.Q, load.p)
-        return algorithm_5(problem.Q, load.p)
+        try:
+            if self.start == "algorithm_4":
+                return algorithm_4(problem.prepared, LoadCase(load.f, load.g))
+            return algorithm_5(problem.Q, load.p)
+        except NoStart as error:
+            details["start_instead"] = f"mehrotra, because {error}"
+            return mehrotra_start(problem.Q, load.p)
 
     def _iterate(self, newton: Newton, point: Point, tolerance: float) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8; the last finite point with what is to be said of it."""
         smallest, stalled = np.inf, 0
         for _ in range(self.max_iterations):  # step 4
-            if point.mu <= tolerance and point.infeasibility <= self.feasibility:
+            rounding = _rounding(newton, point.lam)
+            measure = max(
+                point.mu / tolerance,
+                point.infeasibility / max(self.feasibility, rounding),
+                _undecided(newton, point) / max(TOUCH, rounding),
+            )
+            if measure <= 1:
                 return "solved", "", point
-            measure = max(point.mu / tolerance, point.infeasibility / self.feasibility)
             stalled = 0 if measure < smallest else stalled + 1
             smallest = min(smallest, measure)
-            if stalled == STALLED:
+            if stalled == STALLED or point.mu == 0.0:
                 why = f"{newton.unconverged} systems of unconverged CG" if newton.unconverged else "rounding"
                 return "inaccurate", f"{why}: {smallest:.1e} × what was asked for, and no less", point
             try:
@@ -173,6 +204,17 @@ def _about(start: Start, point: Point) -> dict[str, float]:
         "corrections": start.corrections,
         "multiplications": start.multiplications,
     }
+
+
+def _undecided(newton: Newton, point: Point) -> float:
+    """max min(y_i, q_ii λ_i): how far from closed and from open a contact may be, mm."""
+    return float(np.minimum(point.y, np.diag(newton.Q) * point.lam).max())
+
+
+def _rounding(newton: Newton, lam: Vector) -> float:
+    """What rounding may leave in Qλ − p, mm."""
+    root = np.sqrt(np.diag(newton.Q))
+    return 4 * EPS * float((abs(newton.p) + root * (root @ lam)).max())
 
 
 def _is_inside(point: Point) -> bool:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as sla
+import scipy.sparse as sp
 from scipy.optimize import nnls
 
+from problems.assembly import Assembly, LoadCase, Prepared
+from solvers.base import Answer, Form, Load, Problem
+from solvers.gi import GoldfarbIdnani
 from solvers.goldfarb_idnani import goldfarb_idnani
 from solvers.growing_factor import BLOCK, GrowingFactor
 
@@ -104,3 +108,29 @@ def test_the_limit_on_pivots_is_kept_and_said() -> None:
     result = goldfarb_idnani(G, lambda u: (-np.ones(50) + G @ u, np.ones(50)), 1e-12, 5)
     assert result.status == "iteration_limit"
     assert result.pivots == 5
+
+
+def two_contacts_of_one_node(Q: np.ndarray, form: Form) -> Answer:
+    """A spring of 1 N/mm pulled by 1 N towards two stops at 0.5 and 0.25 mm: x = 0.25 mm, λ = (0, 0.75) N."""
+    A = sp.csc_array(np.array([[1.0, 1.0]]))
+    prepared = Prepared(Assembly((np.eye(1),), A), (np.eye(1),), Q)
+    f, g = np.array([1.0]), np.array([0.5, 0.25])
+    load = Load(f, g, prepared.dual_load(LoadCase(f, g)))
+    solver = GoldfarbIdnani()
+    return solver.solve(solver.prepare(Problem(prepared, form)), load, 1e-10)
+
+
+def test_contacts_that_say_the_same_are_no_hindrance_in_the_primal_form() -> None:
+    answer = two_contacts_of_one_node(np.ones((2, 2)), "primal")
+    assert answer.status == "solved"
+    assert (answer.x, answer.lam) == (pytest.approx([0.25]), pytest.approx([0.0, 0.75]))
+
+
+INDEFINITE = [(np.ones((2, 2)), "dual"), (-np.eye(2), "dual"), (-np.eye(2), "primal")]
+
+
+@pytest.mark.parametrize(("Q", "form"), INDEFINITE)
+def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(Q: np.ndarray, form: Form) -> None:
+    answer = two_contacts_of_one_node(Q, form)
+    assert (answer.status, answer.lam) == ("failed", None)
+    assert "definite" in answer.details["cause"]

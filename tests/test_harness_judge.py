@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from harness.judge import Judgement, judge
+from harness.judge import Judgement, conditioned_limit, judge
 from harness.reference import Reference
 from problems.assembly import Assembly, LoadCase, Prepared
 
@@ -27,7 +27,7 @@ def judged(x: np.ndarray, lam: np.ndarray, bound_mm: float = 1e-15) -> Judgement
 
 
 def test_the_exact_answer() -> None:
-    assert judged(X, LAM) == Judgement("within", 1e-15, 0.0, 0, 0.0, 0.0, 0.0, 0.0)
+    assert judged(X, LAM) == Judgement("within", 1e-15, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def test_an_answer_without_contact() -> None:
@@ -39,6 +39,8 @@ def test_an_answer_without_contact() -> None:
     assert found.dual_residual == 0.0
     assert found.duality_gap == 0.0  # xᵀKx − fᵀx = 5 − 5
     assert found.contact_mismatch == 0  # overlapping is closed
+    # F = 2·1.5 + 3 + 1·0 = 6 N and G = 2·1.5 + 0.5 = 3.5 mm: the overlap of 1.5 mm is what is left.
+    assert found.backward_error == pytest.approx(1.5 / 3.5)
 
 
 def test_an_answer_that_stays_open_with_a_pulling_force() -> None:
@@ -48,6 +50,8 @@ def test_an_answer_that_stays_open_with_a_pulling_force() -> None:
     assert found.primal_residual == 0.0
     assert found.dual_residual == pytest.approx(1.85)  # |1.4 − 3 − 0.25|, above max(0, −λ) = 0.25
     assert found.duality_gap == pytest.approx(abs(2 * 0.58 - 1.8 - 0.125))
+    # F = 2·0.7 + 3 + 1·0.25 = 4.65 N: 1.85 N are out of balance.
+    assert found.backward_error == pytest.approx(1.85 / 4.65)
 
 
 @pytest.mark.parametrize(("shift", "verdict"), [(0.9e-7, "within"), (2e-7, "outside")])
@@ -69,3 +73,27 @@ def test_no_answer(x: list[float]) -> None:
 def test_displacements_without_forces() -> None:
     found = judged(X, np.array([np.nan]))
     assert (found.verdict, found.dual_residual, found.duality_gap) == ("within", None, None)
+    assert found.backward_error is None
+
+
+def test_lengths_in_other_units_are_judged_in_millimetres() -> None:
+    """The first unknown in units of 2 mm, the gap in units of 1/4 mm."""
+    springs = (np.array([[8.0]]), np.array([[2.0]]))
+    assembly = Assembly(springs, sp.csc_array([[8.0], [-4.0]]))
+    prepared = Prepared(assembly, (np.array([[8**0.5]]), np.array([[2**0.5]])), np.array([[16.0]]))
+    load = LoadCase(np.array([6.0, -1.0]), np.array([2.0]))
+    units = {"unit_mm": np.array([2.0, 1.0]), "gap_unit_mm": np.array([0.25])}
+    x, lam = X / units["unit_mm"], LAM / 4
+    reference = Reference(x, lam, np.array([True]), 1e-15, "by hand", **units)
+    assert judge(prepared, load, reference, x, lam, 1e-7).backward_error == 0.0
+    found = judge(prepared, load, reference, x - [1e-3, 0.0], lam, 1e-7)
+    assert (found.verdict, found.contact_mismatch) == ("outside", 1)
+    assert found.displacement_error_mm == pytest.approx(2e-3)
+    small = judge(prepared, load, reference, x - [0.4e-7, 0.0], lam, 1e-7)
+    assert (small.verdict, small.contact_mismatch) == ("within", 0)
+
+
+@pytest.mark.parametrize(("condition", "limit"), [(1e4, 1e-7), (1e12, 100 * 1e12 / 2**53 * 3)])
+def test_the_limit_that_conditioning_allows(condition: float, limit: float) -> None:
+    assert conditioned_limit(1e-7, condition, 3.0) == pytest.approx(limit)
+

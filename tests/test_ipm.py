@@ -132,6 +132,39 @@ def test_the_textbook_corrector_meets_the_second_order_products() -> None:
     assert state.system.factorisations == 1  # one matrix for both directions
 
 
+@pytest.mark.parametrize("system", ["V", "direct"])
+def test_a_start_anew_with_shorter_steps_frees_what_has_jammed(
+    system: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Algorithm 3 takes its predictor step to 0.5 % of the boundary, and here it cannot leave it again."""
+    Q = np.array([[0.571432186, 8.92851495e-3], [8.92851495e-3, 1.39509811e-4]])
+    p = np.array([1.28726556, 0.02011341])
+    answer = solved(Q, p, preconditioner=system)
+    assert (answer.status, answer.details["restarts"]) == ("solved", 1)
+    np.testing.assert_allclose(Q @ answer.lam, p, atol=1e-10)
+    assert (answer.lam > 0).all()
+    monkeypatch.setattr("solvers.ipm.RESTARTS", ())
+    assert solved(Q, p, preconditioner=system).status == "inaccurate"
+
+
+@pytest.mark.parametrize("compliance", [1.0, 1e4])
+def test_a_contact_that_touches_without_a_force_is_not_left_standing_off(compliance: float) -> None:
+    """At μ = 1e-14 N·mm alone it would keep a gap of √(μ q), 1e-5 mm here where q = 1e4 mm/N."""
+    answer = solved(np.diag([compliance, compliance]), np.array([0.0, 1.0]))
+    assert answer.status == "solved"
+    np.testing.assert_allclose(np.array([1.0, 1.0]) * compliance * answer.lam, [0.0, 1.0], atol=2e-9)
+
+
+def test_no_feasibility_is_asked_for_below_rounding() -> None:
+    Q = definite(20, 6, condition=1e3)
+    p = 1e12 * np.random.default_rng(6).standard_normal(20)
+    answer = solved(Q, p, tolerance=1.0)
+    assert answer.status == "solved"
+    assert answer.lam is not None
+    size = abs(p).max() + abs(Q).max() * answer.lam.sum()
+    assert 1e-10 < answer.details["infeasibility"] < 1e-15 * size
+
+
 def test_too_few_iterations_are_said() -> None:
     answer = solved(definite(25, 0), np.ones(25), max_iterations=2)
     assert answer.status == "iteration_limit"
@@ -149,20 +182,32 @@ def test_a_start_that_cannot_be_made_is_a_failure_that_says_so() -> None:
     answer = solved(-np.eye(4), np.ones(4), preconditioner="none")
     assert answer.status == "failed"
     assert answer.lam is None
-    assert "no λ > 0" in answer.details["cause"]
+    assert "definite" in answer.details["cause"]
 
 
-def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
-    with pytest.raises(np.linalg.LinAlgError, match="positive definite"):
-        solved(np.diag([1.0, -1.0]), np.ones(2))
+def test_where_no_feasible_start_is_found_another_is_taken() -> None:
+    """Two contacts that close each other's gap: Qλ > 0 only for λ₁ between 1.072 and 1.076 λ₂."""
+    Q = np.array([[0.00464895, -0.00498223], [-0.00498223, 0.00536092]])
+    answer = solved(Q, np.array([3.2364333, -3.81448455]))
+    assert answer.status == "solved"
+    assert "no λ > 0" in answer.details["start_instead"]
+    np.testing.assert_allclose(Q @ answer.lam, [3.2364333, -3.4684], atol=1e-3)
 
 
-def test_conjugate_gradients_that_stagnate_are_named() -> None:
-    """Asked for more than rounding allows, it says what held it up and does not call itself solved."""
-    Q = definite(40, 0, condition=1e8)
-    without = {"start": "stp1", "preconditioner": "none"}
-    answer = solved(Q, np.ones(40), **without, cg_tolerance=1e-15, feasibility=1e-18)
+@pytest.mark.parametrize("system", ["V", "direct"])
+@pytest.mark.parametrize("start", ["algorithm_5", "mehrotra"])
+def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(system: str, start: str) -> None:
+    answer = solved(np.diag([1.0, -2.0]), np.ones(2), preconditioner=system, start=start)
+    assert (answer.status, answer.lam) == ("failed", None)
+    assert answer.details["cause"]
+
+
+def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a step it does not call itself solved, and says what held it up."""
+    monkeypatch.setattr("solvers.newton_system.LIMIT", 0)
+    answer = solved(definite(40, 0), np.ones(40))
     assert answer.status == "inaccurate"
+    assert answer.details["restarts"] == 2
     assert answer.details["cg_unconverged"] > 0
     assert "unconverged CG" in answer.details["cause"]
 

@@ -49,6 +49,9 @@ class Faulty(Solver):
         while True:
             pass
 
+    def sleep(self, lam):
+        time.sleep(60)
+
     def signal(self, lam):
         os.kill(os.getpid(), signal.SIGSEGV)
 
@@ -109,6 +112,40 @@ class Faulty(Solver):
 
     def raises(self, lam):
         raise ValueError("no step")
+
+    def kill_itself(self, lam):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def stop_itself(self, lam):
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+    def abort(self, lam):
+        os.abort()
+
+    def recurse(self, lam):
+        return self.recurse(lam)
+
+    def close_everything(self, lam):
+        os.closerange(0, 1024)
+        return Answer("solved", lam)
+
+    def write_everywhere(self, lam):
+        for fd in range(1, 64):
+            try:
+                os.write(fd, bytes([10]).join([b"nonsense", b"[1]", bytes(range(256)), b""]))
+            except OSError:
+                pass
+        return Answer("iteration_limit", None)
+
+    def fork_on_and_on(self, lam):
+        if os.fork() == 0:
+            for _ in range(4000):  # some ten seconds
+                if os.fork():
+                    os._exit(0)
+                os.setsid()
+                time.sleep(0.002)
+            os._exit(0)
+        time.sleep(60)
 """
 
 

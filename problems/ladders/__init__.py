@@ -1,0 +1,1 @@
+"""Ladders: each file is one way in which a problem grows hard."""

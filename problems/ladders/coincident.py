@@ -1,0 +1,37 @@
+"""Two nodes of a part that nearly coincide: a spring between them, ever stiffer than the part."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ..assembly import Assembly, LoadCase
+from ..ladder import Ladder, Made, Rung
+from ..manufactured import frame, solved, spectrum
+
+N = 64  # unknowns a part
+CONDITION = 1e4
+
+
+def _rung(bits: int) -> Rung:
+    d = spectrum(N, CONDITION)
+    made = solved(frame(d, d), seed=4)
+    spring = 2.0**bits  # N/mm; the part's largest eigenvalue is 64e4
+    return Rung(f"Two parts, two nodes tied by {spring:.0e} N/mm", made=_tied(made, spring))
+
+
+def _tied(made: Made, spring: float) -> Made:
+    """K += k bbᵀ and f += k b(bᵀx) with b = e₀ − e₁: the same answer, still without rounding."""
+    assert made.x is not None
+    b = np.zeros(N)
+    b[:2] = 1.0, -1.0
+    first, *others = made.assembly.blocks
+    blocks = (np.asfortranarray(first + spring * np.outer(b, b)), *others)
+    f = made.load.f.copy()
+    f[:N] += spring * b * (b @ made.x[:N])
+    assembly = Assembly(blocks, made.assembly.A, None, made.assembly.parts)
+    return Made(assembly, LoadCase(f, made.load.g), made.x, made.lam)
+
+
+RUNGS: Ladder = {f"{2.0**bits:.0e}": partial(_rung, bits) for bits in (22, 27, 32, 37, 42, 45)}

@@ -1,0 +1,29 @@
+"""Two parts whose spectrum is spread ever wider: cond(K) from 1e6 to 1e14."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from ..ladder import Ladder, Made, Rung
+from ..manufactured import frame, solved, spectrum
+
+N = 64  # unknowns a part
+
+
+def _rung(condition: float) -> Rung:
+    d = spectrum(N, condition)
+    return Rung(f"Two parts, cond(K) = {condition:g}", made=solved(frame(d, d), seed=1))
+
+
+def _beyond(condition: float) -> Rung:
+    """Its K is no longer exact, which is of no consequence where it is refused."""
+    d = spectrum(N, condition)
+    base = frame(d, d)
+    made = Made(base.assembly(), solved(frame(d[:1], d[:1]), seed=1).load)
+    return Rung(f"Two parts, cond(K) = {condition:g}", made=made, refused="K must be positive definite")
+
+
+RUNGS: Ladder = {
+    **{f"{condition:.0e}": partial(_rung, condition) for condition in (1e6, 1e8, 1e10, 1e12, 1e13, 9e13)},
+    "1e+16": partial(_beyond, 1e16),
+}

@@ -1,0 +1,34 @@
+"""Parts that contact alone would hold: K is singular, and the model says so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..ladder import Ladder, Made, Rung, plates
+from ..manufactured import frame, solved, spectrum
+from .parts import FASTENERS, GAP, HELD, JUNCTION
+
+REFUSED = "K must be positive definite"
+
+
+def _on_a_part() -> Rung:
+    parts = [HELD | {"name": "clamped"}, {"name": "floating", "thickness": 6.0}]
+    joint = {"junction": JUNCTION, "part": parts}
+    return plates("A free plate against a clamped one", joint, GAP, FASTENERS, refused=REFUSED)
+
+
+def _on_a_tool() -> Rung:
+    part = {"name": "floating", "thickness": 6.0}
+    joint = {"junction": JUNCTION, "part": [part], "contacts": (("floating", "tool"),)}
+    return plates("A free plate against a rigid tool", joint, GAP, FASTENERS, refused=REFUSED)
+
+
+def _singular() -> Rung:
+    d = spectrum(16, 1e4)
+    made = solved(frame(d, d), seed=13)
+    free = np.concatenate([[0.0], d[1:]])
+    made = Made(frame(d, free).assembly(), made.load)
+    return Rung("A part that can move without strain", made=made, refused=REFUSED)
+
+
+RUNGS: Ladder = {"on-a-part": _on_a_part, "on-a-tool": _on_a_tool, "matrix": _singular}

@@ -1,0 +1,24 @@
+"""All at once: cond(K) grows, a quarter of the contacts touch without a force, each in a unit of its own."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ..ladder import Ladder, Rung
+from ..manufactured import Shares, frame, solved, spectrum
+from .units import rescaled
+
+N = 64  # contacts
+
+
+def _rung(condition: float) -> Rung:
+    d = spectrum(N, condition)
+    made = solved(frame(d, d), seed=14, shares=Shares(0.4, 0.25))
+    C = np.exp2(np.random.default_rng(15).integers(-5, 6, N))
+    title = f"Two parts, cond(K) = {condition:g}, contacts without a force and in units of their own"
+    return Rung(title, made=rescaled(made, 1.0, C, 1.0))
+
+
+RUNGS: Ladder = {f"{condition:.0e}": partial(_rung, condition) for condition in (1e4, 1e6, 1e8, 1e10, 1e12)}

@@ -1,0 +1,61 @@
+"""The same problem in other units, and with its unknowns and contacts each in a unit of its own.
+
+Powers of two stand for the thousands (1024 mm for a metre), so that nothing is rounded.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..assembly import Assembly, LoadCase, Vector
+from ..ladder import Ladder, Made, Rung
+from ..manufactured import frame, solved, spectrum
+
+N = 64  # unknowns a part
+CONDITION = 1e6
+KILO, MEGA = 2.0**10, 2.0**20
+
+
+def _problem() -> Made:
+    d = spectrum(N, CONDITION)
+    return solved(frame(d, d), seed=5)
+
+
+def _rung(title: str, S: Vector | float = 1.0, C: Vector | float = 1.0, v: float = 1.0) -> Rung:
+    return Rung(f"Two parts, {title}", made=rescaled(_problem(), S, C, v))
+
+
+def _random(title: str, unknowns: int, contacts: int) -> Rung:
+    """Scalings from 2^−k to 2^k."""
+    random = np.random.default_rng(6)
+    S = np.exp2(random.integers(-unknowns, unknowns + 1, 2 * N))
+    return _rung(title, S, np.exp2(random.integers(-contacts, contacts + 1, N)))
+
+
+def rescaled(made: Made, S: Vector | float, C: Vector | float, v: float) -> Made:
+    """In x' = S⁻¹x, λ' = C⁻¹λ/v: K' = SKS/v, A' = SAC, f' = Sf/v, g' = Cg. S, C and v powers of two."""
+    assert made.x is not None
+    assert made.lam is not None
+    n, m = made.assembly.n, made.assembly.m
+    S, C = np.broadcast_to(S, n), np.broadcast_to(C, m)
+    parts = zip(made.assembly.blocks, made.assembly.slices, strict=True)
+    blocks = tuple(np.asfortranarray(S[rows, None] * K * S[rows] / v) for K, rows in parts)
+    A = sp.csc_array(sp.diags_array(S) @ made.assembly.A @ sp.diags_array(C))
+    load = LoadCase(S * made.load.f / v, C * made.load.g)
+    assembly = Assembly(blocks, A, None, made.assembly.parts)
+    return Made(assembly, load, made.x / S, made.lam / (C * v), S.copy(), 1 / C)
+
+
+RUNGS: Ladder = {
+    "mm-N": partial(_rung, "mm and N"),
+    "mm-kN": partial(_rung, "mm and 1024 N", v=KILO),
+    "mm-MN": partial(_rung, "mm and 1024² N", v=MEGA),
+    "m-N": partial(_rung, "1024 mm and N", S=KILO, C=1 / KILO, v=KILO),
+    "um-N": partial(_rung, "1/1024 mm and N", S=1 / KILO, C=KILO, v=1 / KILO),
+    "unknowns": partial(_random, "each unknown in a unit of its own, 1/16 to 16 mm", 4, 0),
+    "contacts": partial(_random, "each contact in a unit of its own, 1/1024 to 1024 mm", 0, 10),
+    "both": partial(_random, "each unknown and contact in a unit of its own", 4, 10),
+}

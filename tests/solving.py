@@ -1,0 +1,56 @@
+"""Every solver of the registry in each of its forms, and how far from the answer it may end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from problems.assembly import LoadCase, Prepared, Vector
+from solvers.base import Answer, Form, Load, Problem
+from solvers.registry import make_solver, solver_names
+
+CASES: list[tuple[str, Form]] = [
+    (name, form) for name in solver_names() for form in make_solver(name, {}).forms
+]
+IN_HOUSE = [(name, form) for name, form in CASES if name in ("ipm", "gi")]
+
+#: The tolerance handed over; 1e-9 to the others.
+TOLERANCES = {"ipm": 1e-14, "gi": 1e-10}
+
+#: These end with the right contact set and solve its equations: no tolerance is left in their answer.
+ACTIVE_SET = ("gi", "quadprog", "daqp")
+
+
+def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Answer, Vector | None]:
+    """The solver's answer, and its displacements where it has any."""
+    solver, tolerance = make_solver(name, {}), TOLERANCES.get(name, 1e-9)
+    load = Load(case.f, case.g, prepared.dual_load(case))
+    state = solver.prepare(solver.convert(Problem(prepared, form)))
+    answer = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
+    if answer.lam is None or form == "primal":
+        return answer, answer.x
+    return answer, prepared.recover(answer.lam, case)
+
+
+def eigenvalues(prepared: Prepared) -> tuple[float, float]:
+    """λmin and λmax of K."""
+    values = [np.linalg.eigvalsh(K) for K in prepared.assembly.blocks]
+    return min(float(v[0]) for v in values), max(float(v[-1]) for v in values)
+
+
+def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vector) -> float:
+    """max|x − x*|, mm, that cond(K) and the solver's tolerance τ explain.
+
+    100 cond(K) 2⁻⁵³ max(|x|, |K⁻¹f|), x being what is left of K⁻¹f − K⁻¹Aλ; and besides
+    (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and sᵀλ ≤ τ(m + Σλ): the bound that
+    harness/certificate.py derives. Clarabel's τ is a share of the data where that is above 1.
+    """
+    low, high = eigenvalues(prepared)
+    size = max(float(abs(v).max(initial=0.0)) for v in (x, prepared.solve_K(case.f)))
+    conditioning = 100 * high / low * 2.0**-53 * size
+    if name in ACTIVE_SET:
+        return conditioning
+    tau = 1e-10 if name == "ipm" else TOLERANCES.get(name, 1e-9)
+    if name == "clarabel":
+        tau *= max(1.0, float(abs(case.f).max()))
+    residual = tau * np.sqrt(prepared.assembly.n / low)
+    return conditioning + float((residual + np.sqrt(tau * (prepared.assembly.m + lam.sum()))) / np.sqrt(low))

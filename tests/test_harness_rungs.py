@@ -1,0 +1,84 @@
+"""Rungs of the ladders in a run: judged by what conditioning allows, and refused where the model refuses."""
+
+from __future__ import annotations
+
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from harness import records
+from harness.gate import gate
+from harness.plan import Overrides, expand, overridden
+from harness.run import run
+from harness.suite import Suite, read_suite
+from problems.errors import InputError
+
+WIDE, REFUSED = "hard/conditioning/1e+10", "hard/duplicates/copies"
+
+
+@pytest.fixture(scope="module")
+def suite() -> Suite:
+    only = Overrides(scenes=(WIDE, REFUSED), solvers=("gi",), forms=("primal",))
+    return overridden(read_suite("hard"), only)
+
+
+@pytest.fixture(scope="module")
+def directory(suite: Suite, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("rungs")
+    assert run(suite, directory, Console(file=StringIO())) == 0
+    return directory
+
+
+def test_the_limit_of_a_rung_is_what_conditioning_allows(directory: Path) -> None:
+    (row,) = records.read(directory / records.MEASUREMENTS)
+    problems = {problem["scene"]: problem for problem in records.read(directory / "problems.jsonl")}
+    with np.load(directory / row["answer"]) as saved:
+        largest = abs(saved["x"]).max()
+    assert row["limit_asked_mm"] == 1e-7
+    assert row["limit_mm"] == pytest.approx(100 * problems[WIDE]["cond_K"] * 2.0**-53 * largest, rel=1e-6)
+    assert row["verdict"] == "within"
+    assert row["backward_error"] < 1e-7
+    assert problems[WIDE]["reference_bound_mm"] == 0.0
+
+
+def test_a_refused_rung_is_recorded_and_not_measured(directory: Path, suite: Suite) -> None:
+    assert REFUSED in suite.scenes
+    assert {m.scene for m in expand(suite)} == {WIDE}
+    problems = {problem["scene"]: problem for problem in records.read(directory / "problems.jsonl")}
+    assert "must not depend on the columns before it" in problems[REFUSED]["refused"]
+    assert "refused" not in problems[WIDE]
+
+
+def test_running_again_measures_nothing_twice(directory: Path, suite: Suite) -> None:
+    before = (directory / records.MEASUREMENTS).read_bytes()
+    console = Console(file=StringIO())
+    assert run(suite, directory, console) == 0
+    assert (directory / records.MEASUREMENTS).read_bytes() == before
+
+
+@pytest.mark.parametrize(("share", "code"), [(0.9, 0), (1.1, 1)])
+def test_the_gate_makes_out_the_limit_itself(directory: Path, share: float, code: int) -> None:
+    (row,) = records.read(directory / records.MEASUREMENTS)
+    with np.load(directory / row["answer"]) as saved:
+        x, lam = saved["x"].copy(), saved["lam"]
+    moved = x.copy()
+    moved[5] += share * row["limit_mm"]
+    try:
+        np.savez(directory / row["answer"], x=moved, lam=lam)
+        said = Console(file=StringIO(), width=200)
+        assert gate(directory, said) == code
+        assert ("within their limits" in said.file.getvalue()) == (code == 0)  # type: ignore[attr-defined]
+    finally:
+        np.savez(directory / row["answer"], x=x, lam=lam)
+
+
+def test_rungs_are_meant_by_their_prefix_alone() -> None:
+    suite = read_suite("gate")
+    assert not any(name.startswith("hard/") for name in overridden(suite, Overrides(scenes=("*",))).scenes)
+    some = overridden(suite, Overrides(scenes=("hard/parts/*",))).scenes
+    assert "hard/parts/one-node" in some
+    with pytest.raises(InputError, match="hard/conditioning/1e"):
+        overridden(suite, Overrides(scenes=("hard/conditioning/1e+07",)))

@@ -1,0 +1,153 @@
+"""The ladders: their answers are exact, what cannot be taken is refused, and the in-house solvers hold."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.ground import Ground, ground
+from harness.judge import judge
+from harness.plan import expand
+from harness.reference import refined_active_set
+from harness.suite import read_suite
+from problems.build import prepared
+from problems.errors import InputError
+from problems.ladder import Made, make_rung, rung_names
+from problems.manufactured import spectrum
+from problems.scene import read_scene, scene_names
+from solvers.base import Form, Load, Problem
+from solvers.registry import make_solver
+
+RUNGS = rung_names()
+TAKEN = [name for name in RUNGS if not make_rung(name).refused]
+REFUSED = [name for name in RUNGS if make_rung(name).refused]
+EXACT = [name for name in TAKEN if (made := make_rung(name).made) and made.x is not None]
+IN_HOUSE: list[tuple[str, Form, float]] = [
+    ("ipm", "dual", 1e-14),
+    ("gi", "dual", 1e-10),
+    ("gi", "primal", 1e-10),
+]
+
+
+@cache
+def opened(name: str) -> Ground:
+    return ground(name)
+
+
+def whole(values: Any) -> Any:
+    """Whole numbers that are 2¹⁴⁰ times the values, exactly."""
+    exact = [Fraction(float(v)) * 2**140 for v in np.asarray(values).ravel()]
+    assert all(v.denominator == 1 for v in exact)
+    return np.array([v.numerator for v in exact], dtype=object).reshape(np.shape(values))
+
+
+def made_of(name: str) -> Made:
+    made = make_rung(name).made
+    assert made is not None
+    return made
+
+
+def test_there_are_enough_rungs_and_none_twice() -> None:
+    assert len(TAKEN) >= 60
+    assert len({read_scene(name).key for name in RUNGS}) == len(RUNGS)
+    assert not set(RUNGS) & set(scene_names())
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_answer_satisfies_the_optimality_conditions_without_rounding(name: str) -> None:
+    made = made_of(name)
+    A, (x, lam, f, g) = whole(made.assembly.A.toarray()), map(whole, (made.x, made.lam, *load_of(made)))
+    parts = zip(made.assembly.blocks, made.assembly.slices, strict=True)
+    Kx = np.concatenate([whole(K) @ x[rows] for K, rows in parts])
+    y = g * 2**140 - A.T @ x
+    assert (Kx + A @ lam == f * 2**140).all()
+    assert (lam >= 0).all()
+    assert (y >= 0).all()
+    assert not (lam * y).any()
+    assert all((K == K.T).all() for K in made.assembly.blocks)
+
+
+def load_of(made: Made) -> tuple[Any, Any]:
+    return made.load.f, made.load.g
+
+
+@pytest.mark.parametrize("percent", [5, 10, 25, 50, 75, 100])
+def test_the_share_of_contacts_without_a_force_is_as_named(percent: int) -> None:
+    made = made_of(f"hard/degeneracy/{percent:03d}")
+    y = made.load.g - made.assembly.A.T @ made.x
+    weak = np.count_nonzero((made.lam == 0) & (y == 0))
+    assert weak == round(percent / 100 * made.assembly.m)
+
+
+@pytest.mark.parametrize("condition", [1e6, 1e10])
+def test_the_spectrum_is_as_named(condition: float) -> None:
+    d = spectrum(64, condition)
+    assert d[-1] / d[0] == condition
+    for K in made_of(f"hard/conditioning/{condition:.0e}").assembly.blocks:
+        values = np.linalg.eigvalsh(K)
+        np.testing.assert_allclose(values, 64 * d, atol=1e-15 * 64 * values[-1])
+
+
+def test_cond_grows_along_the_ladders_that_say_so() -> None:
+    for ladder in ("conditioning", "coincident", "thickness", "refinement", "together"):
+        names = [name for name in TAKEN if f"/{ladder}/" in name]
+        conditions = [opened(name).prepared.facts["cond_K"] for name in names]
+        assert conditions == sorted(conditions)  # type: ignore[type-var]
+        assert len(names) >= 4
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_the_model_cannot_take_is_refused_in_words(name: str) -> None:
+    scene = read_scene(name)
+    with pytest.raises(InputError) as error:
+        prepared(scene)
+    assert scene.refused in str(error.value)
+    assert name in str(error.value)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_refined_reference_finds_the_exact_answer(name: str) -> None:
+    """Two independent ways to the truth; beyond cond(K) = 1e13 no bound is proven any more."""
+    base = opened(name)
+    found = refined_active_set(base.prepared, base.load)
+    assert base.reference.bound_mm == 0.0
+    assert abs(found.x - base.reference.x).max() <= found.bound_mm
+    assert np.isfinite(found.bound_mm) or base.prepared.facts["cond_K"] > 2e13  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("name", TAKEN)
+def test_every_rung_can_be_judged(name: str) -> None:
+    base = opened(name)
+    assert base.reference.bound_mm <= 0.1 * base.limit_mm(1e-7)
+
+
+@pytest.mark.parametrize(("solver", "form", "tolerance"), IN_HOUSE, ids=str)
+@pytest.mark.parametrize("name", TAKEN)
+def test_in_house_solvers_hold(name: str, solver: str, form: Form, tolerance: float) -> None:
+    """Up to cond(K) = 1e12 within what conditioning allows; beyond it, or else a status that says so."""
+    base = opened(name)
+    data, case = base.prepared, base.load
+    made = make_solver(solver, {})
+    state = made.prepare(made.convert(Problem(data, form)))
+    load = Load(case.f, case.g, data.dual_load(case))
+    answer = made.solve(made.setup(state, load, tolerance), load, tolerance)
+    assert answer.lam is not None
+    assert np.isfinite(answer.lam).all()
+    x = answer.x if answer.x is not None else data.recover(answer.lam, case)
+    found = judge(data, case, base.reference, x, answer.lam, base.limit_mm(1e-7))
+    hard = data.facts["cond_K"] > 1.2e12  # type: ignore[operator]
+    assert found.verdict == "within" or (hard and answer.status != "solved")
+    assert answer.status == "solved" or answer.details["cause"]
+
+
+def test_the_suite_measures_every_rung_with_every_solver() -> None:
+    suite = read_suite("hard")
+    plan = expand(suite)
+    assert {m.scene for m in plan} == set(TAKEN)
+    lines = {(m.solver, m.form) for m in plan}
+    assert len(plan) == len(TAKEN) * len(lines)
+    assert {m.solver for m in plan if m.gated} == {"ipm", "gi"}

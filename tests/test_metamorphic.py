@@ -1,0 +1,140 @@
+"""What must come of an answer when the problem is changed in a known way: no reference is needed.
+
+Two answers, each within its bound of the truth, are at most the sum of the bounds apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from small import make_load, make_prepared
+from solving import CASES, IN_HOUSE, allowed, eigenvalues, solve
+
+from harness.trials import prepared_from
+from problems.assembly import LoadCase, Prepared, Vector
+from problems.ladder import make_rung
+from solvers.base import Form
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A problem, and how its x and λ give those of the problem that it was made from."""
+
+    prepared: Prepared
+    case: LoadCase
+    x: Callable[[Vector], Vector] = lambda x: x
+    lam: Callable[[Vector], Vector] = lambda lam: lam
+    length: float = 1.0  # mm that 1 stands for in its x
+
+
+def permuted(prepared: Prepared, case: LoadCase) -> Changed:
+    """The nodes of each part and the contacts in another order."""
+    random, assembly = np.random.default_rng(1), prepared.assembly
+    orders = [random.permutation(len(K)) for K in assembly.blocks]
+    blocks = tuple(K[np.ix_(order, order)] for K, order in zip(assembly.blocks, orders, strict=True))
+    rows = np.concatenate([s.start + order for s, order in zip(assembly.slices, orders, strict=True)])
+    columns = random.permutation(assembly.m)
+    made = prepared_from(blocks, sp.csc_array(assembly.A.toarray()[np.ix_(rows, columns)]))
+    x_back, lam_back = np.argsort(rows), np.argsort(columns)
+    load = LoadCase(case.f[rows], case.g[columns])
+    return Changed(made, load, lambda x: x[x_back], lambda lam: lam[lam_back])
+
+
+def in_other_units(prepared: Prepared, case: LoadCase) -> Changed:
+    """Lengths in units of 4 mm, forces in units of 1/2 N."""
+    length, force = 4.0, 0.5
+    blocks = tuple(K * length / force for K in prepared.assembly.blocks)
+    load = LoadCase(case.f / force, case.g / length)
+    made = prepared_from(blocks, prepared.assembly.A)
+    return Changed(made, load, lambda x: x * length, lambda lam: lam * force, length)
+
+
+def with_a_redundant_contact(prepared: Prepared, case: LoadCase) -> Changed:
+    """A rigid stop at 100 mm, which no node reaches."""
+    assembly = prepared.assembly
+    normal = np.zeros((assembly.n, 1))
+    normal[-1] = 1.0
+    made = prepared_from(assembly.blocks, sp.csc_array(sp.hstack([assembly.A, normal])))
+    return Changed(made, LoadCase(case.f, np.append(case.g, 100.0)), lam=lambda lam: lam[:-1])
+
+
+def with_the_parts_swapped(prepared: Prepared, case: LoadCase) -> Changed:
+    """The second part first, and all displacements counted the other way."""
+    assembly, size = prepared.assembly, len(prepared.assembly.blocks[0])
+    order = np.roll(np.arange(assembly.n), -size)
+    made = prepared_from(assembly.blocks[::-1], sp.csc_array(-assembly.A.toarray()[order]))
+    return Changed(made, LoadCase(-case.f[order], case.g), lambda x: -np.roll(x, size))
+
+
+def shifted(prepared: Prepared, case: LoadCase) -> Changed:
+    """Everything a quarter of a millimetre further: the supports' springs take up the force of it."""
+    shift = np.full(prepared.assembly.n, 0.25)
+    f = case.f + prepared.assembly.multiply_K(shift)
+    return Changed(prepared, LoadCase(f, case.g + prepared.assembly.A.T @ shift), lambda x: x - shift)
+
+
+def doubled(prepared: Prepared, case: LoadCase) -> Changed:
+    """K and f twice as large: the same displacements under twice the forces."""
+    made = prepared_from(tuple(2 * K for K in prepared.assembly.blocks), prepared.assembly.A)
+    return Changed(made, LoadCase(2 * case.f, case.g), lam=lambda lam: lam / 2)
+
+
+CHANGES = [permuted, in_other_units, with_a_redundant_contact, with_the_parts_swapped, shifted, doubled]
+
+
+@cache
+def problem(kind: str) -> tuple[Prepared, LoadCase]:
+    """A plain one, cond(K) = 1e3, or that of a ladder's rung."""
+    if kind == "plain":
+        prepared = make_prepared(21, pairs=12, tools=4)
+        return prepared, make_load(22, prepared)[0]
+    made = make_rung(kind).made
+    assert made is not None
+    return prepared_from(made.assembly.blocks, made.assembly.A), made.load
+
+
+TRIED = [("plain", *case) for case in CASES]
+TRIED += [(f"hard/{rung}", *case) for rung in ("conditioning/1e+10", "degeneracy/025") for case in IN_HOUSE]
+
+
+def solved(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector, float]:
+    """x, λ and the bound on x."""
+    answer, x = solve(name, form, prepared, case)
+    assert answer.status == "solved"
+    assert x is not None
+    assert answer.lam is not None
+    return x, answer.lam, allowed(name, prepared, case, x, answer.lam)
+
+
+@pytest.mark.parametrize(("kind", "name", "form"), TRIED, ids=str)
+@pytest.mark.parametrize("change", CHANGES)
+def test_the_answer_changes_as_the_problem_does(
+    change: Callable[[Prepared, LoadCase], Changed], kind: str, name: str, form: Form
+) -> None:
+    x, lam, bound = solved(name, form, *problem(kind))
+    assert 3 < np.count_nonzero(lam > 1e-6) < len(lam) - 3  # a problem with a real choice
+    made = change(*problem(kind))
+    other_x, other_lam, other_bound = solved(name, form, made.prepared, made.case)
+    bound += made.length * other_bound
+    assert abs(made.x(other_x) - x).max() <= bound
+    # From A(λ' − λ) = K(x − x') up to the residual, where each row of A has one entry, ±1.
+    force = eigenvalues(problem(kind)[0])[1] * bound * np.sqrt(len(x))
+    assert abs(made.lam(other_lam) - lam).max() <= force
+
+
+@pytest.mark.parametrize(("kind", "name", "form"), TRIED, ids=str)
+def test_a_load_in_two_steps_leads_to_the_same_place(kind: str, name: str, form: Form) -> None:
+    """The second step starts from the first one's displacements, under the forces that they call up."""
+    prepared, case = problem(kind)
+    x, _, bound = solved(name, form, prepared, case)
+    first, _, _ = solved(name, form, prepared, LoadCase(case.f / 2, case.g))
+    left = LoadCase(case.f - prepared.assembly.multiply_K(first), case.g - prepared.assembly.A.T @ first)
+    second, _, second_bound = solved(name, form, prepared, left)
+    assert abs(first - x).max() > 0.01
+    # What the first step is off by stands in the second one's load, and is made good by it.
+    assert abs(first + second - x).max() <= bound + second_bound
