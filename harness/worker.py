@@ -24,7 +24,7 @@ import numpy as np
 import threadpoolctl
 
 from problems.assembly import Prepared, Vector
-from problems.build import load_case, prepared
+from problems.prepare import load_case, prepared
 from problems.scene import read_scene
 from solvers.base import Answer, Load, Problem, Status
 from solvers.registry import make_solver
