@@ -8,10 +8,13 @@ are the dual form, dashed lines and hollow markers the primal. Colours are those
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
@@ -110,8 +113,16 @@ def marker_only(style: dict[str, Any]) -> dict[str, Any]:
     return {**style, "linestyle": ""}
 
 
-def legend_entries(order: list[str], styles: dict[str, dict[str, Any]]) -> list[Line2D]:
-    return [Line2D([], [], label=series, **styles[series]) for series in order]
+def legend_entries(styles: dict[str, dict[str, Any]]) -> list[Line2D]:
+    return [Line2D([], [], label=series, **look) for series, look in styles.items()]
+
+
+def percent_above(axes: Axes, whole: float) -> None:
+    """A second axis above the first, in % of `whole`."""
+    there_and_back = (partial(np.multiply, 100 / whole), partial(np.multiply, whole / 100))
+    axis = axes.secondary_xaxis("top", functions=there_and_back)
+    axis.xaxis.set_major_formatter(lambda value, _: f"{value:g} %")
+    axis.tick_params(length=3, labelsize=8)
 
 
 def plain_log(axis: Axis) -> None:

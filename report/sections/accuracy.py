@@ -39,7 +39,7 @@ def section(results: Results) -> Section | None:
     for axes, scene in zip(panels, scenes, strict=True):
         _panel(axes, points[points["scene"] == scene], limit, styles)
     axes.set_xlabel("displacement error, mm (max norm)")
-    handles = style.legend_entries(in_order(points, "series"), styles)
+    handles = style.legend_entries({series: styles[series] for series in in_order(points, "series")})
     drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
     caption = (
         "*Seconds a load case against the displacement error that was achieved*, both of the same run, on "

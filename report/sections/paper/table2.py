@@ -53,9 +53,7 @@ def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
 
 def no_more(line: Mapping[str, Any], suffix: str = "") -> bool | None:
     """Whether Algorithm 5 needed no more iterations than STP1 and STP2; None where a number is missing."""
-    mine, *others = [
-        as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)
-    ]
+    mine, *others = [as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)]
     if mine is None or not all(other is not None for other in others):
         return None
     return all(mine <= other for other in others if other is not None)
