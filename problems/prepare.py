@@ -26,10 +26,9 @@ def prepared(scene: Scene, progress: build.Progress = lambda text, fraction: Non
         return base
     from .ties import tied
 
-    progress("installing fasteners", 0.0)
     springs = [effect.springs(scene.joint) for effect in ties]
     T = sp.csc_array(sp.hstack([T for T, _ in springs]))
-    return tied(base, scene, T, np.concatenate([k for _, k in springs]))
+    return tied(base, scene, T, np.concatenate([k for _, k in springs]), progress)
 
 
 def load_case(scene: Scene, prepared: Prepared) -> LoadCase:

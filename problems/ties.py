@@ -14,11 +14,19 @@ import scipy.sparse as sp
 
 from . import cache
 from .assembly import Assembly, Matrix, Prepared, Vector
-from .build import LARGEST_CONDITION, _extreme_eigenvalues, _factor, _indefinite, _schur, cache_key
+from .build import (
+    LARGEST_CONDITION,
+    Progress,
+    _extreme_eigenvalues,
+    _factor,
+    _indefinite,
+    _schur,
+    cache_key,
+)
 from .scene import Scene
 
 
-def tied(base: Prepared, scene: Scene, T: sp.csc_array, k: Vector) -> Prepared:
+def tied(base: Prepared, scene: Scene, T: sp.csc_array, k: Vector, progress: Progress) -> Prepared:
     """The prepared assembly with springs in the directions T (n, r), of stiffness k (r,) in N/mm.
 
     From the cache where it stands there. Raises InputError where cond(K) becomes larger than 1e14.
@@ -30,6 +38,7 @@ def tied(base: Prepared, scene: Scene, T: sp.csc_array, k: Vector) -> Prepared:
         with cache.lock(key):
             found = cache.load(key)
             if found is None:
+                progress("springs between the parts", 0.0)
                 cache.store(key, *_build(base, scene, T, k))
                 found = cache.load(key)
     assert found is not None
