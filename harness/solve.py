@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from problems.assembly import LoadCase, Prepared, Vector
-from problems.effect import ForceEffect, PartLoadEffect, TieEffect
+from problems.effect import ForceEffect, PartLoadEffect, StiffnessEffect, TieEffect
 from problems.errors import InputError
 from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
@@ -158,8 +158,13 @@ def _layout(scene: Scene, data: Prepared) -> dict[str, Any]:
     pairs = [{"pair": pair, "start": k * size, "stop": (k + 1) * size} for k, pair in enumerate(joint.pairs)]
     marks: dict[str, list[list[float]]] = {}
     for effect in scene.effects:
-        if isinstance(effect, ForceEffect) and len(points := effect.marks(joint)):
-            marks.setdefault(effect.kind, []).extend(points.tolist())
+        points: list[Any] = []
+        if isinstance(effect, ForceEffect):
+            points = effect.marks(joint).tolist()
+        elif isinstance(effect, StiffnessEffect):
+            points = [[x, y] for x, y in effect.held_points if 0 <= y <= joint.junction.width]
+        if points:
+            marks.setdefault(effect.kind, []).extend(points)
     return {"parts": parts, "pairs": pairs, "marks": marks}
 
 

@@ -23,9 +23,9 @@ from .numbers import significant
 from .vtu import write_vtu
 
 #: Marks of what stands on the junction, by the kind of the effect.
-MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
-STRIP = 7.4  # inches, the width of a map over the whole page
-NARROW = 0.45  # height over width of a junction up to which its maps stand below one another
+MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^", "supports": "x"}
+STRIP, TALLEST = 7.4, 5.5  # inches: the width of a map over the whole page, the largest height of one
+NARROW, UPRIGHT = 0.45, 2.0  # height over width of a junction: maps below one another, all side by side
 
 
 def write(directory: Path) -> Path:
@@ -100,11 +100,10 @@ def _summary(nodes: pd.DataFrame, contacts: pd.DataFrame) -> tuple[Rows, Rows]:
 
 def _figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
     with style.applied():
-        return {
-            "gap": _gap(record, arrays),
-            "forces": _forces(record, arrays),
-            "displacement": _displacement(record, arrays),
-        }
+        figures = {"gap": _gap(record, arrays)}
+        if (arrays["lam"] > 0).any():
+            figures["forces"] = _forces(record, arrays)
+        return figures | {"displacement": _displacement(record, arrays)}
 
 
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
@@ -159,10 +158,12 @@ def _panels(nodes: Array, count: int, after_each_other: int = 1) -> tuple[Figure
     """Maps of one size: below one another where the junction is a strip, else side by side."""
     width, height = np.ptp(nodes, axis=0)
     ratio = float(height / width) if width else 1.0
-    columns = 1 if ratio < NARROW else max(2, after_each_other) if count > 1 else 1
+    columns = 1 if ratio < NARROW else count if ratio > UPRIGHT else min(count, max(2, after_each_other))
     rows = -(-count // columns)
-    tall = min(STRIP / columns * ratio, 5.5)
+    tall = min(STRIP / columns * ratio, TALLEST)
     drawing = style.figure(rows * (max(tall, 0.5) + 0.45) + 0.6)
+    if ratio > UPRIGHT:
+        drawing.set_figwidth(max(4.0, 1.8 + columns * (TALLEST / ratio + 2.6)))
     panels = list(drawing.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel())
     for spare in panels[count:]:
         spare.remove()

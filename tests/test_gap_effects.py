@@ -96,13 +96,16 @@ def test_shims_fill_their_rectangle_borders_included() -> None:
     np.testing.assert_array_equal(g, expected)
 
 
-def test_a_tool_is_a_parabola_over_the_middle_of_the_junction() -> None:
+def test_a_tool_is_a_parabola_about_its_crest() -> None:
     tool = RigidTool(kind="rigid_tool", part="a", distance=0.2, curvature=(2e-6, -1e-5))
     g = tool.gap(ON_TOOL).reshape(5, 9)
     assert g[2, 4] == pytest.approx(0.2)
     assert g[2, 0] == pytest.approx(0.2 + 1e-6 * 200**2)
     assert g[0, 4] == pytest.approx(0.2 - 0.5e-5 * 60**2)
     assert g[-1, -1] == pytest.approx(0.2 + 1e-6 * 200**2 - 0.5e-5 * 60**2)
+    moved = tool.model_copy(update={"crest": (100.0, 0.0)}).gap(ON_TOOL).reshape(5, 9)
+    assert moved[0, 2] == pytest.approx(0.2)
+    assert moved[-1, -1] == pytest.approx(0.2 + 1e-6 * 300**2 - 0.5e-5 * 120**2)
 
 
 def test_a_clamp_spreads_its_force_evenly_under_its_pad() -> None:

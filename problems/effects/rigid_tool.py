@@ -15,17 +15,19 @@ from ..joint import TOOL, Finite, Joint
 class RigidTool(GapEffect):
     """Adds the contact of `part` and the tool at every junction node, x ≤ g, with
 
-        g += distance + ½ κ_x (x − L/2)² + ½ κ_y (y − B/2)²,   L × B the junction.
+        g += distance + ½ κ_x (x − x_0)² + ½ κ_y (y − y_0)².
 
-    distance in mm; curvature = (κ_x, κ_y) in 1/mm: positive where the tool bends away from the part.
+    distance in mm; curvature = (κ_x, κ_y) in 1/mm: positive where the tool bends away from the part;
+    crest = (x_0, y_0) in mm, the middle of the junction where it is not given.
     """
 
-    units: ClassVar = {"distance": "mm", "curvature": "1/mm"}
+    units: ClassVar = {"distance": "mm", "curvature": "1/mm", "crest": "mm"}
 
     kind: Literal["rigid_tool"]
     part: str
     distance: Finite = 0.0
     curvature: tuple[Finite, Finite] = (0.0, 0.0)
+    crest: tuple[Finite, Finite] | None = None
 
     @property
     def contacts(self) -> tuple[Pair, ...]:
@@ -39,8 +41,8 @@ class RigidTool(GapEffect):
             yield "part", self.part, "one rigid_tool a part: another one stands against this part"
 
     def gap(self, joint: Joint) -> Vector:
-        centre = joint.junction.length / 2, joint.junction.width / 2
+        crest = self.crest or (joint.junction.length / 2, joint.junction.width / 2)
         g = np.zeros(joint.size[1])
-        away = 0.5 * (joint.nodes - centre) ** 2 @ self.curvature
+        away = 0.5 * (joint.nodes - crest) ** 2 @ self.curvature
         g[contacts_of((self.part, TOOL), joint)] = self.distance + away
         return g
