@@ -39,7 +39,7 @@ def write(directory: Path) -> Path:
     figures = _figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
-            drawing.savefig(directory / f"{name}.png", dpi=style.DPI)
+            drawing.savefig(directory / f"{name}.png", dpi=style.DPI, bbox_inches="tight")
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
@@ -162,9 +162,9 @@ def _panels(nodes: Array, count: int, after_each_other: int = 1) -> tuple[Figure
     rows = -(-count // columns)
     tall = min(STRIP / columns * ratio, TALLEST)
     drawing = style.figure(rows * (max(tall, 0.5) + 0.45) + 0.6)
-    if ratio > UPRIGHT:
-        drawing.set_figwidth(max(4.0, 1.8 + columns * (TALLEST / ratio + 2.6)))
     panels = list(drawing.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel())
+    if ratio > UPRIGHT:
+        drawing.set_figwidth(1.0 + columns * (TALLEST / ratio + 2.0))
     for spare in panels[count:]:
         spare.remove()
     return drawing, panels[:count]
