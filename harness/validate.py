@@ -39,13 +39,14 @@ def validate(source: str, console: Console) -> None:
     """Read and check a scene, print what it is made of and an estimate. Raises InputError."""
     scene = read_scene(source)
     if scene.joint is None:
+        from problems.digits import apparent_digits
         from problems.matrices import read_matrices
 
         assembly = read_matrices(dict(scene.matrices))[0]
         blocks = ", ".join(str(len(K)) for K in assembly.blocks)
-        console.print(
-            f"{scene.name}: own matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}. Fine."
-        )
+        digits = min(apparent_digits(K[np.nonzero(K)]) for K in assembly.blocks)
+        console.print(f"{scene.name}: own matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
+        console.print(f"K is symmetric, its entries seem to have {digits} digits. Fine.")
         return
     joint = scene.joint
     console.print(f"{scene.name}: {scene.title}. Fine.")

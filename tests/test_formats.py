@@ -219,8 +219,8 @@ def rounded(K: Any, digits: int) -> Any:
 
 @pytest.mark.parametrize("digits", [9, 11])
 def test_the_expected_error_is_that_of_rounding(digits: int) -> None:
-    """Against solving with the rounded matrix, some contacts closed; within a factor of five of the middle one
-    of nine units of force, in each of which K is rounded differently."""
+    """Against solving with the rounded matrix, some contacts closed: within a factor of five of the middle
+    one of nine units of force, in each of which K is rounded differently."""
     scene = read_scene("gallery/sheet-over-former")
     data = prepared(scene)
     load = load_case(scene, data)

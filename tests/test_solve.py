@@ -346,3 +346,6 @@ def test_a_scene_of_own_matrices_has_no_ledger(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", K=np.eye(2), A=np.eye(2)[:, :1], f=np.ones(2), g=np.ones(1))
     scene = read_scene(str(tmp_path / "mine.npz"))
     assert ledger(scene, prepared(scene), built=True) == []
+    said = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")]).output
+    assert "n = 2, m = 1, blocks of 1, 1" in said
+    assert "seem to have 1 digits" in said
