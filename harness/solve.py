@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from problems.assembly import LoadCase, Prepared, Vector
-from problems.effect import ForceEffect, PartLoadEffect, StiffnessEffect, TieEffect
+from problems.effect import ForceEffect, PartLoadEffect, TieEffect
 from problems.errors import InputError
 from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
@@ -144,7 +144,12 @@ def _layout(scene: Scene, data: Prepared) -> dict[str, Any]:
     assembly = data.assembly
     if scene.joint is None:
         spans = zip(assembly.parts, assembly.slices, strict=True)
-        parts = [{"name": name, "start": s.start, "stop": s.stop} for name, s in spans]
+        nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
+        bare: dict[str, Any] = {"clamped": [], "supports": []}
+        parts = [
+            {"name": name, "start": s.start, "stop": s.stop, "outline": _extent(nodes[s]), **bare}
+            for name, s in spans
+        ]
         return {
             "parts": parts,
             "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}],
@@ -152,20 +157,31 @@ def _layout(scene: Scene, data: Prepared) -> dict[str, Any]:
         }
     joint = scene.joint
     size = joint.node_count
-    parts = [
-        {"name": part.name, "start": k * size, "stop": (k + 1) * size} for k, part in enumerate(joint.part)
-    ]
+    parts = []
+    for k, part in enumerate(joint.part):
+        plate = joint.plate(part)
+        held = [e.held_points for e in scene.stiffness_effects if e.part == part.name]
+        parts.append(
+            {
+                "name": part.name,
+                "start": k * size,
+                "stop": (k + 1) * size,
+                "outline": [0.0, joint.junction.length, plate.y[0], plate.y[-1]],
+                "clamped": part.clamped,
+                "supports": [point for points in held for point in points],
+            }
+        )
     pairs = [{"pair": pair, "start": k * size, "stop": (k + 1) * size} for k, pair in enumerate(joint.pairs)]
     marks: dict[str, list[list[float]]] = {}
     for effect in scene.effects:
-        points: list[Any] = []
-        if isinstance(effect, ForceEffect):
-            points = effect.marks(joint).tolist()
-        elif isinstance(effect, StiffnessEffect):
-            points = [[x, y] for x, y in effect.held_points if 0 <= y <= joint.junction.width]
-        if points:
-            marks.setdefault(effect.kind, []).extend(points)
+        if isinstance(effect, ForceEffect) and len(points := effect.marks(joint)):
+            marks.setdefault(effect.kind, []).extend(points.tolist())
     return {"parts": parts, "pairs": pairs, "marks": marks}
+
+
+def _extent(nodes: Vector) -> list[float]:
+    """The smallest and largest x, then y, of some nodes."""
+    return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist()
 
 
 def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vector) -> Iterator[str]:

@@ -23,7 +23,7 @@ from .numbers import significant
 from .vtu import write_vtu
 
 #: Marks of what stands on the junction, by the kind of the effect.
-MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^", "supports": "x"}
+MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 STRIP, TALLEST = 7.4, 5.5  # inches: the width of a map over the whole page, the largest height of one
 NARROW, UPRIGHT = 0.45, 2.0  # height over width of a junction: maps below one another, all side by side
 
@@ -121,7 +121,7 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
             _mark(axes, record["marks"])
         _outline(panels[2 * k + 1], nodes, arrays["lam"][own] > 0, "white")
     drawing.colorbar(drawn, ax=panels, label="gap, mm", pad=0.015, fraction=0.05)
-    return _labelled(drawing, panels, record["marks"])
+    return _labelled(drawing, panels)
 
 
 def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
@@ -137,21 +137,29 @@ def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         _outline(axes, nodes, closed, "#444444")
         _mark(axes, record["marks"])
     drawing.colorbar(drawn, ax=panels, label="force, N", pad=0.015, fraction=0.05)
-    return _labelled(drawing, panels, record["marks"])
+    return _labelled(drawing, panels)
 
 
 def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
-    """All parts on one scale."""
+    """All parts on one scale, each inside its outline; a thick edge is clamped."""
     parts = record["parts"]
-    drawing, panels = _panels(arrays["nodes"], len(parts))
+    corners = [(x, y) for part in parts for x in part["outline"][:2] for y in part["outline"][2:]]
+    drawing, panels = _panels(np.array(corners), len(parts))
     norm = Normalize(float(arrays["x"].min()), float(arrays["x"].max()))
     for axes, part in zip(panels, parts, strict=True):
         own = slice(part["start"], part["stop"])
         drawn = draw(axes, arrays["nodes"][own], arrays["x"][own], norm, "cividis")
         axes.set_title(f"displacement of {part['name']}")
-        _mark(axes, record["marks"])
+        west, east, south, north = part["outline"]
+        axes.plot(
+            [west, east, east, west, west], [south, south, north, north, south], color="#666666", lw=0.8
+        )
+        for edge, y in (("south", south), ("north", north)):
+            if edge in part["clamped"]:
+                axes.plot([west, east], [y, y], color="#222222", lw=3.0, clip_on=False)
+        _mark(axes, record["marks"] | ({"supports": part["supports"]} if part["supports"] else {}))
     drawing.colorbar(drawn, ax=panels, label="displacement, mm", pad=0.015, fraction=0.05)
-    return _labelled(drawing, panels, record["marks"])
+    return _labelled(drawing, panels)
 
 
 def _panels(nodes: Array, count: int, after_each_other: int = 1) -> tuple[Figure, list[Axes]]:
@@ -188,9 +196,12 @@ def _mark(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
         )
 
 
-def _labelled(drawing: Figure, panels: list[Axes], marks: dict[str, list[list[float]]]) -> Figure:
+def _labelled(drawing: Figure, panels: list[Axes]) -> Figure:
     panels[-1].set_xlabel("x, mm")
-    if marks:
-        handles, labels = panels[0].get_legend_handles_labels()
-        drawing.legend(handles, labels, loc="outside lower left", ncols=len(marks))
+    found = [axes.get_legend_handles_labels() for axes in panels]
+    named = {
+        label: handle for handles, labels in found for handle, label in zip(handles, labels, strict=True)
+    }
+    if named:
+        drawing.legend(named.values(), named.keys(), loc="outside lower left", ncols=len(named))
     return drawing

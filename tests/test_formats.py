@@ -255,5 +255,5 @@ def test_a_built_problem_is_exported_with_all_its_terms(tmp_path: Path) -> None:
     wanted, found = there_and_back("npz", tmp_path)
     base = build.prepared(read_scene(SCENE))
     bare = sla.block_diag(*base.assembly.blocks)
-    assert abs(found["K"] - bare).max() == pytest.approx(20.0)
-    assert abs(wanted["f"]).max() == pytest.approx(10.0)
+    assert abs(found["K"] - bare).max() == pytest.approx(5.0)
+    assert abs(wanted["f"]).max() == pytest.approx(2.5)

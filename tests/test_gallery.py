@@ -134,8 +134,8 @@ def test_three_part_stack() -> None:
 def test_installed_fasteners() -> None:
     """Cantilevers of compliance c = L³/3EI each: the springs, k in all, pull with k d / (1 + 2 c k)."""
     _, x, lam = solved("installed-fasteners")
-    c = 400.0**3 / (3 * 70e3 * 20.0 * 5.0**3 / 12)
-    k, d = 2 * 20.0, 0.5
+    c = 400.0**3 / (3 * 70e3 * 20.0 * 10.0**3 / 12)
+    k, d = 2 * 5.0, 0.5
     assert not lam.any()
     tips = x[[48, 50]], x[[99, 101]]
     np.testing.assert_allclose(tips[0], c * k * d / (1 + 2 * c * k), rtol=1e-3)

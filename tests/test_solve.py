@@ -81,6 +81,18 @@ value = 1e-3
 """ + SCENE[SCENE.index("[joint]") :]
 
 
+@pytest.fixture(autouse=True)
+def _without_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing takes most of the time: only where a test looks at pictures."""
+    if "pictures" not in request.fixturenames:
+        monkeypatch.setattr("report.solution._figures", lambda *_: {})
+
+
+@pytest.fixture
+def pictures() -> None:
+    """Asked for by a test that looks at pictures."""
+
+
 def run(folder: Path, text: str = SCENE, solver: str | None = None, preload: float = 80.0) -> dict[str, Any]:
     """Solve, and return what solution.json says with the exit code and the terminal's text."""
     path = folder / "scene.toml"
@@ -149,6 +161,7 @@ def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: 
     assert "linear solve" in record["shown"]
 
 
+@pytest.mark.usefixtures("pictures")
 def test_files_hold_the_answer(tmp_path: Path) -> None:
     run(tmp_path)
     out, found = tmp_path / "out", arrays(tmp_path)
