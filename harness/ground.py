@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from problems.assembly import LoadCase, Prepared
-from problems.build import Progress, load_case, prepared
+from problems.build import Progress
 from problems.effect import ForceEffect
 from problems.errors import InputError
+from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
 
 from . import records

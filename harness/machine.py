@@ -1,4 +1,4 @@
-"""What the measurements were made on, and with which versions."""
+"""What the measurements were made on, with which versions, and the memory of this process."""
 
 from __future__ import annotations
 
@@ -37,6 +37,18 @@ def usable_cores() -> int:
 
 def physical_memory_mib() -> int:
     return int(psutil.virtual_memory().total // 2**20)
+
+
+def resident_mib(name: str) -> float | None:
+    """Resident memory of this process, now (VmRSS) or at its highest (VmHWM), MiB.
+
+    (ru_maxrss also counts the process before exec on Linux.)
+    """
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return None
+    return int(status.partition(f"{name}:")[2].split()[0]) / 1024
 
 
 def installed_version(package: str) -> str:

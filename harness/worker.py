@@ -24,11 +24,12 @@ import numpy as np
 import threadpoolctl
 
 from problems.assembly import Prepared, Vector
-from problems.build import load_case, prepared
+from problems.prepare import load_case, prepared
 from problems.scene import read_scene
 from solvers.base import Answer, Load, Problem, Status
 from solvers.registry import make_solver
 
+from .machine import resident_mib
 from .records import to_line
 
 LARGEST_EVENT = 2**16  # bytes; a solver's details beyond it are dropped
@@ -181,18 +182,6 @@ def threads_in_effect() -> Row:
         "kernels": ", ".join(sorted(kernels)) or None,
         "threads": max((pool["num_threads"] for pool in blas or pools), default=None),
     }
-
-
-def resident_mib(name: str) -> float | None:
-    """Resident memory of this process, now (VmRSS) or at its highest (VmHWM), MiB.
-
-    (ru_maxrss also counts the process before exec on Linux.)
-    """
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    return int(status.partition(f"{name}:")[2].split()[0]) / 1024
 
 
 if __name__ == "__main__":

@@ -2,6 +2,12 @@
 
 An effect `kind = "some_effect"` in a scene is the class SomeEffect of problems/effects/some_effect.py.
 Its module is imported only when a scene names it.
+
+    StiffnessEffect   to the stiffness of one part, before condensation
+    ForceEffect       forces on the junction nodes
+    PartLoadEffect    a load anywhere on one part, condensed onto its junction nodes
+    GapEffect         to the initial gap; it may bring the contact that it is about
+    TieEffect         springs between the junction nodes of two parts, and the forces they were set with
 """
 
 from __future__ import annotations
@@ -9,23 +15,52 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
+from pydantic import Field
 
 from .assembly import Matrix, Vector
-from .joint import Joint, Table
+from .joint import TOOL, Joint, Table
 from .plate import Plate
+
+Pair = tuple[str, str]
+Range = tuple[float, float]
+
+#: A contact, or None for all. None stays out of a scene's key: it is as if the parameter did not exist.
+Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
+
+#: What somebody may look for, and why the model has no place for it.
+EXCLUDED = {
+    "friction": "assumption 4: friction between the parts is neglected",
+    "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
+    "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
+    "plasticity": "assumption 5: linear elasticity",
+    "dynamics": "the answer is the minimum of a static energy, without inertia or time",
+}
 
 
 class Effect(Table):
     """Parameters of an effect, in mm and N."""
 
+    units: ClassVar[dict[str, str]] = {}
+
     kind: str
+
+    @property
+    def contacts(self) -> tuple[Pair, ...]:
+        """Pairs that are in contact because of this effect."""
+        return ()
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         """(key, value, what is allowed) of whatever does not fit the joint."""
+        yield from ()
+
+    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+        """The same of whatever contradicts the scene's other effects."""
         yield from ()
 
 
@@ -38,6 +73,11 @@ class StiffnessEffect(Effect):
     def held_points(self) -> tuple[tuple[float, float], ...]:
         """Where the effect keeps the part from floating away."""
         return ()
+
+    @property
+    def pad(self) -> tuple[float, Range, Range] | None:
+        """Thickness, range of x and range of y, in mm, of an area that the effect makes as thick as that."""
+        return None
 
     @abstractmethod
     def stiffness(self, plate: Plate) -> sp.csr_array:
@@ -65,6 +105,71 @@ class GapEffect(Effect):
     @abstractmethod
     def gap(self, joint: Joint) -> Vector:
         """(m,) gap in mm."""
+
+
+class TieEffect(ForceEffect):
+    """Adds springs between parts at junction nodes: K += T diag(k) Tᵀ, after condensation."""
+
+    @abstractmethod
+    def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
+        """T (n, r) with a spring's direction in each column, and k (r,) in N/mm."""
+
+
+@dataclass(frozen=True)
+class PartModel:
+    """A part's plate and what stiffens and holds it."""
+
+    plate: Plate
+    effects: tuple[StiffnessEffect, ...]
+
+    def areas(self) -> Iterator[tuple[float, float, Range, Range]]:
+        """(sign, thickness, range of x, range of y) whose sum is the part with its pads."""
+        x, y = ((float(grid[0]), float(grid[-1])) for grid in (self.plate.x, self.plate.y))
+        yield 1.0, self.plate.thickness, x, y
+        for effect in self.effects:
+            if effect.pad:
+                thickness, x, y = effect.pad
+                yield 1.0, thickness, x, y
+                yield -1.0, self.plate.thickness, x, y
+
+
+class PartLoadEffect(Effect):
+    """Adds a load on one part, in the junction or beyond it."""
+
+    part: str
+
+    @abstractmethod
+    def load(self, model: PartModel) -> Vector:
+        """(plate.size,) work of the load on each degree of freedom: N, N·mm, N·mm²."""
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_part(self.part, joint)
+
+
+def pairs_of(between: Pair | None, joint: Joint) -> tuple[Pair, ...]:
+    """The contacts that an effect acts on."""
+    return joint.pairs if between is None else (between,)
+
+
+def contacts_of(pair: Pair, joint: Joint) -> slice:
+    """Where the contacts of a pair stand in g and λ."""
+    start = joint.pairs.index(pair) * joint.node_count
+    return slice(start, start + joint.node_count)
+
+
+def pressed(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
+    """f (n,) of forces (node_count,) in N that press the two parts of each contact together."""
+    f = np.zeros(joint.size[0])
+    for first, second in pairs_of(between, joint):
+        f[joint.unknowns(first)] += nodal
+        if second != TOOL:
+            f[joint.unknowns(second)] -= nodal
+    return f
+
+
+def unknown_pair(between: Pair | None, joint: Joint) -> Iterator[tuple[str, object, str]]:
+    if between is not None and between not in joint.pairs:
+        yield "between", list(between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
 
 
 def unknown_part(part: str, joint: Joint) -> Iterator[tuple[str, object, str]]:

@@ -12,17 +12,18 @@ or, for a user's own matrices, `[matrices]` with K, A, f, g (Matrix Market) or p
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from .cache import digest
-from .effect import Effect, StiffnessEffect, effect_class, effect_kinds
+from .effect import EXCLUDED, Effect, Pair, StiffnessEffect, effect_class, effect_kinds
 from .errors import Fault, InputError
 from .joint import Joint, Table
 from .ladder import PREFIX, Made, Rung, make_rung, rung_names
@@ -31,6 +32,16 @@ HERE = Path(__file__).resolve().parent
 SCENES = HERE / "scenes"
 ASSEMBLIES = HERE / "assemblies"
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
+
+Tables = list[tuple[Path, int, dict[str, Any]]]  # the tables of effects: file, place in it, content
+
+#: Units of what joints and stiffeners are described by; an effect names those of its own parameters.
+UNITS = {
+    **dict.fromkeys(["length", "width", "thickness", "points", "lines", "pitch", "start", "stop"], "mm"),
+    **dict.fromkeys(["I", "J"], "mm⁴"),
+    **dict.fromkeys(["young", "value"], "N/mm²"),
+    "stiffness_per_point": "N/mm",
+}
 
 
 @dataclass(frozen=True)
@@ -69,14 +80,14 @@ class Scene:
         if self.joint is None:
             keys = [key for key, _ in self.matrices]
             return digest(keys, *(path.read_bytes() for _, path in self.matrices))
-        return digest(_plain(self.joint), [_plain(effect) for effect in self.stiffness_effects])
+        return digest(plain(self.joint), [plain(effect) for effect in self.stiffness_effects])
 
     @property
     def key(self) -> str:
         """Hash of everything that determines K, A, f and g."""
         if self.made:
             return digest(self.assembly_key, self.made.load.f.tobytes(), self.made.load.g.tobytes())
-        loads = [_plain(effect) for effect in self.effects if not isinstance(effect, StiffnessEffect)]
+        loads = [plain(effect) for effect in self.effects if not isinstance(effect, StiffnessEffect)]
         return digest(self.assembly_key, loads)
 
     @property
@@ -136,17 +147,23 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError.one(path, "TOML", str(error), "valid TOML") from error
 
 
-def validation_faults(where: object, prefix: str, error: ValidationError) -> Iterator[Fault]:
-    """pydantic's findings in our words."""
+def validation_faults(
+    where: object, prefix: str, error: ValidationError, units: Mapping[str, str] = MappingProxyType({})
+) -> Iterator[Fault]:
+    """pydantic's findings in our words; units of the keys that have one."""
     items = error.errors()
     for item in items:
         depth = len(item["loc"])
         if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
             continue  # it follows from a fault inside it
+        if isinstance(cause := item.get("ctx", {}).get("error"), InputError):
+            yield from cause.faults  # of a file that the table names
+            continue
         key = ".".join(filter(None, [prefix, *map(str, item["loc"])]))
         value = None if item["type"] == "missing" else item["input"]
         allowed = "unknown key" if item["type"] == "extra_forbidden" else item["msg"]
-        yield Fault(str(where), key or "file", value, allowed)
+        unit = next((units[str(part)] for part in reversed(item["loc"]) if part in units), None)
+        yield Fault(str(where), key or "file", value, f"{allowed}; in {unit}" if unit else allowed)
 
 
 def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
@@ -166,24 +183,31 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     allowed = "unknown key; a scene has title, assembly or joint, effect, matrices"
     faults += [Fault(str(path), key, value, allowed) for key, value in data.items()]
 
+    read = [_effect(where, k, table, faults) for where, k, table in effects]
+    found = tuple(effect for effect in read if effect is not None)
     joint = None
     try:
-        joint = Joint.model_validate(joint_data)
+        joint = _with_contacts(Joint.model_validate(joint_data), found)
         faults += [Fault(str(joint_path), *fault) for fault in joint.faults()]
     except ValidationError as error:
-        faults += validation_faults(joint_path, "", error)
-    checked = [_effect(where, k, table, joint, faults) for where, k, table in effects]
-    found = tuple(effect for effect in checked if effect is not None)
+        faults += validation_faults(joint_path, "", error, UNITS)
+    if joint is not None:
+        faults += _misfits(joint, effects, read)
     if joint is not None and not faults:
+        faults += _conflicts(joint, effects, found)
         faults += _floating(joint_path, joint, found)
     if faults or joint is None:
         raise InputError(faults)
     return Scene(name, title, joint, found)
 
 
-def _effect_tables(
-    where: Path, data: dict[str, Any], faults: list[Fault]
-) -> list[tuple[Path, int, dict[str, Any]]]:
+def _with_contacts(joint: Joint, effects: tuple[Effect, ...]) -> Joint:
+    """The joint with the contacts that effects bring."""
+    new: list[Pair] = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
+    return joint.model_copy(update={"contacts": (*joint.pairs, *dict.fromkeys(new))}) if new else joint
+
+
+def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> Tables:
     tables = data.pop("effect", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         faults.append(Fault(str(where), "effect", tables, "tables [[effect]]"))
@@ -191,23 +215,35 @@ def _effect_tables(
     return [(where, k, table) for k, table in enumerate(tables)]
 
 
-def _effect(
-    where: Path, index: int, table: dict[str, Any], joint: Joint | None, faults: list[Fault]
-) -> Effect | None:
+def _effect(where: Path, index: int, table: dict[str, Any], faults: list[Fault]) -> Effect | None:
     kind = table.get("kind")
-    prefix = f"effect[{index}]"
     if kind not in effect_kinds():
-        faults.append(Fault(str(where), f"{prefix}.kind", kind, f"one of {', '.join(effect_kinds())}"))
+        known = f"one of {', '.join(effect_kinds())}"
+        allowed = f"the model excludes it ({EXCLUDED[kind]}); {known}" if kind in EXCLUDED else known
+        faults.append(Fault(str(where), f"effect[{index}].kind", kind, allowed))
         return None
+    effect = effect_class(kind)
     try:
-        effect = effect_class(kind).model_validate(table)
+        return effect.model_validate(table, context={"folder": where.parent})
     except ValidationError as error:
-        faults += validation_faults(where, f"{prefix} ({kind})", error)
+        faults += validation_faults(where, f"effect[{index}] ({kind})", error, UNITS | effect.units)
         return None
-    if joint is not None:
-        for key, value, allowed in effect.faults(joint):
-            faults.append(Fault(str(where), f"{prefix} ({kind}).{key}", value, allowed))
-    return effect
+
+
+def _misfits(joint: Joint, tables: Tables, effects: Sequence[Effect | None]) -> Iterator[Fault]:
+    """What of each effect does not fit the joint."""
+    for (where, k, _), effect in zip(tables, effects, strict=True):
+        if effect is not None:
+            for key, value, allowed in effect.faults(joint):
+                yield Fault(str(where), f"effect[{k}] ({effect.kind}).{key}", value, allowed)
+
+
+def _conflicts(joint: Joint, tables: Tables, effects: tuple[Effect, ...]) -> Iterator[Fault]:
+    """What of each effect contradicts the others."""
+    for position, ((where, k, _), effect) in enumerate(zip(tables, effects, strict=True)):
+        others = (*effects[:position], *effects[position + 1 :])
+        for key, value, allowed in effect.conflicts(others, joint):
+            yield Fault(str(where), f"effect[{k}] ({effect.kind}).{key}", value, allowed)
 
 
 def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...]) -> Iterator[Fault]:
@@ -253,5 +289,6 @@ def _matrices_scene(name: str, title: str, path: Path, data: dict[str, Any]) -> 
     return Scene(name, title, matrices=tuple(files))
 
 
-def _plain(table: Table) -> dict[str, Any]:
+def plain(table: Table) -> dict[str, Any]:
+    """What a key is made of."""
     return table.model_dump(mode="json")

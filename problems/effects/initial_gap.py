@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ..assembly import Matrix, Vector
-from ..effect import GapEffect
+from ..effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
 from ..joint import Finite, Joint, Positive, Table
 
 
@@ -25,21 +26,30 @@ class InitialGap(GapEffect):
 
     The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
     roots Lx and Ly of two one-dimensional correlation matrices. A negative gap is an overclosure.
+    `between` names one contact; where it is not given, all of them get the gap, each a field of its own.
     """
+
+    units: ClassVar = {"mean": "mm", "sd": "mm", "correlation_length": "mm"}
 
     kind: Literal["initial_gap"]
     mean: Finite
     random: RandomField | None = None
+    between: Between = None
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_pair(self.between, joint)
 
     def gap(self, joint: Joint) -> Vector:
-        g = np.full(joint.size[1], self.mean)
+        g = np.zeros(joint.size[1])
+        pairs = pairs_of(self.between, joint)
+        for pair in pairs:
+            g[contacts_of(pair, joint)] = self.mean
         if self.random:
             rng = np.random.default_rng(self.random.seed)
             Lx, Ly = (_square_root(grid, self.random.correlation_length) for grid in (joint.x, joint.y))
-            for k in range(len(joint.pairs)):
+            for pair in pairs:
                 Z = rng.standard_normal((len(joint.y), len(joint.x)))
-                field = self.random.sd * (Ly @ Z @ Lx).ravel()
-                g[k * joint.node_count : (k + 1) * joint.node_count] += field
+                g[contacts_of(pair, joint)] += self.random.sd * (Ly @ Z @ Lx).ravel()
         return g
 
 

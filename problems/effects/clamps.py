@@ -1,0 +1,39 @@
+"""Holding clamps: each presses the parts together over a round pad."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..assembly import Vector
+from ..effect import Between, ForceEffect, pressed, unknown_pair
+from ..joint import Joint, Positive
+from ..positions import Positions
+
+
+class Clamps(Positions, ForceEffect):
+    """f += force on the first part of every contact, −= on the second, shared by the nodes under the pad.
+
+    clamping_force in N a clamp, spread evenly over the junction nodes within `radius` mm of the clamp's node.
+    `between` names one contact; where it is not given, the clamp goes round all of them.
+    """
+
+    units: ClassVar = {"clamping_force": "N", "radius": "mm", "points": "mm", "edge": "mm"}
+
+    kind: Literal["clamps"]
+    clamping_force: Positive
+    radius: Positive = 20.0
+    between: Between = None
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_pair(self.between, joint)
+        yield from self.misplaced(joint)
+
+    def force(self, joint: Joint) -> Vector:
+        nodal = np.zeros(joint.node_count)
+        for centre in joint.nodes[self.nearest_nodes(joint)]:
+            under = np.hypot(*(joint.nodes - centre).T) <= self.radius
+            nodal[under] += self.clamping_force / under.sum()
+        return pressed(nodal, self.between, joint)

@@ -1,0 +1,63 @@
+"""Installed fasteners: springs that tie the two parts of a contact together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import ClassVar, Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..assembly import Vector
+from ..effect import Between, Effect, ForceEffect, Pair, TieEffect, pairs_of, unknown_pair
+from ..joint import TOOL, Finite, Joint, Positive
+from ..positions import Positions
+
+
+class InstalledFasteners(Positions, TieEffect):
+    """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = e_a − e_b.
+
+    stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
+    shank through 20 mm. approach in mm: how much closer than in their initial state the parts were when
+    the fastener was set, so 0 keeps the gap as it was, and the initial gap keeps it closed. Each acts on
+    the junction node nearest to it. `between` names one contact; else a fastener ties all that it crosses.
+    """
+
+    units: ClassVar = {"stiffness": "N/mm", "approach": "mm", "points": "mm", "edge": "mm"}
+
+    kind: Literal["installed_fasteners"]
+    stiffness: Positive = 1e5
+    approach: Finite = 0.0
+    between: Between = None
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_pair(self.between, joint)
+        yield from self.misplaced(joint)
+        if not self._tied(joint):
+            yield "between", self.between, "a contact of two parts; a fastener does not tie to the tool"
+
+    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+        """A hole holds one element: no two ties, no tie and preload, at one node of one contact."""
+        mine = set(self.nearest_nodes(joint))
+        for other in others:
+            if isinstance(other, Positions) and isinstance(other, ForceEffect):
+                shared = mine & set(other.nearest_nodes(joint))
+                if shared and set(self._tied(joint)) & set(pairs_of(getattr(other, "between", None), joint)):
+                    where = [joint.nodes[node].tolist() for node in sorted(shared)]
+                    yield "points", where, f"nodes of their own: {other.kind} acts at the same nodes"
+
+    def _tied(self, joint: Joint) -> list[Pair]:
+        return [pair for pair in pairs_of(self.between, joint) if pair[1] != TOOL]
+
+    def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
+        nodes = self.nearest_nodes(joint)
+        columns = []
+        for first, second in self._tied(joint):
+            for node in nodes:
+                ends = [joint.unknowns(first).start + node, joint.unknowns(second).start + node]
+                columns.append(sp.coo_array(([1.0, -1.0], (ends, [0, 0])), shape=(joint.size[0], 1)))
+        return sp.csc_array(sp.hstack(columns)), np.full(len(columns), self.stiffness)
+
+    def force(self, joint: Joint) -> Vector:
+        T, k = self.springs(joint)
+        return T @ (k * self.approach)

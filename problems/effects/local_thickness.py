@@ -1,0 +1,64 @@
+"""Local thickness: a rectangle of a part that is thicker or thinner than the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import scipy.sparse as sp
+
+from ..effect import Effect, Range, StiffnessEffect
+from ..hermite import line_matrices
+from ..joint import Finite, Joint, Positive
+from ..plate import Plate
+
+
+class LocalThickness(StiffnessEffect):
+    """K += (D(t') − D(t)) / D(t) times the plate's own stiffness integrated over the rectangle; mm.
+
+    The mid-plane stays where it is. self_weight and thermal_bending see the thickness, too.
+    """
+
+    units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
+
+    kind: Literal["local_thickness"]
+    thickness: Positive
+    x: tuple[Finite, Finite]
+    y: tuple[Finite, Finite]
+
+    @property
+    def pad(self) -> tuple[float, Range, Range]:
+        return self.thickness, self.x, self.y
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from super().faults(joint)
+        for part in joint.part:
+            if part.name == self.part:
+                plate = joint.plate(part)
+                for key, (start, stop), grid in (("x", self.x, plate.x), ("y", self.y, plate.y)):
+                    if not grid[0] <= start < stop <= grid[-1]:
+                        yield key, [start, stop], f"start < stop on the part, {grid[0]:g} … {grid[-1]:g} mm"
+
+    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+        for other in others:
+            if (
+                isinstance(other, LocalThickness)
+                and other.part == self.part
+                and max(self.x[0], other.x[0]) < min(self.x[1], other.x[1])
+                and max(self.y[0], other.y[0]) < min(self.y[1], other.y[1])
+            ):
+                allowed = f"an area of its own: another local_thickness has {list(other.x)} × {list(other.y)}"
+                yield "x, y", [list(self.x), list(self.y)], allowed
+
+    def stiffness(self, plate: Plate) -> sp.csr_array:
+        nu = plate.poisson
+        X, Y = line_matrices(plate.x, *self.x), line_matrices(plate.y, *self.y)
+        bending = (
+            sp.kron(Y.M, X.H)
+            + sp.kron(Y.H, X.M)
+            + nu * (sp.kron(Y.B, X.B.T) + sp.kron(Y.B.T, X.B))
+            + 2 * (1 - nu) * sp.kron(Y.G, X.G)
+        )
+        change = replace(plate, thickness=self.thickness).rigidity - plate.rigidity
+        return (change * bending).tocsr()

@@ -1,0 +1,61 @@
+"""Measured gap: points with the gap that was found there, interpolated to the contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+from ..assembly import Vector
+from ..csv_table import in_place_of_file
+from ..effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from ..joint import Finite, Joint
+
+
+class MeasuredGap(GapEffect):
+    """g += linear interpolation of the points (x, y, gap) in mm, from `file`, a CSV with these columns.
+
+    Linear on the Delaunay triangles of the points; beyond their hull the gap of the nearest point. The
+    points may lie beside the junction. `between` names one contact; else all of them get the gap.
+    """
+
+    units: ClassVar = {"points": "mm"}
+
+    kind: Literal["measured_gap"]
+    points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3)]
+    between: Between = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_file(cls, data: Any, info: ValidationInfo) -> Any:
+        return in_place_of_file(data, info, "points", ("x", "y", "gap"))
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_pair(self.between, joint)
+        places = np.array(self.points)[:, :2]
+        if np.linalg.matrix_rank(places - places.mean(axis=0), tol=1e-9 * np.ptp(places)) < 2:
+            yield "points", "all on one line", "three points off a line"
+        _, first, count = np.unique(places, axis=0, return_index=True, return_counts=True)
+        for k in first[count > 1]:
+            yield f"points[{k}]", list(self.points[k]), "one gap at each point; this point comes twice"
+
+    def conflicts(self, others: Any, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        for other in others:
+            if isinstance(other, MeasuredGap) and set(pairs_of(self.between, joint)) & set(
+                pairs_of(other.between, joint)
+            ):
+                yield "between", self.between, "one measured_gap a contact: another one measured the same"
+
+    def gap(self, joint: Joint) -> Vector:
+        points = np.array(self.points)
+        places, values = points[:, :2], points[:, 2]
+        at_nodes = LinearNDInterpolator(places, values)(joint.nodes)
+        beyond = np.isnan(at_nodes)
+        at_nodes[beyond] = NearestNDInterpolator(places, values)(joint.nodes[beyond])
+        g = np.zeros(joint.size[1])
+        for pair in pairs_of(self.between, joint):
+            g[contacts_of(pair, joint)] = at_nodes
+        return g

@@ -1,0 +1,48 @@
+"""A rigid tool: a surface that one part may touch and not pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..assembly import Vector
+from ..effect import Effect, GapEffect, Pair, contacts_of, unknown_part
+from ..joint import TOOL, Finite, Joint
+
+
+class RigidTool(GapEffect):
+    """Adds the contact of `part` and the tool at every junction node, x ≤ g, with
+
+        g += distance + ½ κ_x (x − x_0)² + ½ κ_y (y − y_0)².
+
+    distance in mm; curvature = (κ_x, κ_y) in 1/mm: positive where the tool bends away from the part;
+    crest = (x_0, y_0) in mm, the middle of the junction where it is not given.
+    """
+
+    units: ClassVar = {"distance": "mm", "curvature": "1/mm", "crest": "mm"}
+
+    kind: Literal["rigid_tool"]
+    part: str
+    distance: Finite = 0.0
+    curvature: tuple[Finite, Finite] = (0.0, 0.0)
+    crest: tuple[Finite, Finite] | None = None
+
+    @property
+    def contacts(self) -> tuple[Pair, ...]:
+        return ((self.part, TOOL),)
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_part(self.part, joint)
+
+    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+        if any(isinstance(other, RigidTool) and other.part == self.part for other in others):
+            yield "part", self.part, "one rigid_tool a part: another one stands against this part"
+
+    def gap(self, joint: Joint) -> Vector:
+        crest = self.crest or (joint.junction.length / 2, joint.junction.width / 2)
+        g = np.zeros(joint.size[1])
+        away = 0.5 * (joint.nodes - crest) ** 2 @ self.curvature
+        g[contacts_of((self.part, TOOL), joint)] = self.distance + away
+        return g

@@ -1,0 +1,37 @@
+"""Self-weight of a part, with what of it lies beyond the junction."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..assembly import Vector
+from ..effect import PartLoadEffect, PartModel
+from ..joint import Finite, Positive
+from ..line_loads import line_loads
+
+KG_PER_M3_TIMES_M_PER_S2 = 1e-9  # N/mm³
+
+
+class SelfWeight(PartLoadEffect):
+    """f += ρ g t ∫ φ over the part: density ρ in kg/m³, gravity g in m/s².
+
+    A positive gravity pulls the part in the direction of positive displacements. The weight is that of
+    the plate and its pads, not of stringers and ribs.
+    """
+
+    units: ClassVar = {"density": "kg/m³", "gravity": "m/s²"}
+
+    kind: Literal["self_weight"]
+    density: Positive = 2700.0
+    gravity: Finite = 9.80665
+
+    def load(self, model: PartModel) -> Vector:
+        weight = self.density * self.gravity * KG_PER_M3_TIMES_M_PER_S2
+        f = np.zeros(model.plate.size)
+        for sign, thickness, x, y in model.areas():
+            along_x, _ = line_loads(model.plate.x, *x)
+            along_y, _ = line_loads(model.plate.y, *y)
+            f += sign * weight * thickness * np.kron(along_y, along_x)
+        return f

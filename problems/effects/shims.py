@@ -1,0 +1,46 @@
+"""Shims: a sheet of given thickness fills the gap over a rectangle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..assembly import Vector
+from ..effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from ..joint import Finite, Joint, Positive
+
+
+class Shims(GapEffect):
+    """g −= thickness at every contact with x and y in the ranges, borders included; mm.
+
+    A shim is rigid. One thicker than the gap holds the parts apart there; two over one another add up.
+    `between` names the contact; where it is not given, each contact gets a shim.
+    """
+
+    units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
+
+    kind: Literal["shims"]
+    thickness: Positive
+    x: tuple[Finite, Finite]
+    y: tuple[Finite, Finite]
+    between: Between = None
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_pair(self.between, joint)
+        if not self._covered(joint).any():
+            hx, hy = joint.x[1] - joint.x[0], joint.y[1] - joint.y[0]
+            allowed = f"ranges with a node in them; nodes stand every {hx:g} × {hy:g} mm from 0, 0"
+            yield "x, y", [list(self.x), list(self.y)], allowed
+
+    def _covered(self, joint: Joint) -> NDArray[np.bool_]:
+        at_x, at_y = joint.nodes.T
+        return (self.x[0] <= at_x) & (at_x <= self.x[1]) & (self.y[0] <= at_y) & (at_y <= self.y[1])
+
+    def gap(self, joint: Joint) -> Vector:
+        g = np.zeros(joint.size[1])
+        for pair in pairs_of(self.between, joint):
+            g[contacts_of(pair, joint)][self._covered(joint)] = -self.thickness
+        return g

@@ -1,0 +1,56 @@
+"""Support shift: supports that do not stand where they should."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ..assembly import Vector
+from ..effect import Effect, PartLoadEffect, PartModel
+from ..joint import Finite, Joint
+from .supports import Supports
+
+
+class SupportShift(PartLoadEffect):
+    """f += k · shift · e at each of `points`, where the scene has a support of stiffness k.
+
+    A support's spring then has its zero at w = shift (mm) instead of w = 0.
+    """
+
+    units: ClassVar = {"shift": "mm", "points": "mm"}
+
+    kind: Literal["support_shift"]
+    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1)]
+    shift: Finite
+
+    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+        shifted = [
+            point
+            for other in others
+            if isinstance(other, SupportShift) and other.part == self.part
+            for point in other.points
+        ]
+        standing = [
+            point
+            for other in others
+            if isinstance(other, Supports) and other.part == self.part
+            for point in other.points
+        ]
+        for k, point in enumerate(self.points):
+            if point not in standing:
+                allowed = f"a point of a supports effect of part {self.part}, one of {standing}"
+                yield f"points[{k}]", list(point), allowed
+            if point in shifted:
+                yield f"points[{k}]", list(point), "one support_shift a support: another one shifts this one"
+
+    def load(self, model: PartModel) -> Vector:
+        f = np.zeros(model.plate.size)
+        for effect in model.effects:
+            if isinstance(effect, Supports):
+                for point in set(effect.points) & set(self.points):
+                    e = model.plate.evaluate(*point)
+                    f += effect.stiffness_per_point * self.shift * e.toarray()[0]
+        return f

@@ -1,0 +1,39 @@
+"""Thermal bending: one face of a part is warmer than the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ..assembly import Vector
+from ..effect import PartLoadEffect, PartModel
+from ..joint import Finite, Positive
+from ..line_loads import line_loads
+
+
+class ThermalBending(PartLoadEffect):
+    """f −= D (1 + ν) κ ∫ (φ_xx + φ_yy) over the part, κ = α ΔT / t.
+
+    difference ΔT in K: the temperature of the face in the direction of positive displacements less that
+    of the other, linear through the thickness; expansion α in 1/K. The free part would bend to
+    w_xx = w_yy = −κ, without stress. Stringers and ribs stay at the mean temperature.
+    """
+
+    units: ClassVar = {"difference": "K", "expansion": "1/K"}
+
+    kind: Literal["thermal_bending"]
+    difference: Finite
+    expansion: Positive = 23e-6
+
+    def load(self, model: PartModel) -> Vector:
+        plate = model.plate
+        f = np.zeros(plate.size)
+        for sign, thickness, x, y in model.areas():
+            kappa = self.expansion * self.difference / thickness
+            moment = replace(plate, thickness=thickness).rigidity * (1 + plate.poisson) * kappa
+            x_value, x_bend = line_loads(plate.x, *x)
+            y_value, y_bend = line_loads(plate.y, *y)
+            f -= sign * moment * (np.kron(y_value, x_bend) + np.kron(y_bend, x_value))
+        return f

@@ -1,0 +1,70 @@
+"""Abaqus matrix text, as *MATRIX OUTPUT writes it: the stiffness as lines of numbers.
+
+    row node, row dof, column node, column dof, value      FORMAT=MATRIX INPUT
+    row, column, value                                     FORMAT=COORDINATE
+
+One triangle of K or both. Abaqus has no text for A, f, g: they go beside it as Matrix Market files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import Fault, InputError
+from . import Data
+from .mtx_format import write_others
+
+NORMAL = 3  # the degree of freedom that displacements are written as
+
+
+def write(path: Path, data: Data) -> None:
+    path.mkdir(parents=True, exist_ok=True)
+    lower = sp.coo_array(sp.tril(data["K"]))
+    lines = (
+        f"{i + 1},{NORMAL},{j + 1},{NORMAL},{value!r}\n"
+        for i, j, value in zip(*lower.coords, lower.data.tolist(), strict=True)
+    )
+    with (path / "K.mtx").open("w", encoding="ascii") as file:
+        file.writelines(lines)
+    write_others(path, data)
+
+
+def read(path: Path) -> Data:
+    rows = _rows(path)
+    wide = rows.shape[1] == 5
+    first = rows[:, :2] if wide else np.column_stack([rows[:, 0], np.zeros(len(rows))])
+    second = rows[:, 2:4] if wide else np.column_stack([rows[:, 1], np.zeros(len(rows))])
+    unknowns, place = np.unique(np.vstack([first, second]), axis=0, return_inverse=True)
+    i, j = place.ravel()[: len(rows)], place.ravel()[len(rows) :]
+    n = len(unknowns)
+    K = sp.csr_array(sp.coo_array((rows[:, -1], (i, j)), shape=(n, n)))
+    if sp.tril(K, -1).nnz == 0 or sp.triu(K, 1).nnz == 0:
+        K = K + K.T - sp.diags_array(K.diagonal())
+    return {path.stem: sp.csr_array(K)}
+
+
+def _rows(path: Path) -> np.ndarray:
+    """(k, 5) or (k, 3) numbers. Raises InputError with the lines that are something else."""
+    rows: list[list[float]] = []
+    faults: list[Fault] = []
+    with path.open(encoding="ascii", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            if not line.strip() or line.startswith("*"):  # ** comments, *MATRIX ASSEMBLE, …
+                continue
+            try:
+                row = [float(word) for word in line.replace(",", " ").split()]
+            except ValueError:
+                row = []
+            if len(row) not in (3, 5) or (rows and len(row) != len(rows[0])):
+                allowed = "node, dof, node, dof, value; or row, column, value; on every line the same"
+                faults.append(Fault(str(path), f"line {number}", line.strip(), allowed))
+            else:
+                rows.append(row)
+    if not rows and not faults:
+        faults.append(Fault(str(path), "lines", 0, "at least one"))
+    if faults:
+        raise InputError(faults)
+    return np.array(rows)

@@ -1,0 +1,33 @@
+"""Matrix Market: a folder with K.mtx, A.mtx, f.mtx, g.mtx; 17 digits keep every bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import scipy.io
+import scipy.sparse as sp
+
+from . import Data, vector
+
+
+def write(path: Path, data: Data) -> None:
+    path.mkdir(parents=True, exist_ok=True)
+    write_one(path / "K.mtx", data["K"], "symmetric")
+    write_others(path, data)
+
+
+def write_others(path: Path, data: Data) -> None:
+    write_one(path / "A.mtx", data["A"], "general")
+    for name in "fg":
+        write_one(path / f"{name}.mtx", data[name][:, None], "general")
+
+
+def write_one(path: Path, matrix: object, symmetry: str) -> None:
+    scipy.io.mmwrite(path, matrix, precision=17, symmetry=symmetry)
+
+
+def read(path: Path) -> Data:
+    found = scipy.io.mmread(path)
+    if path.stem in "fg":
+        found = vector(found.toarray() if sp.issparse(found) else found)
+    return {path.stem: found}

@@ -1,0 +1,20 @@
+"""numpy's .npz with arrays K, A, f, g and optionally nodes: the format that scenes open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from . import NAMES, Data
+
+
+def write(path: Path, data: Data) -> None:
+    dense = {name: data[name].toarray() for name in "KA"}
+    with path.open("wb") as file:
+        np.savez(file, **(data | dense))
+
+
+def read(path: Path) -> Data:
+    with np.load(path) as archive:
+        return {name: archive[name] for name in NAMES if name in archive.files}

@@ -1,0 +1,19 @@
+"""Nastran OUTPUT4, binary and in double precision, by pyyeti: matrices k, a, f, g."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from . import Data, pyyeti, vector
+
+
+def write(path: Path, data: Data) -> None:
+    op4 = pyyeti(path).op4
+    columns = {name: data[name][:, None] for name in "fg"}
+    op4.OP4().write(str(path), {"k": data["K"].toarray(), "a": data["A"].toarray()} | columns, binary=True)
+
+
+def read(path: Path) -> Data:
+    found = pyyeti(path).op4.OP4().dctload(str(path), justmatrix=True)
+    data = {"K": found.get("k"), "A": found.get("a"), "f": found.get("f"), "g": found.get("g")}
+    return {name: vector(m) if name in "fg" else m for name, m in data.items() if m is not None}

@@ -1,0 +1,28 @@
+"""qpsolvers' own problem file: P = K, q = −f, G = Aᵀ, h = g."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import InputError
+from . import Data
+
+
+def write(path: Path, data: Data) -> None:
+    import qpsolvers
+
+    G = data["A"].T.toarray()
+    with path.open("wb") as file:
+        qpsolvers.Problem(data["K"].toarray(), -data["f"], G, data["g"]).save(file)
+
+
+def read(path: Path) -> Data:
+    import qpsolvers
+
+    found = qpsolvers.Problem.load(str(path))
+    for name in ("A", "b", "lb", "ub"):
+        if getattr(found, name) is not None:
+            raise InputError.one(
+                path, name, "present", "contact problems have no equations and no bounds on x"
+            )
+    return {"K": found.P, "f": -found.q, "A": found.G.T, "g": found.h}

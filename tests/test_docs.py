@@ -1,0 +1,98 @@
+"""docs/effects.md: its effect works as written, and its table is that of the code."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic_core import PydanticUndefined
+
+from problems import effects
+from problems.effect import Effect, effect_class, effect_kinds
+from problems.errors import InputError
+from problems.formats import WRITERS
+from problems.prepare import load_case, prepared
+from problems.scene import SCENES, read_scene
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = (DOCS / "effects.md").read_text("utf-8")
+JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+
+
+def test_the_scene_of_the_page_can_be_solved(tmp_path: Path) -> None:
+    assert JOINT is not None
+    (tmp_path / "scene.toml").write_text(JOINT[1])
+    scene = read_scene(str(tmp_path / "scene.toml"))
+    assert (prepared(scene).dual_load(load_case(scene, prepared(scene))) > 0).any()
+
+
+def test_the_new_effect_of_the_page_is_one_short_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Put into a folder of effects, it is known to scenes, messages and loads by its name alone."""
+    code = re.search(r"```python\n# problems/effects/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL)
+    assert JOINT is not None
+    assert code is not None
+    assert len(code[2].splitlines()) < 40
+    (tmp_path / f"{code[1]}.py").write_text(code[2])
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    monkeypatch.delitem(sys.modules, f"problems.effects.{code[1]}", raising=False)
+    table = f'[[effect]]\nkind = "{code[1]}"\npart = "skin"\nnewton = 7.5\n'
+    points = "points = [[15.0, 0.0], [600.0, 120.0]]\n"
+    (tmp_path / "bare.toml").write_text(JOINT[1])
+    (tmp_path / "scene.toml").write_text(JOINT[1] + table + points)
+    bare, scene = (read_scene(str(tmp_path / name)) for name in ("bare.toml", "scene.toml"))
+    data = prepared(scene)
+    added = load_case(scene, data).f - load_case(bare, data).f
+    second = 41 * 9  # where the skin's unknowns begin
+    assert {int(i): float(added[i]) for i in np.flatnonzero(added)} == {second + 1: 7.5, second + 368: 7.5}
+    (tmp_path / "bad.toml").write_text(JOINT[1] + table + points.replace("600", "601"))
+    with pytest.raises(
+        InputError, match=re.escape(f"({code[1]}).points[1] = [601.0, 120.0]: on the junction")
+    ):
+        read_scene(str(tmp_path / "bad.toml"))
+    sys.modules.pop(f"problems.effects.{code[1]}")
+
+
+def parameters(effect: type[Effect]) -> set[str]:
+    """The names that a scene may give, those of tables inside included."""
+    names = set(effect.model_fields) - {"kind"}
+    if {"points", "pattern"} <= names:
+        names |= {"file"}
+    return names
+
+
+@pytest.mark.parametrize("kind", effect_kinds())
+def test_the_table_names_every_parameter_with_its_default_and_unit(kind: str) -> None:
+    row = next(line for line in PAGE.splitlines() if line.startswith(f"| `{kind}` |"))
+    effect = effect_class(kind)
+    named = set(re.findall(r"`(\w+)", row.split("|", 3)[3]))
+    assert named - {"file"} == parameters(effect) - {"file"}
+    for name, field in effect.model_fields.items():
+        default = field.default
+        if name != "kind" and default is not PydanticUndefined and isinstance(default, float) and default:
+            stated = re.search(rf"`{name}` = (\S+)", row)
+            assert stated is not None
+            assert float(stated[1].rstrip(";,")) == default
+    for unit in effect.units.values():
+        assert unit.replace("1/mm", "mm") in row or kind in ("clamps", "fasteners", "installed_fasteners")
+
+
+def test_every_scene_of_the_gallery_is_shown_with_its_command_and_pictures() -> None:
+    for path in (SCENES / "gallery").glob("*.toml"):
+        name = path.stem
+        assert f"python -m harness solve gallery/{name} --out docs/gallery/{name}\n" in PAGE
+        page = (DOCS / "gallery" / name / "answer.md").read_text("utf-8")
+        assert page.startswith(f"# {read_scene(f'gallery/{name}').title}\n")
+        for picture in re.findall(r"\]\((\w+\.png)\)", page):
+            assert (DOCS / "gallery" / name / picture).is_file()
+    for picture in re.findall(r"\]\((gallery/\S+)\)", PAGE):
+        assert (DOCS / picture).is_file()
+
+
+def test_the_formats_of_the_page_are_those_of_the_code() -> None:
+    stated = re.findall(r"^\| `(\w+)` \|", PAGE[PAGE.index("## Matrices") :], re.MULTILINE)
+    assert stated == list(WRITERS)

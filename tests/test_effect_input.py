@@ -1,0 +1,194 @@
+"""What is said of bad effects: file, key, value, unit and what is allowed; contradictions by both names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from problems.errors import Fault, InputError
+from problems.scene import read_scene
+
+JOINT = """
+[joint]
+junction = { length = 100.0, width = 50.0, nodes = [5, 3] }
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+[[joint.part]]
+name = "b"
+thickness = 2.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+"""
+
+
+def faults(folder: Path, *tables: str, joint: str = JOINT) -> list[Fault]:
+    path = folder / "scene.toml"
+    path.write_text("".join(f"[[effect]]\n{table}\n" for table in tables) + joint)
+    with pytest.raises(InputError) as error:
+        read_scene(str(path))
+    return error.value.faults
+
+
+@pytest.mark.parametrize(
+    ("kind", "why"),
+    [
+        ("friction", "assumption 4"),
+        ("large_displacement", "assumption 5"),
+        ("plasticity", "assumption 5"),
+        ("tangential", "assumption 2"),
+        ("dynamics", "static"),
+    ],
+)
+def test_what_the_model_excludes_is_refused_with_its_assumption(tmp_path: Path, kind: str, why: str) -> None:
+    (fault,) = faults(tmp_path, f'kind = "{kind}"\ncoefficient = 0.2')
+    assert (fault.key, fault.value) == ("effect[0].kind", kind)
+    assert "the model excludes it" in fault.allowed
+    assert why in fault.allowed
+
+
+SUPPORTS = 'kind = "supports"\npart = "a"\npoints = [[0.0, 0.0]]'
+ALONE = [
+    ('kind = "shims"\nthickness = -0.1\nx = [0, 9]\ny = [0, 9]', "thickness", "greater than 0; in mm"),
+    ('kind = "shims"\nthickness = 0.1\nx = [3, 9]\ny = [0, 9]', "x, y", "25 × 25 mm"),
+    ('kind = "shims"\nthickness = 0.1\nx = [9, 3]\ny = [0, 9]', "x, y", "25 × 25 mm"),
+    ('kind = "self_weight"\npart = "a"\ndensity = 0', "density", "greater than 0; in kg/m³"),
+    ('kind = "self_weight"\npart = "c"', "part", "['a', 'b']"),
+    ('kind = "thermal_bending"\npart = "a"\ndifference = nan', "difference", "finite number; in K"),
+    ('kind = "thermal_bending"\npart = "a"', "difference", "required; in K"),
+    ('kind = "clamps"\nclamping_force = -1\npoints = [[1, 1]]', "clamping_force", "in N"),
+    ('kind = "clamps"\nclamping_force = 1\npoints = [[1, 51]]', "points[0]", "0 … 50 mm"),
+    ('kind = "installed_fasteners"\nstiffness = 0\npoints = [[1, 1]]', "stiffness", "in N/mm"),
+    ('kind = "installed_fasteners"\npoints = [[1, 1]]\nbetween = ["a", "c"]', "between", "['a', 'b']"),
+    ('kind = "initial_gap"\nmean = 1\nbetween = ["b", "a"]', "between", "['a', 'b']"),
+    ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 9, 1], [18, 18, 1]]', "points", "off a line"),
+    ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 9, 1]]', "points", "at least 3 items"),
+    ('kind = "measured_gap"\npoints = [[0, 0, 1], [9, 0, 1], [9, 9, 2], [9, 0, 3]]', "points[1]", "twice"),
+    ('kind = "local_thickness"\npart = "a"\nthickness = 1\nx = [0, 101]\ny = [0, 9]', "x", "0 … 100 mm"),
+    ('kind = "local_thickness"\npart = "a"\nthickness = 1\nx = [9, 9]\ny = [-1, 9]', "y", "0 … 90 mm"),
+    ('kind = "rigid_tool"\npart = "a"\ncurvature = [0.1]', "curvature.1", "required; in 1/mm"),
+    (
+        'kind = "support_shift"\npart = "a"\npoints = [[0, 0]]\nshift = 1',
+        "points[0]",
+        "supports effect of part a",
+    ),
+    ('kind = "fasteners"\npreload = "much"\npoints = [[1, 1]]', "preload", "number; in N"),
+    ('kind = "pressure"\npart = "a"\nvalue = inf', "value", "in N/mm²"),
+]
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "allowed"), ALONE, ids=[f"{t.splitlines()[0][8:-1]} {k}" for t, k, _ in ALONE]
+)
+def test_a_wrong_value_is_named_with_unit_and_range(
+    tmp_path: Path, table: str, key: str, allowed: str
+) -> None:
+    found = [fault for fault in faults(tmp_path, table) if fault.key.endswith(f").{key}")]
+    assert len(found) == 1
+    assert found[0].where == str(tmp_path / "scene.toml")
+    assert allowed in found[0].allowed
+
+
+def test_units_of_a_joint(tmp_path: Path) -> None:
+    (fault,) = faults(tmp_path, joint=JOINT.replace("thickness = 2.0", "thickness = 0", 1))
+    assert fault.allowed.endswith("greater than 0; in mm")
+
+
+MEASURED = "points = [[0, 0, 1], [9, 0, 1], [9, 9, 2]]"
+PAD = 'kind = "local_thickness"\npart = "a"\nthickness = {}\nx = [{}, {}]\ny = [0, 50]'
+CONTRADICTIONS = {
+    "one gap measured twice": [
+        f'kind = "measured_gap"\n{MEASURED}',
+        f'kind = "measured_gap"\n{MEASURED}\nbetween = ["a", "b"]',
+    ],
+    "two tools at one part": [
+        'kind = "rigid_tool"\npart = "b"',
+        'kind = "rigid_tool"\npart = "b"\ndistance = 1',
+    ],
+    "pads that overlap": [PAD.format(3, 0, 50), PAD.format(4, 49, 80)],
+    "a hole twice": [
+        'kind = "installed_fasteners"\npoints = [[0, 0]]',
+        'kind = "installed_fasteners"\npoints = [[50, 25], [3, 0]]',
+    ],
+    "a support shifted twice": [
+        'kind = "support_shift"\npart = "a"\npoints = [[0, 0]]\nshift = 1',
+        'kind = "support_shift"\npart = "a"\npoints = [[0, 0]]\nshift = 2',
+        SUPPORTS,
+    ],
+}
+
+
+@pytest.mark.parametrize("case", CONTRADICTIONS)
+def test_effects_that_contradict_each_other_are_both_named(tmp_path: Path, case: str) -> None:
+    found = faults(tmp_path, *CONTRADICTIONS[case])
+    assert [fault.key[:9] for fault in found] == ["effect[0]", "effect[1]"]
+
+
+def test_a_preload_at_an_installed_fastener(tmp_path: Path) -> None:
+    tables = [
+        'kind = "fasteners"\npreload = 1\npoints = [[0, 0]]',
+        'kind = "installed_fasteners"\npoints = [[9, 3]]',
+    ]
+    for order in (tables, tables[::-1]):
+        (fault,) = faults(tmp_path, *order)
+        assert "installed_fasteners" in fault.key
+        assert "fasteners acts at the same nodes" in fault.allowed
+
+
+def test_pads_side_by_side_are_no_contradiction(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text("".join(f"[[effect]]\n{PAD.format(3, *x)}\n" for x in ((0, 50), (50, 80))) + JOINT)
+    assert len(read_scene(str(path)).effects) == 2
+
+
+GAPS = 'kind = "measured_gap"\nfile = "gaps.csv"'
+
+
+def test_every_bad_row_of_a_file_is_named_by_its_line(tmp_path: Path) -> None:
+    (tmp_path / "gaps.csv").write_text("x,y,gap\n0,0,0.1\n50,zero,0.1\n\n90,0\n0,50,nan\n90,50,0.3\n")
+    found = faults(tmp_path, GAPS, 'kind = "shims"\nthickness = 0\nx = [0, 9]\ny = [0, 9]')
+    file = str(tmp_path / "gaps.csv")
+    assert [(fault.where, fault.key, fault.value) for fault in found[:-1]] == [
+        (file, "line 3", "50,zero,0.1"),
+        (file, "line 5", "90,0"),
+        (file, "line 6", "0,50,nan"),
+    ]
+    assert found[-1].key == "effect[1] (shims).thickness"
+
+
+@pytest.mark.parametrize(
+    ("content", "key"),
+    [
+        (b"x;y;gap\n0;0;1\n", "line 1"),
+        (b"0,0,1\n9,9,1\n", "line 1"),
+        (b"", "line 1"),
+        (b"x,y,gap\n", "rows"),
+        (b"x,y,gap\n\xff\xfe,1,1\n", "file"),
+        (None, "file"),
+    ],
+)
+def test_a_file_that_is_no_table(tmp_path: Path, content: bytes | None, key: str) -> None:
+    if content is not None:
+        (tmp_path / "gaps.csv").write_bytes(content)
+    (fault,) = faults(tmp_path, GAPS)
+    assert (fault.where, fault.key) == (str(tmp_path / "gaps.csv"), key)
+
+
+def test_a_file_and_a_list_at_once(tmp_path: Path) -> None:
+    (fault,) = faults(tmp_path, 'kind = "fasteners"\npreload = 1\nfile = "a.csv"\npoints = [[1, 1]]')
+    assert "either points or a file" in fault.allowed
+
+
+def test_the_key_depends_on_what_a_file_says_not_on_its_name(tmp_path: Path) -> None:
+    def key(name: str, content: str) -> str:
+        (tmp_path / name).write_text(content)
+        path = tmp_path / "scene.toml"
+        path.write_text(f'[[effect]]\nkind = "measured_gap"\nfile = "{name}"\n' + JOINT)
+        return read_scene(str(path)).key
+
+    same = "x,y,gap\n0,0,0.1\n100,0,0.2\n0,50,0.3\n"
+    assert key("one.csv", same) == key("two.csv", "gap,y,x,who\n0.1,0,0,A\n0.2,0,100,B\n0.3,50.0,0,C\n")
+    assert key("one.csv", same.replace("0.3", "0.31")) != key("two.csv", same)

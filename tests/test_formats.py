@@ -1,0 +1,259 @@
+"""Matrices out to other programs' files and back, and what is said of the files' digits."""
+
+from __future__ import annotations
+
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+from small import make_load, make_prepared, solve_by_nnls
+from typer.testing import CliRunner
+
+from harness.cli import app
+from harness.exchange import export, import_, matrices
+from harness.trials import prepared_from
+from problems import build, formats
+from problems.assembly import LoadCase, Prepared
+from problems.digits import apparent_digits, expected_error
+from problems.errors import InputError
+from problems.prepare import load_case, prepared
+from problems.scene import read_scene
+
+QUIET = Console(file=StringIO())
+SCENE = "gallery/installed-fasteners"  # springs join both parts into one block of K
+FOLDERS = ("mtx", "abaqus")
+PATHS = {"npz": "p.npz", "op4": "p.op4", "dmig": "p.pch", "qpsolvers": "q.npz", "mtx": "m", "abaqus": "a"}
+
+
+def files_of(form: str, path: Path) -> list[str]:
+    return [str(path / f"{name}.mtx") for name in "KAfg"] if form in FOLDERS else [str(path)]
+
+
+def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """K, A, f, g of the scene, and the same after export and import."""
+    if form in ("op4", "dmig"):
+        pytest.importorskip("pyyeti")
+    export(SCENE, form, folder / PATHS[form], QUIET)
+    import_(files_of(form, folder / PATHS[form]), folder / "back.npz", QUIET)
+    scene = read_scene(SCENE)
+    data = prepared(scene)
+    wanted = matrices(data, load_case(scene, data))
+    return wanted, dict(np.load(folder / "back.npz"))
+
+
+@pytest.mark.parametrize("form", [form for form in formats.WRITERS if form != "dmig"])
+def test_there_and_back_bit_for_bit(form: str, tmp_path: Path) -> None:
+    wanted, found = there_and_back(form, tmp_path)
+    for name in "KA":
+        np.testing.assert_array_equal(found[name], wanted[name].toarray())
+    for name in "fg":
+        np.testing.assert_array_equal(found[name], wanted[name])
+    if form == "npz":
+        np.testing.assert_array_equal(found["nodes"], wanted["nodes"])
+
+
+def test_dmig_keeps_ten_digits(tmp_path: Path) -> None:
+    wanted, found = there_and_back("dmig", tmp_path)
+    np.testing.assert_allclose(found["K"], wanted["K"].toarray(), rtol=1e-9)
+    np.testing.assert_array_equal(found["A"], wanted["A"].toarray())
+    np.testing.assert_allclose(found["f"], wanted["f"], rtol=1e-9)
+    np.testing.assert_allclose(found["g"], wanted["g"], rtol=1e-9)
+
+
+def test_the_imported_problem_has_the_scenes_answer(tmp_path: Path) -> None:
+    scene = read_scene("gallery/three-part-stack")
+    export(scene.name, "npz", tmp_path / "stack.npz", QUIET)
+    own = read_scene(str(tmp_path / "stack.npz"))
+    one, two = prepared(scene), prepared(own)
+    np.testing.assert_array_equal(two.Q, one.Q)
+    for K, L in zip(one.assembly.blocks, two.assembly.blocks, strict=True):
+        np.testing.assert_array_equal(K, L)
+    np.testing.assert_array_equal(load_case(own, two).f, load_case(scene, one).f)
+
+
+def test_qpsolvers_reads_its_file(tmp_path: Path) -> None:
+    """And solves it: quadprog's x is the scene's."""
+    qpsolvers = pytest.importorskip("qpsolvers")
+    export("gallery/sheet-over-former", "qpsolvers", tmp_path / "q.npz", QUIET)
+    x = qpsolvers.solve_problem(qpsolvers.Problem.load(str(tmp_path / "q.npz")), solver="quadprog").x
+    scene = read_scene("gallery/sheet-over-former")
+    data = prepared(scene)
+    np.testing.assert_allclose(x, solve_by_nnls(data, load_case(scene, data))[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", ["lower", "upper", "both"])
+@pytest.mark.parametrize("labels", [True, False])
+def test_abaqus_text_in_its_shapes(shape: str, labels: bool, tmp_path: Path) -> None:
+    """Nodes 7, 12 and 100 with the degrees of freedom 3 and 1 3; by hand, one number without exponent."""
+    K = np.array([[4.0, 1.0, 0.0, -0.5], [1.0, 5.0, 0.25, 0.0], [0.0, 0.25, 6.0, 0.0], [-0.5, 0.0, 0.0, 7.0]])
+    at = [(7, 3), (12, 1), (12, 3), (100, 3)]
+    lines = ["** made by hand", "*MATRIX INPUT"]
+    for i in range(4):
+        for j in range(4):
+            wanted = {"lower": i >= j, "upper": i <= j, "both": True}[shape]
+            if K[i, j] and wanted:
+                where = [*at[i], *at[j]] if labels else [i + 1, j + 1]
+                lines.append(", ".join(map(str, where)) + f", {K[i, j]:.17e}")
+    (tmp_path / "K.mtx").write_text("\n".join(lines) + "\n")
+    found = formats.read(tmp_path / "K.mtx")
+    np.testing.assert_array_equal(found["K"].toarray(), K)
+
+
+def test_bad_lines_of_abaqus_text_are_named(tmp_path: Path) -> None:
+    (tmp_path / "K.mtx").write_text("1,3,1,3,5.0\n1,3,2,3,what\n2,3,2,3\n\n2,2,1.0\n")
+    with pytest.raises(InputError) as error:
+        formats.read(tmp_path / "K.mtx")
+    assert [fault.key for fault in error.value.faults] == ["line 2", "line 3", "line 5"]
+
+
+# --- import -------------------------------------------------------------------------------------------
+
+
+def small(seed: int = 3) -> tuple[Prepared, LoadCase]:
+    data = make_prepared(seed, 5, tools=2)
+    return data, make_load(seed, data)[0]
+
+
+def written(folder: Path, **changes: Any) -> list[str]:
+    formats.write("mtx", folder, matrices(*small()) | changes)
+    return files_of("mtx", folder)
+
+
+def test_a_file_of_another_name(tmp_path: Path) -> None:
+    files = written(tmp_path)
+    renamed = tmp_path / "job_STIF2.mtx"
+    (tmp_path / "K.mtx").rename(renamed)
+    with pytest.raises(InputError, match="job_STIF2"):
+        import_([str(renamed), *files[1:]], tmp_path / "out.npz", QUIET)
+    import_([f"K={renamed}", *files[1:]], tmp_path / "out.npz", QUIET)
+    assert dict(np.load(tmp_path / "out.npz"))["K"].shape == (12, 12)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"K": -sp.eye_array(12)}, "positive definite"),
+        ({"f": np.ones(11)}, "f.shape"),
+        ({"g": np.full(7, np.nan)}, "NaN"),
+        ({"A": sp.csc_array(np.zeros((12, 7)))}, "each contact must touch an unknown"),
+    ],
+)
+def test_bad_matrices_are_refused_and_nothing_is_left(change: Any, said: str, tmp_path: Path) -> None:
+    files = written(tmp_path / "in", **change)
+    with pytest.raises(InputError, match=said):
+        import_(files, tmp_path / "out.npz", QUIET)
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
+def test_an_asymmetric_K_is_refused(tmp_path: Path) -> None:
+    data = matrices(*small())
+    K = data["K"].toarray()
+    K[0, 1] *= 1.1
+    np.savez(tmp_path / "p.npz", K=K, A=data["A"].toarray(), f=data["f"], g=data["g"])
+    with pytest.raises(InputError, match="max"):
+        import_([str(tmp_path / "p.npz")], tmp_path / "out.npz", QUIET)
+
+
+def test_what_is_missing_or_of_no_format_is_named(tmp_path: Path) -> None:
+    files = written(tmp_path)
+    (tmp_path / "x.txt").write_text("1 2 3")
+    for given_files, said in (
+        (files[:2], "is in none of the files"),
+        ([str(tmp_path / "x.txt")], ".op4"),
+        ([str(tmp_path / "none.mtx")], "no such file"),
+    ):
+        done = CliRunner().invoke(app, ["import", *given_files, "--out", str(tmp_path / "out.npz")])
+        assert done.exit_code == 2
+        assert said in done.output
+    done = CliRunner().invoke(app, ["export", SCENE, "--format", "xls", "--out", str(tmp_path / "o")])
+    assert done.exit_code == 2
+    assert "qpsolvers" in done.output
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no archive", b"%%MatrixMarket nothing\n"])
+@pytest.mark.parametrize("name", ["K.npz", "K.mtx"])
+def test_damaged_files_are_named(content: bytes, name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=name):
+        formats.read(tmp_path / name)
+
+
+def test_nastran_without_pyyeti_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pyyeti", None)
+    (tmp_path / "k.op4").write_bytes(b"x" * 100)
+    with pytest.raises(InputError, match="pip install"):
+        formats.read(tmp_path / "k.op4")
+    with pytest.raises(InputError, match="pip install"):
+        export(SCENE, "dmig", tmp_path / "k.pch", QUIET)
+
+
+# --- digits -------------------------------------------------------------------------------------------
+
+
+@given(st.integers(3, 14), st.integers(0, 1000))
+@settings(deadline=None, max_examples=40)
+def test_rounded_values_show_their_digits(digits: int, seed: int) -> None:
+    values = np.random.default_rng(seed).normal(size=300) * 10.0 ** np.arange(-5, 5).repeat(30)
+    assert apparent_digits(rounded(values, digits)) == digits
+
+
+def test_unrounded_and_single_precision_values() -> None:
+    values = np.random.default_rng(1).normal(size=300)
+    assert apparent_digits(values) == 16
+    assert apparent_digits(values.astype(np.float32).astype(float)) == 7
+    assert apparent_digits(np.array([2.0, -1.0, 0.0])) == 1
+
+
+def rounded(K: Any, digits: int) -> Any:
+    return np.vectorize(lambda value: float(f"{value:.{digits - 1}e}"))(K)
+
+
+@pytest.mark.parametrize("digits", [9, 11])
+def test_the_expected_error_is_that_of_rounding(digits: int) -> None:
+    """Against solving with the rounded matrix, some contacts closed: within a factor of five of the middle
+    one of nine units of force, in each of which K is rounded differently."""
+    scene = read_scene("gallery/sheet-over-former")
+    data = prepared(scene)
+    load = load_case(scene, data)
+    x, lam = solve_by_nnls(data, load)
+    assert 3 < (lam > 0).sum() < 150
+    errors = []
+    for unit in 1.17 ** np.arange(9):
+        coarse = prepared_from((rounded(data.assembly.blocks[0] * unit, digits) / unit,), data.assembly.A)
+        errors.append(abs(solve_by_nnls(coarse, load)[0] - x).max())
+    expected = expected_error(data, x, lam, digits)
+    assert np.median(errors) / 5 < expected < 5 * np.median(errors)
+
+
+def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
+    scene = read_scene("gallery/sheet-over-former")
+    data = matrices(prepared(scene), load_case(scene, prepared(scene)))
+    K = data["K"].toarray()
+    data["K"] = sp.csr_array(rounded(K, 7))
+    formats.write("npz", tmp_path / "seven.npz", data)
+    shown = StringIO()
+    import_([str(tmp_path / "seven.npz")], tmp_path / "out.npz", Console(file=shown, width=200))
+    assert "seem to have 7 digits" in shown.getvalue()
+    assert "export it with more digits" in shown.getvalue()
+    formats.write("npz", tmp_path / "all.npz", data | {"K": sp.csr_array(K)})
+    shown = StringIO()
+    import_([str(tmp_path / "all.npz")], tmp_path / "out2.npz", Console(file=shown, width=200))
+    assert "all digits of double precision" in shown.getvalue()
+
+
+def test_a_built_problem_is_exported_with_all_its_terms(tmp_path: Path) -> None:
+    """Springs and loads beyond the junction are in the file, not only what build.py makes."""
+    wanted, found = there_and_back("npz", tmp_path)
+    base = build.prepared(read_scene(SCENE))
+    bare = sla.block_diag(*base.assembly.blocks)
+    assert abs(found["K"] - bare).max() == pytest.approx(5.0)
+    assert abs(wanted["f"]).max() == pytest.approx(2.5)

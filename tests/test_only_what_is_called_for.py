@@ -1,0 +1,172 @@
+"""An effect that no scene names is not imported, allocates nothing and changes no bit."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from joints import make_joint, make_scene
+
+from problems.build import cache_key
+from problems.effect import effect_class, effect_kinds
+from problems.scene import plain, read_scene, scene_names
+
+ROOT = Path(__file__).parents[1]
+JOINT = """
+[joint]
+junction = { length = 100.0, width = 50.0, nodes = [4, 3] }
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+[[joint.part]]
+name = "b"
+thickness = 3.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+"""
+OLD = {"fasteners", "initial_gap", "pressure", "ribs", "stringers", "supports"}
+#: Each kind by itself, as small as it can be.
+TABLES = {
+    "clamps": "clamping_force = 5.0\npoints = [[10.0, 10.0]]",
+    "fasteners": "preload = 5.0\npoints = [[10.0, 10.0]]",
+    "initial_gap": "mean = 0.1\nrandom = { sd = 0.1, correlation_length = 20.0, seed = 1 }",
+    "installed_fasteners": "points = [[10.0, 10.0]]",
+    "local_thickness": 'part = "a"\nthickness = 3.0\nx = [0.0, 50.0]\ny = [0.0, 50.0]',
+    "measured_gap": "points = [[0.0, 0.0, 0.1], [100.0, 0.0, 0.2], [0.0, 50.0, 0.3]]",
+    "pressure": 'part = "a"\nvalue = 1e-3',
+    "ribs": 'part = "a"\nlines = [20.0]\nI = 100.0',
+    "rigid_tool": 'part = "b"\ndistance = 0.3',
+    "self_weight": 'part = "b"',
+    "shims": "thickness = 0.1\nx = [0.0, 40.0]\ny = [0.0, 50.0]",
+    "stringers": 'part = "a"\npitch = 50.0\nstart = 0.0\nstop = 50.0\nI = 100.0',
+    "supports": 'part = "a"\npoints = [[0.0, 0.0]]',
+    "support_shift": 'part = "a"\npoints = [[0.0, 0.0]]\nshift = 0.1',
+    "thermal_bending": 'part = "a"\ndifference = 10.0',
+}
+
+RUN = """
+import sys, numpy as np
+scene_file, out, *hidden = sys.argv[1:]
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name in hidden:
+            raise ModuleNotFoundError(name)
+sys.meta_path.insert(0, Hidden())
+from problems.prepare import load_case, prepared
+from problems.scene import read_scene
+scene = read_scene(scene_file)
+made = prepared(scene)
+load = load_case(scene, made)
+blocks = {f"K{i}": K for i, K in enumerate(made.assembly.blocks)}
+np.savez(out, f=load.f, g=load.g, Q=made.Q, key=scene.key, **blocks)
+print(*[m for m in sys.modules if m.startswith("problems.")])
+"""
+
+
+def imported(scene: Path, out: Path, cache: Path, hidden: list[str]) -> set[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, str(scene), str(out), *hidden],
+        cwd=ROOT,
+        env={"RIVETBENCH_CACHE": str(cache), "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(done.stdout.split())
+
+
+def scene_of(folder: Path, *kinds: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text("".join(f'[[effect]]\nkind = "{kind}"\n{TABLES[kind]}\n' for kind in kinds) + JOINT)
+    return path
+
+
+def test_every_kind_has_a_smallest_scene_here() -> None:
+    assert set(TABLES) == set(effect_kinds())
+
+
+@pytest.mark.parametrize(
+    "kinds", [sorted(OLD), ["self_weight"], ["installed_fasteners"], ["rigid_tool", "shims"]]
+)
+def test_bits_are_the_same_without_the_other_effects_files(kinds: list[str], tmp_path: Path) -> None:
+    """Once with every module there, once with all that the scene does not name out of reach."""
+    scene = scene_of(tmp_path, *kinds)
+    needs = {"self_weight": {"condensed_load", "line_loads"}, "installed_fasteners": {"ties"}}
+    needed = set().union(*(needs.get(kind, set()) for kind in kinds))
+    hidden = [f"problems.effects.{kind}" for kind in effect_kinds() if kind not in kinds]
+    hidden += [f"problems.{name}" for name in {"condensed_load", "line_loads", "ties"} - needed]
+    everything = imported(scene, tmp_path / "all.npz", tmp_path / "cache1", [])
+    bare = imported(scene, tmp_path / "bare.npz", tmp_path / "cache2", hidden)
+    assert bare == everything
+    assert {m.removeprefix("problems.effects.") for m in bare if m.startswith("problems.effects.")} == set(
+        kinds
+    )
+    with (tmp_path / "all.npz").open("rb") as one, (tmp_path / "bare.npz").open("rb") as two:
+        assert one.read() == two.read()
+
+
+@pytest.mark.parametrize("kind", sorted(set(TABLES) - {"support_shift"}))
+def test_a_named_effect_imports_itself_alone(kind: str, tmp_path: Path) -> None:
+    found = imported(scene_of(tmp_path, kind), tmp_path / "out.npz", tmp_path / "cache", [])
+    assert {m for m in found if m.startswith("problems.effects.")} == {f"problems.effects.{kind}"}
+
+
+def test_a_parameter_that_is_not_given_is_not_in_the_key() -> None:
+    """`between` came later than the scenes that do without it: their keys must not know of it."""
+    for kind, given in (
+        ("initial_gap", {"mean": 0.6}),
+        ("fasteners", {"preload": 1.0, "points": [[1.0, 1.0]]}),
+    ):
+        assert "between" not in plain(effect_class(kind).model_validate({"kind": kind, **given}))
+        named = plain(effect_class(kind).model_validate({"kind": kind, "between": ["a", "b"], **given}))
+        assert named["between"] == ["a", "b"]
+
+
+def test_keys_of_packaged_scenes_are_made_of_these_names_alone() -> None:
+    """What enters a scene's key, written down: a name added here outdates every published result."""
+    parameters = {
+        "initial_gap": {"kind", "mean", "random"},
+        "fasteners": {"kind", "preload", "points", "pattern"},
+        "pressure": {"kind", "part", "value"},
+        "supports": {"kind", "part", "points", "stiffness_per_point"},
+        "ribs": {"kind", "part", "lines", "I", "J"},
+        "stringers": {"kind", "part", "pitch", "start", "stop", "I", "J"},
+    }
+    joint = {"junction", "part", "contacts"}
+    part = {"name", "thickness", "young", "poisson", "south", "north", "clamped"}
+    for name in scene_names():
+        if name.startswith("gallery/"):
+            continue
+        scene = read_scene(name)
+        assert scene.joint is not None
+        assert set(plain(scene.joint)) == joint
+        assert all(set(table) == part for table in plain(scene.joint)["part"])
+        for effect in scene.effects:
+            assert set(plain(effect)) == parameters[effect.kind]
+
+
+@pytest.mark.parametrize(
+    "kind", sorted(set(TABLES) - OLD - {"local_thickness", "support_shift", "rigid_tool"})
+)
+def test_an_effect_on_loads_keeps_the_assembly(kind: str, tmp_path: Path) -> None:
+    """Springs between parts, too: they are added to the parts as they are in the cache."""
+    with_it = read_scene(str(scene_of(tmp_path, kind)))
+    assert with_it.joint is not None
+    without = make_scene(with_it.joint)
+    assert with_it.assembly_key == without.assembly_key
+    assert cache_key(with_it) == cache_key(without)
+    assert with_it.key != without.key
+
+
+def test_a_tool_changes_the_assembly_as_its_contact_does(tmp_path: Path) -> None:
+    from_effect = read_scene(str(scene_of(tmp_path, "rigid_tool")))
+    part = {"thickness": 2.0, "north": {"length": 40.0, "elements": 2}, "clamped": ["north"]}
+    grid = {"length": 100.0, "width": 50.0, "nodes": (4, 3)}
+    listed = make_joint(
+        part, part | {"name": "b", "thickness": 3.0}, contacts=[["a", "b"], ["b", "tool"]], **grid
+    )
+    assert from_effect.assembly_key == make_scene(listed).assembly_key

@@ -1,0 +1,203 @@
+"""Weight, heat, shifted supports and pads against beam theory and statics."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from joints import degrees, dof, make_joint, make_scene
+from numpy.typing import NDArray
+from scipy.sparse.linalg import spsolve
+
+from problems.assembly import Prepared
+from problems.effect import Effect, PartLoadEffect, PartModel, StiffnessEffect
+from problems.effects.fasteners import Fasteners
+from problems.effects.local_thickness import LocalThickness
+from problems.effects.ribs import Ribs
+from problems.effects.self_weight import SelfWeight
+from problems.effects.support_shift import SupportShift
+from problems.effects.supports import Supports
+from problems.effects.thermal_bending import ThermalBending
+from problems.joint import Joint
+from problems.prepare import load_case, prepared
+
+E, T = 70e3, 6.0
+#: A strip along y, clamped at y = −200, free at y = 150, bending like a beam since ν = 0.
+STRIP = {"poisson": 0.0, "south": {"length": 200.0, "elements": 4}, "clamped": ["south"]}
+STRIP_JOINT = make_joint(STRIP, contacts=[["a", "tool"]], length=40.0, width=150.0, nodes=(3, 6))
+ALONG = 200.0 + np.linspace(0, 150, 6)  # distance from the clamp
+#: On three supports at junction nodes: free to bend, held without constraint.
+THREE = ((0.0, 0.0), (400.0, 0.0), (200.0, 120.0))
+HELD = Supports(kind="supports", part="a", points=THREE, stiffness_per_point=1e6)
+OVERHANG: dict[str, Any] = {
+    "south": {"length": 250.0, "elements": 4},
+    "north": {"length": 90.0, "elements": 2},
+}
+FREE_JOINT = make_joint(OVERHANG, contacts=[["a", "tool"]])
+
+
+def solved(joint: Joint, *effects: Effect) -> tuple[NDArray[np.float64], Prepared]:
+    scene = make_scene(joint, *effects)
+    made = prepared(scene)
+    return made.solve_K(load_case(scene, made).f), made
+
+
+def strip(*effects: Effect) -> NDArray[np.float64]:
+    """Deflections of the strip's middle line at ALONG."""
+    x, _ = solved(STRIP_JOINT, *effects)
+    return x.reshape(6, 3)[:, 1]
+
+
+def test_a_heavy_cantilever() -> None:
+    """w = q s² (6L² − 4Ls + s²) / 24 EI, the nodal values exact for cubic elements."""
+    w = strip(SelfWeight(kind="self_weight", part="a", density=2800.0, gravity=9.81))
+    q, EI, L = 2800e-9 * 9.81 * T, E * T**3 / 12, 350.0  # N/mm per mm of width
+    np.testing.assert_allclose(w, q * ALONG**2 * (6 * L**2 - 4 * L * ALONG + ALONG**2) / (24 * EI), rtol=1e-8)
+
+
+@pytest.mark.parametrize("pad", [False, True])
+def test_a_warm_face_bends_a_cantilever_away_from_it(pad: bool) -> None:
+    """κ = αΔT/t by pieces, integrated twice; 2 mm wide, so that the clamp hardly hinders it across."""
+    joint = make_joint(STRIP, contacts=[["a", "tool"]], length=2.0, width=150.0, nodes=(3, 6))
+    thick = LocalThickness(kind="local_thickness", part="a", thickness=9.0, x=(0, 2), y=(-100, 60))
+    heat = ThermalBending(kind="thermal_bending", part="a", difference=30.0)
+    x, _ = solved(joint, heat, *([thick] if pad else []))
+    expected = np.zeros(6)
+    for t, start, stop in ((6.0, 0, 100), (9.0 if pad else 6.0, 100, 260), (6.0, 260, 350)):
+        length = np.clip(ALONG, start, stop) - start
+        expected -= 23e-6 * 30.0 / t * (length**2 / 2 + length * np.maximum(ALONG - stop, 0))
+    np.testing.assert_allclose(x.reshape(6, 3)[:, 1], expected, rtol=1e-4)
+
+
+def test_work_of_heat_on_a_part_with_a_pad() -> None:
+    """On w = a x² + c y²: −(1 + ν) D κ (2a + 2c) times the area, with the pad's D and κ on the pad."""
+    plate = FREE_JOINT.plate(FREE_JOINT.part[0])
+    pad = LocalThickness(kind="local_thickness", part="a", thickness=9.0, x=(30, 333), y=(-111, 95))
+    f = ThermalBending(kind="thermal_bending", part="a", difference=30.0).load(PartModel(plate, (pad,)))
+    a, c = 1e-4, -3e-5
+    fields = degrees(plate.x, plate.y, lambda x, y: (a * x**2 + c * y**2, 2 * a * x, 2 * c * y, 0.0))
+    moment = [E * t**3 / 12 / (1 - 0.33**2) * 1.33 * 23e-6 * 30.0 / t for t in (6.0, 9.0)]
+    on_pad = 303.0 * 206.0
+    work = -(moment[0] * (400 * 460 - on_pad) + moment[1] * on_pad) * (2 * a + 2 * c)
+    assert f @ fields == pytest.approx(work, rel=1e-10)
+
+
+@pytest.mark.parametrize("thickness", [3.0, 9.0])
+def test_a_stepped_cantilever(thickness: float) -> None:
+    """P at the end, EI changes at s = 100, a grid line: w(L) = P/3 [(L³−b³)/EI₁ + b³/EI₂], b = L−100."""
+    step = LocalThickness(kind="local_thickness", part="a", thickness=thickness, x=(0, 40), y=(-200, -100))
+    ends = tuple((x, 150.0) for x in (0.0, 20.0, 20.0, 40.0))
+    w = strip(step, Fasteners(kind="fasteners", preload=5.0, points=ends))
+    root, tip = (E * 40 * t**3 / 12 for t in (thickness, T))
+    # The ends' load is uniform over the width but for the slopes' share, so beam theory holds to 1e-3.
+    assert w[-1] == pytest.approx(20 / 3 * ((350.0**3 - 250.0**3) / root + 250.0**3 / tip), rel=1e-3)
+
+
+@pytest.mark.parametrize("area", [((0.0, 400.0), (-250.0, 210.0)), ((30.0, 333.0), (-111.0, 95.0))])
+def test_energy_of_a_pad_under_constant_curvature(area: tuple[Any, Any]) -> None:
+    """w = a x² + b xy + c y²: (D' − D) [(w_xx + w_yy)² − 2(1−ν)(w_xx w_yy − w_xy²)] times the area."""
+    plate = FREE_JOINT.plate(FREE_JOINT.part[0])
+    pad = LocalThickness(kind="local_thickness", part="a", thickness=9.0, x=area[0], y=area[1])
+    a, b, c = 1e-4, -3e-5, 2e-4
+    w = degrees(
+        plate.x,
+        plate.y,
+        lambda x, y: (a * x**2 + b * x * y + c * y**2, 2 * a * x + b * y, b * x + 2 * c * y, b),
+    )
+    D = [E * t**3 / 12 / (1 - 0.33**2) for t in (9.0, 6.0)]
+    density = (2 * a + 2 * c) ** 2 - 2 * (1 - 0.33) * (4 * a * c - b**2)
+    size = (area[0][1] - area[0][0]) * (area[1][1] - area[1][0])
+    assert w @ (pad.stiffness(plate) @ w) == pytest.approx((D[0] - D[1]) * density * size, rel=1e-9)
+
+
+@pytest.mark.parametrize("padded", [False, True])
+def test_weight_is_the_sum_of_the_reactions(padded: bool) -> None:
+    pad = LocalThickness(kind="local_thickness", part="a", thickness=15.0, x=(33, 290), y=(-201, 45))
+    weight = SelfWeight(kind="self_weight", part="a")
+    x, _ = solved(FREE_JOINT, HELD, weight, *([pad] if padded else []))
+    at_supports = x[[0, 4, 17]]  # nodes of the 5 × 4 grid
+    volume = 400 * (250 + 120 + 90) * T + padded * (290 - 33) * (45 + 201) * (15.0 - T)
+    assert 1e6 * at_supports.sum() == pytest.approx(2700e-9 * 9.80665 * volume, rel=1e-9)
+
+
+def test_moments_of_the_weight_about_the_supports() -> None:
+    """The centre of gravity stands at y = −20 and x = 200: statics gives each of the three reactions."""
+    x, _ = solved(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a"))
+    weight = 2700e-9 * 9.80665 * 400 * 460 * T
+    far = weight * -20.0 / 120.0
+    np.testing.assert_allclose(1e6 * x[[0, 4, 17]], [(weight - far) / 2, (weight - far) / 2, far], rtol=1e-8)
+
+
+def test_a_free_plate_bends_to_a_bowl_without_stress() -> None:
+    """w = −κ (x² + y²) / 2 plus a rigid motion, so no support feels a force and w is zero there."""
+    x, _ = solved(FREE_JOINT, HELD, ThermalBending(kind="thermal_bending", part="a", difference=-25.0))
+    bowl = 23e-6 * 25.0 / T * (FREE_JOINT.nodes**2).sum(axis=1) / 2
+    rows = np.column_stack([np.ones(20), FREE_JOINT.nodes])
+    plane = np.linalg.solve(rows[[0, 4, 17]], bowl[[0, 4, 17]])
+    np.testing.assert_allclose(x, bowl - rows @ plane, atol=1e-9)
+
+
+def test_three_shifted_supports_move_the_part_as_a_plane() -> None:
+    shifts = [
+        SupportShift(kind="support_shift", part="a", points=(THREE[0],), shift=1.0),
+        SupportShift(kind="support_shift", part="a", points=(THREE[1], THREE[2]), shift=-0.5),
+    ]
+    x, _ = solved(FREE_JOINT, HELD, *shifts)
+    at_x, at_y = FREE_JOINT.nodes.T
+    np.testing.assert_allclose(x, 1.0 - 1.5 * at_x / 400 - 0.75 * at_y / 120, atol=1e-9)
+
+
+LOADS: list[PartLoadEffect] = [
+    SelfWeight(kind="self_weight", part="a"),
+    ThermalBending(kind="thermal_bending", part="a", difference=12.0),
+    SupportShift(kind="support_shift", part="a", points=((33.0, -200.0),), shift=0.7),
+]
+SIDES: list[dict[str, Any]] = [
+    OVERHANG,
+    OVERHANG | {"clamped": ["south"]},
+    OVERHANG | {"clamped": ["south", "north"]},
+    {"north": OVERHANG["north"], "clamped": ["north"]},
+]
+
+
+@pytest.mark.parametrize("load", LOADS, ids=lambda load: load.kind)
+@pytest.mark.parametrize("part", SIDES, ids=lambda part: "-".join(part))
+def test_junction_moves_as_in_the_whole_plate(load: PartLoadEffect, part: dict[str, Any]) -> None:
+    """Against one solution of all unknowns, with nothing condensed."""
+    joint = make_joint(part, contacts=[["a", "tool"]])
+    points = (*THREE, (33.0, -200.0)) if "south" in part else THREE
+    stiff: list[StiffnessEffect] = [
+        Supports(kind="supports", part="a", points=points, stiffness_per_point=3e3),
+        Ribs(kind="ribs", part="a", lines=(160.0,), I=2e4, J=1e3),
+        LocalThickness(kind="local_thickness", part="a", thickness=8.0, x=(11, 120), y=(30, 171)),
+    ]
+    x, _ = solved(joint, *stiff, load)
+
+    plate = joint.plate(joint.part[0])
+    K = plate.stiffness() + sum(effect.stiffness(plate) for effect in stiff)  # type: ignore[operator]
+    f = load.load(PartModel(plate, tuple(stiff)))
+    held = {"south": 0, "north": len(plate.y) - 1}
+    clamped = [held[edge] for edge in part.get("clamped", [])]
+    lines = [iy for iy in range(len(plate.y)) if iy not in clamped]
+    free = np.concatenate([plate.line_dofs(iy) for iy in lines])
+    w = np.zeros(plate.size)
+    w[free] = spsolve(K[free][:, free].tocsc(), f[free])
+    rows = [iy for iy, y in enumerate(plate.y) if -1e-6 < y < 120 + 1e-6]
+    expected = np.array([w[dof(5, ix, iy)] for iy in rows for ix in range(5)])
+    if load.kind != "support_shift" or "south" in part:
+        assert abs(expected).max() > 1e-4
+    np.testing.assert_allclose(x, expected, atol=1e-10 * max(1.0, abs(expected).max()))
+
+
+def test_a_condensed_load_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    from problems import condensed_load
+
+    scene = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1234.0))
+    made = prepared(scene)
+    first = load_case(scene, made)
+    monkeypatch.setattr(condensed_load, "_condensed", lambda *_: pytest.fail("condensed a second time"))
+    np.testing.assert_array_equal(load_case(scene, made).f, first.f)
+    heavier = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1235.0))
+    with pytest.raises(pytest.fail.Exception, match="second time"):
+        load_case(heavier, made)

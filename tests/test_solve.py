@@ -1,0 +1,364 @@
+"""`solve` and `validate`: the answer, its files, the ledger, and what was not computed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.image import imread
+from rich.console import Console
+from small import solve_by_nnls
+from typer.testing import CliRunner
+
+from harness.cli import app
+from harness.ledger import ledger
+from harness.solve import solve
+from harness.validate import estimated
+from problems import build
+from problems.build import cache_key
+from problems.cache import root
+from problems.errors import InputError
+from problems.prepare import load_case, prepared
+from problems.scene import read_scene
+from report.vtu import grid_with_fields, write_vtu
+
+ROOT = Path(__file__).parents[1]
+SCENE = """
+title = "Two panels on a tool"
+[[effect]]
+kind = "rigid_tool"
+part = "b"
+distance = 0.4
+[[effect]]
+kind = "initial_gap"
+mean = 0.3
+between = ["a", "b"]
+random = { sd = 0.05, correlation_length = 60.0, seed = 2 }
+[[effect]]
+kind = "fasteners"
+preload = PRELOAD
+points = [[60.0, 20.0], [140.0, 40.0]]
+[[effect]]
+kind = "ribs"
+part = "a"
+lines = [40.0]
+I = 500.0
+[[effect]]
+kind = "installed_fasteners"
+points = [[100.0, 60.0]]
+approach = 0.3
+[[effect]]
+kind = "self_weight"
+part = "b"
+[joint]
+junction = { length = 200.0, width = 80.0, nodes = [11, 5] }
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+[[joint.part]]
+name = "b"
+thickness = 3.0
+south = { length = 60.0, elements = 2 }
+clamped = ["south"]
+"""
+APART = """
+[[effect]]
+kind = "initial_gap"
+mean = 5.0
+[[effect]]
+kind = "pressure"
+part = "a"
+value = 1e-3
+""" + SCENE[SCENE.index("[joint]") :]
+
+
+@pytest.fixture(autouse=True)
+def _without_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing takes most of the time: only where a test looks at pictures."""
+    if "pictures" not in request.fixturenames:
+        monkeypatch.setattr("report.solution._figures", lambda *_: {})
+
+
+@pytest.fixture
+def pictures() -> None:
+    """Asked for by a test that looks at pictures."""
+
+
+def run(folder: Path, text: str = SCENE, solver: str | None = None, preload: float = 80.0) -> dict[str, Any]:
+    """Solve, and return what solution.json says with the exit code and the terminal's text."""
+    path = folder / "scene.toml"
+    path.write_text(text.replace("PRELOAD", str(preload)))
+    shown = StringIO()
+    code = solve(str(path), solver, 1e-10, folder / "out", Console(file=shown, width=200))
+    record = json.loads((folder / "out" / "solution.json").read_text())
+    return record | {"code": code, "shown": shown.getvalue()}
+
+
+def arrays(folder: Path) -> dict[str, Any]:
+    with np.load(folder / "out" / "solution.npz") as saved:
+        return {name: saved[name] for name in saved.files}
+
+
+def test_the_answer_is_that_of_another_method(tmp_path: Path) -> None:
+    record = run(tmp_path)
+    scene = read_scene(str(tmp_path / "scene.toml"))
+    data = prepared(scene)
+    x, lam = solve_by_nnls(data, load_case(scene, data))
+    found = arrays(tmp_path)
+    assert record["code"] == 0
+    assert record["qp"]
+    assert 0 < record["error_bound_mm"] < 1e-11
+    np.testing.assert_allclose(found["x"], x, atol=1e-9)
+    np.testing.assert_allclose(found["lam"], lam, atol=1e-4)
+    assert 5 < (lam > 0).sum() < 100
+    np.testing.assert_allclose(found["gap_after"], found["gap_before"] - data.assembly.A.T @ x, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["gi", "piqp"])
+def test_a_named_solver_is_judged(tmp_path: Path, solver: str) -> None:
+    record = run(tmp_path, solver=solver)
+    assert record["code"] == 0
+    assert record["verdict"] == "within"
+    assert 0 <= record["judged_error_mm"] <= 1e-7
+    assert record["method"].startswith(f"{solver}, dual form")
+    assert "judged" in (tmp_path / "out" / "answer.md").read_text()
+
+
+def test_an_answer_outside_the_limit_fails(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace("PRELOAD", "80"))
+    shown = StringIO()
+    code = solve(str(path), "piqp", 1e-1, tmp_path / "out", Console(file=shown, width=200))
+    assert code == 1
+    assert "outside" in shown.getvalue()
+
+
+def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from solvers import registry
+
+    monkeypatch.setattr(registry, "make_solver", lambda *_: pytest.fail("a QP solver was made"))
+    record = run(tmp_path, APART, solver="piqp")
+    assert not record["qp"]
+    assert record["code"] == 0
+    found = arrays(tmp_path)
+    assert not found["lam"].any()
+    data = prepared(read_scene(str(tmp_path / "scene.toml")))
+    f = load_case(read_scene(str(tmp_path / "scene.toml")), data).f
+    for K, own in zip(data.assembly.blocks, data.assembly.slices, strict=True):
+        np.testing.assert_allclose(found["x"][own], np.linalg.solve(K, f[own]), atol=1e-12)
+    assert record["closest_mm"] == pytest.approx(found["gap_after"].min(), rel=1e-9)
+    assert any("not called for" in line and "piqp was not run" in line for line in record["skipped"])
+    assert "No quadratic program was called for" in (tmp_path / "out" / "answer.md").read_text()
+    assert "linear solve" in record["shown"]
+
+
+@pytest.mark.usefixtures("pictures")
+def test_files_hold_the_answer(tmp_path: Path) -> None:
+    run(tmp_path)
+    out, found = tmp_path / "out", arrays(tmp_path)
+    nodes, contacts = pd.read_csv(out / "nodes.csv"), pd.read_csv(out / "contacts.csv")
+    assert list(nodes) == ["part", "x_mm", "y_mm", "displacement_mm"]
+    assert nodes["part"].value_counts().to_dict() == {"a": 55, "b": 55}
+    np.testing.assert_array_equal(nodes["displacement_mm"], found["x"])
+    np.testing.assert_array_equal(nodes[["x_mm", "y_mm"]], found["nodes"])
+    assert contacts["contact"].value_counts().to_dict() == {"a – b": 55, "b – tool": 55}
+    np.testing.assert_array_equal(contacts["gap_after_mm"], found["gap_after"])
+    np.testing.assert_array_equal(contacts["force_N"], found["lam"])
+    text = (out / "answer.md").read_text()
+    for name in ("gap", "forces", "displacement"):
+        assert f"]({name}.png)" in text
+        height, width, *_ = imread(out / f"{name}.png").shape
+        assert min(height, width) > 300
+    assert len(text.splitlines()) < 90
+
+
+def test_the_ledger_names_every_effect_and_what_it_added(tmp_path: Path) -> None:
+    record = run(tmp_path, SCENE.replace("I = 500.0", "I = 501.0"))
+    added = {(entry["effect"], entry["adds"]): entry for entry in record["ledger"]}
+    assert list(added) == [
+        ("rigid_tool b", "constraints"),
+        ("rigid_tool b", "gap"),
+        ("initial_gap", "gap"),
+        ("fasteners", "load"),
+        ("ribs a", "stiffness"),
+        ("installed_fasteners", "stiffness"),
+        ("installed_fasteners", "load"),
+        ("self_weight b", "load"),
+    ]
+    assert added["rigid_tool b", "gap"]["amount"] == "0.4 … 0.4 mm at 55 contacts"
+    assert added["fasteners", "load"]["amount"] == "a +160 N on 2 nodes"  # through to the tool
+    assert "3e+04 N, b -3e+04 N" in added["installed_fasteners", "load"]["amount"]
+    assert all(entry["seconds"] > 0 for entry in record["ledger"] if entry["adds"] != "constraints")
+    (unnamed,) = (line for line in record["skipped"] if "not imported" in line)
+    assert "shims" in unnamed
+    assert "ribs" not in unnamed
+    assert any(name.startswith("matrices") for name in record["steps"])
+
+
+def test_effects_of_the_ledger_add_up_to_the_load_case(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace("PRELOAD", "80"))
+    scene = read_scene(str(path))
+    data = prepared(scene)
+    load = load_case(scene, data)
+    alone = [
+        load_case(replace(scene, effects=(*scene.stiffness_effects, effect)), data)
+        for effect in scene.effects
+        if effect not in scene.stiffness_effects
+    ]
+    np.testing.assert_allclose(sum(part.f for part in alone), load.f, rtol=1e-14)
+    np.testing.assert_array_equal(sum(part.g for part in alone), load.g)
+
+
+def test_a_change_of_loads_alone_reuses_the_assembly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run(tmp_path)
+    before = arrays(tmp_path)
+    monkeypatch.setattr(build, "_build", lambda *_: pytest.fail("built the matrices again"))
+    record = run(tmp_path, preload=160.0)
+    assert any("came from the cache" in line for line in record["skipped"])
+    (ribs,) = (entry for entry in record["ledger"] if entry["effect"] == "ribs a")
+    assert (ribs["amount"], ribs["seconds"]) == ("in the assembly from the cache", None)
+    assert abs(arrays(tmp_path)["x"] - before["x"]).max() > 1e-4
+
+
+def test_only_what_is_called_for_is_imported(tmp_path: Path) -> None:
+    """Through the whole command, pictures included."""
+    (tmp_path / "scene.toml").write_text(APART)
+    code = (
+        "import sys\nfrom harness.cli import main\n"
+        "try:\n    main()\n"
+        "finally:\n    print(*[m for m in sys.modules if m.startswith(('problems.', 'solvers.'))])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "solve", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    modules = set(done.stdout.splitlines()[-1].split())
+    assert {m for m in modules if m.startswith("problems.effects.")} == {
+        "problems.effects.initial_gap",
+        "problems.effects.pressure",
+    }
+    assert not modules & {"problems.ties", "problems.condensed_load", "problems.csv_table"}
+    assert not modules & {"solvers.ipm", "solvers.gi", "solvers.registry"}
+
+
+def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
+    K = np.array([[3.0, 1.0, 0.0], [1.0, 4.0, 0.0], [0.0, 0.0, 2.0]])
+    A = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+    np.savez(tmp_path / "mine.npz", K=K, A=A, f=np.array([5.0, 1.0, 0.0]), g=np.array([0.1, 9.0]))
+    code = solve(str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "out", Console(file=StringIO()))
+    assert code == 0
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        "answer.md",
+        "contacts.csv",
+        "nodes.csv",
+        "solution.json",
+        "solution.npz",
+    ]
+    # One closed contact: x₀ − x₂ = 0.1 with K x = f − A λ, solved by hand: λ = 2 (x₀ − 0.1), 13 x₀ = 21.2.
+    x = arrays(tmp_path)["x"]
+    force = arrays(tmp_path)["lam"][0]
+    assert x[0] - x[2] == pytest.approx(0.1)
+    assert force == pytest.approx(2 * x[2])
+    np.testing.assert_allclose(K @ x, [5.0 - force, 1.0, force], atol=1e-12)
+
+
+def test_a_grid_for_paraview_covers_the_junction_of_each_part(tmp_path: Path) -> None:
+    record, found = run(tmp_path), arrays(tmp_path)
+    points, blocks, data = grid_with_fields(record, found)
+    for kind, cells in blocks:
+        assert kind == "quad"
+        corners = points[cells][:, :, :2]
+        d1, d2 = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        areas = (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]) / 2  # all turn the same way
+        np.testing.assert_allclose(areas, 20.0 * 20.0)
+        assert len(cells) == 40
+    assert data["contact_force_N"][:55].sum() == pytest.approx(found["lam"][:55].sum())
+    assert data["contact_force_N"][55:].sum() == pytest.approx(found["lam"].sum())
+    np.testing.assert_array_equal(data["gap_after_mm"][:55], found["gap_after"][:55])
+    np.testing.assert_array_equal(
+        data["gap_after_mm"][55:], np.minimum(found["gap_after"][:55], found["gap_after"][55:])
+    )
+
+
+def test_a_vtu_file_reads_back(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    record, found = run(tmp_path), arrays(tmp_path)
+    assert write_vtu(tmp_path / "a.vtu", record, found) == "a.vtu"
+    mesh = meshio.read(tmp_path / "a.vtu")
+    np.testing.assert_array_equal(mesh.point_data["displacement_mm"][:, 2], found["x"])
+    assert sum(len(block.data) for block in mesh.cells) == 80
+
+
+def test_without_meshio_the_page_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    run(tmp_path)
+    assert "meshio is not installed" in (tmp_path / "out" / "answer.md").read_text()
+
+
+def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text(SCENE.replace("PRELOAD", "-1").replace("I = 500.0", "I = 0"))
+    for command in (["solve", str(bad), "--out", str(tmp_path / "out")], ["validate", str(bad)]):
+        done = CliRunner().invoke(app, command)
+        assert done.exit_code == 2
+        lines = done.output.strip().splitlines()
+        assert len(lines) == 2
+        assert "preload" in lines[0]
+        assert "in N" in lines[0]
+        assert "mm⁴" in lines[1]
+    assert not (tmp_path / "out").exists()
+    (tmp_path / "file").touch()
+    good = tmp_path / "good.toml"
+    good.write_text(APART)
+    with pytest.raises(InputError, match="--out"):
+        solve(str(good), None, 1e-9, tmp_path / "file", Console(file=StringIO()))
+
+
+def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace("PRELOAD", "80").replace("I = 500.0", "I = 777.0"))
+    first = CliRunner().invoke(app, ["validate", str(path)])
+    assert first.exit_code == 0
+    for said in ("n = 110", "m = 110", "contact b – tool", "has to be built", "self_weight"):
+        assert said in first.output
+    assert not (root() / cache_key(read_scene(str(path)))).exists()
+    prepared(read_scene(str(path)))
+    assert "stands in the cache" in CliRunner().invoke(app, ["validate", str(path)]).output
+
+
+def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(APART)
+    scene = read_scene(str(path))
+    assert scene.joint is not None
+    made = prepared(scene)
+    stored = sum(a.nbytes for a in (*made.assembly.blocks, *made.factors, made.Q))
+    estimate = estimated(scene, scene.joint, 1e9)
+    assert estimate.stored_mib == pytest.approx(stored / 2**20)
+    assert (estimate.n, estimate.m) == (made.assembly.n, made.assembly.m)
+    slower = estimated(scene, scene.joint, 1e8)
+    assert slower.build_s == pytest.approx(10 * estimate.build_s)
+
+
+def test_a_scene_of_own_matrices_has_no_ledger(tmp_path: Path) -> None:
+    np.savez(tmp_path / "mine.npz", K=np.eye(2), A=np.eye(2)[:, :1], f=np.ones(2), g=np.ones(1))
+    scene = read_scene(str(tmp_path / "mine.npz"))
+    assert ledger(scene, prepared(scene), built=True) == []
+    said = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")]).output
+    assert "n = 2, m = 1, blocks of 1, 1" in said
+    assert "seem to have 1 digits" in said

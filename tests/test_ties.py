@@ -1,0 +1,101 @@
+"""Installed fasteners: springs between the parts, against closed forms and the dense sum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+from joints import make_joint, make_scene
+
+from problems import build
+from problems.effects.fasteners import Fasteners
+from problems.effects.installed_fasteners import InstalledFasteners
+from problems.effects.pressure import Pressure
+from problems.effects.supports import Supports
+from problems.prepare import load_case, prepared
+
+PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
+TWO = make_joint(PART, PART | {"name": "b"})
+FOUR = make_joint(*(PART | {"name": name, "thickness": 4.0 + k} for k, name in enumerate("abcd")))
+
+
+def fastener(*points: tuple[float, float], **more: object) -> InstalledFasteners:
+    return InstalledFasteners.model_validate({"kind": "installed_fasteners", "points": points} | more)
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e5, 1e7])
+def test_one_fastener_draws_two_equal_parts_together(stiffness: float) -> None:
+    """Each part has the compliance c at the node: x_a = −x_b = c k d / (1 + 2 c k)."""
+    scene = make_scene(TWO, fastener((200.0, 40.0), stiffness=stiffness, approach=0.6))
+    made = prepared(scene)
+    x = made.solve_K(load_case(scene, made).f)
+    node = 7  # (200, 40) on the 5 × 4 grid
+    c = np.linalg.inv(build.prepared(scene).assembly.blocks[0])[node, node]
+    u = c * stiffness * 0.6 / (1 + 2 * c * stiffness)
+    assert x[node] == pytest.approx(u, rel=1e-9)
+    np.testing.assert_allclose(x[:20], -x[20:], atol=1e-12)
+
+
+def test_fasteners_without_approach_let_equal_parts_move_as_one() -> None:
+    """The same load on both: no spring is stretched, and the parts do what they do without them."""
+    loads = [Pressure(kind="pressure", part=name, value=1e-3) for name in "ab"]
+    bare, tied = make_scene(TWO, *loads), make_scene(TWO, *loads, fastener((100.0, 0.0), (300.0, 80.0)))
+    x = [made.solve_K(load_case(s, made).f) for s in (bare, tied) for made in [prepared(s)]]
+    np.testing.assert_allclose(x[0], x[1], rtol=1e-8)
+
+
+def test_blocks_are_those_of_the_dense_sum() -> None:
+    """a–b tied, c–d not; a tie over two contacts joins three parts."""
+    for effects, names in (
+        ([fastener((100.0, 0.0), (300.0, 80.0), between=["a", "b"])], ["a + b", "c", "d"]),
+        ([fastener((100.0, 0.0), between=["c", "d"])], ["a", "b", "c + d"]),
+        (
+            [fastener((0.0, 0.0), between=["b", "c"]), fastener((400.0, 0.0), between=["c", "d"])],
+            ["a", "b + c + d"],
+        ),
+        ([fastener((100.0, 0.0))], ["a + b + c + d"]),
+    ):
+        scene = make_scene(FOUR, *effects)
+        made, base = prepared(scene), build.prepared(scene)
+        assert list(made.assembly.parts) == names
+        K = sla.block_diag(*base.assembly.blocks)
+        for effect in effects:
+            for point in effect.points:
+                node = int(np.hypot(*(FOUR.nodes - point).T).argmin())
+                for one, two in [effect.between] if effect.between else FOUR.pairs:
+                    t = np.zeros(80)
+                    t[FOUR.unknowns(one).start + node], t[FOUR.unknowns(two).start + node] = 1, -1
+                    K += 1e5 * np.outer(t, t)
+        np.testing.assert_allclose(sla.block_diag(*made.assembly.blocks), K, rtol=1e-14)
+        A = made.assembly.A.toarray()
+        np.testing.assert_allclose(made.Q, A.T @ np.linalg.solve(K, A), rtol=1e-7, atol=1e-12)
+        values = np.linalg.eigvalsh(K)
+        assert made.facts["cond_K"] == pytest.approx(values[-1] / values[0], rel=1e-5)
+        b = np.random.default_rng(1).normal(size=80)
+        np.testing.assert_allclose(K @ made.solve_K(b), b, atol=1e-7)
+
+
+def test_installing_a_fastener_condenses_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    effect = Supports(kind="supports", part="a", points=((0.0, 0.0),), stiffness_per_point=123.0)
+    build.prepared(make_scene(TWO, effect))
+    monkeypatch.setattr(build, "_build", lambda *_: pytest.fail("built the parts again"))
+    first = prepared(make_scene(TWO, effect, fastener((100.0, 0.0))))
+    again = prepared(
+        make_scene(TWO, effect, fastener((100.0, 0.0)), Pressure(kind="pressure", part="a", value=1.0))
+    )
+    np.testing.assert_array_equal(first.Q, again.Q)
+    assert isinstance(again.Q, np.memmap)
+    more = prepared(make_scene(TWO, effect, fastener((100.0, 0.0), (300.0, 0.0))))
+    assert abs(more.Q - first.Q).max() > 1e-6
+
+
+def test_a_hole_holds_one_element() -> None:
+    tie = fastener((100.0, 0.0), (300.0, 80.0))
+    temporary = Fasteners(kind="fasteners", preload=5.0, points=((110.0, 3.0),))
+    ((key, where, allowed),) = tie.conflicts([temporary], TWO)
+    assert (key, where) == ("points", [[100.0, 0.0]])
+    assert "fasteners" in allowed
+    elsewhere = Fasteners(kind="fasteners", preload=5.0, points=((200.0, 0.0),))
+    assert not list(tie.conflicts([elsewhere], TWO))
+    on_another_contact = temporary.model_copy(update={"between": ("c", "d")})
+    assert not list(fastener((100.0, 0.0), between=["a", "b"]).conflicts([on_another_contact], FOUR))
