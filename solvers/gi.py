@@ -17,13 +17,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg as sla
-from scipy.linalg import lapack
 
 from problems.assembly import LoadCase, Matrix, Vector
 from problems.errors import InputError
 
-from .base import FORMS, Answer, Form, Load, Problem, Solver, Status
-from .goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
+from .base import FORMS, Answer, Form, Load, Problem, Solver
+from .goldfarb_idnani import GiResult, Slacks, goldfarb_idnani
+from .inverse import inverse_with_factor
+from .kkt import checked
 
 
 @dataclass(frozen=True)
@@ -57,11 +58,8 @@ class GoldfarbIdnani(Solver):
         """G: Q itself, or Q⁻¹ from the Cholesky factor of Q."""
         if data.form == "primal":
             return _Prepared(data, data.Q, None)
-        U = sla.cholesky(data.Q, check_finite=False)
-        inverse, info = lapack.dpotri(U)
-        if info != 0:
-            raise np.linalg.LinAlgError(f"dpotri returned {info}")
-        return _Prepared(data, np.asfortranarray(np.triu(inverse) + np.triu(inverse, 1).T), U)
+        inverse, U = inverse_with_factor(data.Q)
+        return _Prepared(data, inverse, U)
 
     def solve(self, ready: _Prepared, load: Load, tolerance: float) -> Answer:
         data = ready.problem
@@ -71,9 +69,11 @@ class GoldfarbIdnani(Solver):
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is not None:
             lam = _on_support(ready, load, slacks(result.u)[0], result)
-            status, residual = _checked(result.status, data, load, lam, tolerance)
+            status, residual = checked(data.Q, load.p, lam, tolerance)
             details["kkt_residual_mm"] = residual
-            if status == "solved":
+            if result.status == "iteration_limit":
+                status = result.status
+            elif status == "solved":
                 details.pop("cause", None)
             return Answer(status, lam, None, result.pivots, details=details)
         x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
@@ -123,15 +123,3 @@ def _on_support(ready: _Prepared, load: Load, lam: Vector, result: GiResult) -> 
         lam += v - ready.G @ u
     lam[C] = 0.0
     return np.maximum(lam, 0.0)
-
-
-def _checked(
-    status: Status, data: Problem, load: Load, lam: Vector, tolerance: float
-) -> tuple[Status, float]:
-    """The status that the optimality conditions of λ ≥ 0 itself bear out, and their residual in mm."""
-    y = data.Q @ lam - load.p
-    residual = max(float((-y).max()), float(abs(y[lam > 0]).max(initial=0.0)))
-    if status == "iteration_limit":
-        return status, residual
-    rounding = 4 * EPS * float((abs(load.p) + abs(data.Q) @ lam).max())
-    return "solved" if residual <= max(tolerance, rounding) else "inaccurate", residual
