@@ -24,7 +24,7 @@ COPY = 1 / 4
 
 @dataclass(frozen=True)
 class Trial:
-    """λ (m,) N and y (m,) mm of a set; `rounding` mm is what its zeros differed from zero by."""
+    """λ (m,) N, zero off the set, y (m,) mm, and by what rounding leaves of the set's zeros, mm."""
 
     lam: Vector
     y: Vector
@@ -100,17 +100,22 @@ class ContactSets:
         self.by = self.open if self.open and 2 * int(C.sum()) > len(C) else self.closed
         return self.by.at(C)
 
-    def refined(self, C: Set, lam: Vector) -> Trial:
-        """One step of iterative refinement of λ_C against Q itself, for the set of the last `at`."""
-        r = np.where(C, self.p - product(self.Q, lam), 0.0)
-        return gaps(self.Q, self.p, C, np.where(C, lam + self.by.correction(r), 0.0))
+    def refined(self, C: Set, trial: Trial, enough: float) -> Trial:
+        """λ_C of the last `at` refined against Q itself, until |y_C| ≤ enough mm or no longer halves."""
+        if self.by is self.open:
+            trial = gaps(self.Q, self.p, C, trial.lam)
+        while trial.rounding > enough:
+            correction = self.by.correction(np.where(C, -trial.y, 0.0))
+            before, trial = trial, gaps(self.Q, self.p, C, np.where(C, trial.lam + correction, 0.0))
+            if trial.rounding > before.rounding / 2:
+                return min(before, trial, key=lambda each: each.rounding)
+        return trial
 
 
 def gaps(Q: Matrix, p: Vector, C: Set, lam: Vector) -> Trial:
-    """The trial of λ: y = Qλ − p off C, and what it leaves on C as rounding."""
+    """The trial of λ: y = Qλ − p, and max|y_C| as its rounding."""
     y = product(Q, lam) - p
-    rounding = float(abs(y[C]).max(initial=0.0))
-    return Trial(lam, np.where(C, 0.0, y), rounding)
+    return Trial(lam, y, float(abs(y[C]).max(initial=0.0)))
 
 
 def product(G: Matrix, v: Vector) -> Vector:

@@ -69,7 +69,7 @@ class GoldfarbIdnani(Solver):
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is not None:
             lam = _on_support(ready, load, slacks(result.u)[0], result)
-            status, residual = checked(data.Q, load.p, lam, tolerance)
+            status, residual = checked(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
             details["kkt_residual_mm"] = residual
             if result.status == "iteration_limit":
                 status = result.status

@@ -11,12 +11,11 @@ from .base import Status
 EPS = float(np.finfo(float).eps)
 
 
-def checked(Q: Matrix, p: Vector, lam: Vector, tolerance: float) -> tuple[Status, float]:
-    """The status that λ ≥ 0 bears out, and its residual max(max(−y), max_{λ>0} |y|) in mm, y = Qλ − p.
+def checked(Q: Matrix, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
+    """The status that λ ≥ 0 with y = Qλ − p bears out, and its residual max(max(−y), max_{λ>0} |y|), mm.
 
     "solved" where the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate".
     """
-    y = Q @ lam - p
     residual = max(float((-y).max(initial=0.0)), float(abs(y[lam > 0]).max(initial=0.0)))
     if residual <= tolerance:
         return "solved", residual

@@ -10,25 +10,24 @@ answers on a sixteenth and a quarter of the contacts, whose problems have princi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from problems.assembly import Matrix, Vector
 from problems.errors import InputError
 
+from .active_set import solve_from
 from .base import Answer, Form, Load, Problem, Solver
-from .block_pivoting import block_pivoting, wrong_signs
+from .block_pivoting import block_pivoting
 from .bordered_factor import Set
-from .contact_sets import ContactSets, Trial, product
+from .contact_sets import ContactSets, product
 from .inverse import inverse_with_factor
-from .kkt import checked
 from .nested import Cells, cells_of, representatives
 
 WIDTHS = (4, 2)  # of the cells, in contacts
 COARSE_PASSES = 10  # a guess need not be right
-REFINEMENTS = 4
 
 
 @dataclass(frozen=True)
@@ -68,25 +67,9 @@ class ActiveSetNewton(Solver):
         return _Ready(data, inverse_with_factor(data.Q)[0], cells)
 
     def solve(self, ready: _Ready, load: Load, tolerance: float) -> Answer:
-        Q, p = ready.problem.Q, load.p
-        C, coarse = _first_guess(ready, p, tolerance)
-        sets = ContactSets(Q, p, ready.inverse)
-        passes = single = 0
-        while True:
-            found = block_pivoting(sets.at, C, sets.compliance, tolerance, max(self.max_sets - passes, 1))
-            passes, single = passes + found.passes, single + found.single
-            C, trial = found.C, _refined(sets, found.C, found.trial)
-            wrong = wrong_signs(C, trial, sets.compliance, tolerance)
-            if not wrong.any() or passes >= self.max_sets:
-                break
-            C = C ^ wrong
-        lam = np.maximum(trial.lam, 0.0)
-        status, residual = checked(Q, p, lam, tolerance)
-        if wrong.any() and status != "solved":
-            status = "iteration_limit"
-        details: dict[str, Any] = {"closed": int(C.sum()), "kkt_residual_mm": residual}
-        details |= {"factorisations": sets.factorisations, "single_exchanges": single}
-        return Answer(status, lam, iterations=passes, inner_iterations=coarse, details=details)
+        C, coarse = _first_guess(ready, load.p, tolerance)
+        answer = solve_from(C, ContactSets(ready.problem.Q, load.p, ready.inverse), tolerance, self.max_sets)
+        return replace(answer, inner_iterations=coarse)
 
 
 def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
@@ -102,14 +85,3 @@ def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
         lam[rows] = np.where(found.C, np.maximum(found.trial.lam, 0.0), 0.0)
         C = (lam > 0) | (product(Q, lam) < p)
     return C, tried
-
-
-def _refined(sets: ContactSets, C: Set, trial: Trial) -> Trial:
-    """Refined until |y_C| no longer halves."""
-    before = np.inf
-    for _ in range(REFINEMENTS):
-        trial = sets.refined(C, trial.lam)
-        if trial.rounding > before / 2:
-            break
-        before = trial.rounding
-    return trial

@@ -12,7 +12,7 @@ from problems.assembly import Prepared
 from solvers.base import Load, Problem
 from solvers.block_pivoting import block_pivoting
 from solvers.bordered_factor import BorderedFactor
-from solvers.contact_sets import ContactSets, product
+from solvers.contact_sets import ContactSets, gaps, product
 from solvers.inverse import BLOCK, inverse_with_factor
 from solvers.nested import cells_of, representatives
 from solvers.newton import ActiveSetNewton
@@ -66,11 +66,15 @@ def test_the_forces_and_gaps_of_a_set(share: float, with_inverse: bool) -> None:
     sets = ContactSets(Q, p, np.linalg.inv(Q) if with_inverse else None)
     C = subset(rng, size, share)
     for _ in range(5):
-        for trial in (sets.at(C), sets.refined(C, sets.at(C).lam * (1 + 1e-6))):
+        found = sets.at(C)
+        worse = gaps(Q, p, C, found.lam * (1 + 1e-6))
+        for trial in (found, sets.refined(C, worse, 1e-11)):
             assert not trial.lam[~C].any()
             assert abs(trial.y[C]).max(initial=0) <= 1e-10
             np.testing.assert_allclose(Q @ trial.lam - p, trial.y, atol=1e-10)
             assert trial.rounding <= 1e-10
+        if C.any():
+            assert worse.rounding > 1e-9
         C = C ^ subset(rng, size, 0.05)
 
 
