@@ -25,6 +25,7 @@ SOLVERS = {
     "ipm": "solvers.ipm:Ipm",
     "gi": "solvers.gi:GoldfarbIdnani",
     "newton": "solvers.newton:ActiveSetNewton",
+    "ipm-fast": "solvers.ipm_fast:FastIpm",
     "osqp": "solvers.with_osqp:Osqp",
     "clarabel": "solvers.with_clarabel:Clarabel",
     "proxqp": "solvers.with_proxqp:ProxQp",
@@ -32,7 +33,7 @@ SOLVERS = {
 }
 
 #: Where the distribution that is installed has another name than the solver.
-IN_HOUSE = ("ipm", "gi", "newton")
+IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
 DISTRIBUTIONS = dict.fromkeys(IN_HOUSE, "rivetbench") | {"proxqp": "proxsuite", "highs": "highspy"}
 
 
