@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
-from scipy.linalg import blas
+from scipy.linalg import blas, lapack
 
 from problems.assembly import Matrix, Vector
 
@@ -23,7 +23,7 @@ Set = NDArray[np.bool_]
 
 
 class BorderedFactor:
-    """G : (m, m) symmetric, read only. base : (m,) the set that is factored.
+    """G : (m, m) symmetric, stored by columns. base : (m,) the set that is factored.
 
     Raises LinAlgError where G_BB is not positive definite.
     """
@@ -34,8 +34,10 @@ class BorderedFactor:
         self.rows = np.flatnonzero(base)
         self.U = np.empty((0, 0), order="F")
         if self.rows.size:
-            block = G[np.ix_(self.rows, self.rows)]
-            self.U = np.asfortranarray(sla.cholesky(block, overwrite_a=True, check_finite=False))
+            block = G.T[np.ix_(self.rows, self.rows)].T  # symmetric, and so it is stored by columns
+            self.U, info = lapack.dpotrf(block, clean=False, overwrite_a=True)
+            if info:
+                raise np.linalg.LinAlgError(f"the leading minor {info} of G_BB is not positive definite")
         self.column = np.full(len(base), -1)  # of each index in Z
         self.Z = np.empty((self.rows.size, 0), order="F")
         self.move_to(base)

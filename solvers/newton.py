@@ -78,7 +78,7 @@ def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
     C = p > 0
     for cells in ready.cells:
         rows = representatives(cells, p)
-        sets = ContactSets(np.asfortranarray(Q[np.ix_(rows, rows)]), p[rows])
+        sets = ContactSets(Q.T[np.ix_(rows, rows)].T, p[rows])
         found = block_pivoting(sets.at, C[rows], sets.compliance, tolerance, COARSE_PASSES)
         tried += found.passes
         lam = np.zeros(len(p))
