@@ -30,6 +30,7 @@ from solvers.base import Answer, Load, Problem, Status
 from solvers.registry import make_solver
 
 from .records import to_line
+from .yardstick import yardstick
 
 LARGEST_EVENT = 2**16  # bytes; a solver's details beyond it are dropped
 PAGE = 4096
@@ -122,6 +123,8 @@ class Run:
             with self.lap("form_s", form_s):
                 x = data.recover(np.asarray(lam, dtype=float), case)
         self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
+        if job["yardstick"]:
+            self.tell(**yardstick(data.Q))
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
