@@ -35,7 +35,7 @@ LAST_WORDS = 64  # chunks read of what a dead worker wrote
 FAMILY_S = 0.5  # between two looks for processes that the worker forked
 LAST_FORKS_S = 10.0  # for killing what forks on
 
-JOB = ("source", "solver", "options", "plugin", "form", "tolerance")
+JOB = ("source", "solver", "options", "plugin", "form", "tolerance", "yardstick")
 THREAD_VARIABLES = (
     *("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"),
     *("VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS", "RAYON_NUM_THREADS"),
@@ -158,7 +158,8 @@ class Worker:
 
     def _look_at_memory(self) -> None:
         used, limit = self.memory_mib(), self.limits.memory_limit_mib
-        self.peak_mib = max(self.peak_mib, used)
+        if self.phase != "save":  # then the solver is done
+            self.peak_mib = max(self.peak_mib, used)
         if used > limit:
             self.verdict = {"status": "memory_limit", "message": f"{used:.0f} MiB, more than {limit} MiB"}
 

@@ -42,6 +42,7 @@ class Measurement:
     limit_mm: float
     gated: bool
     plugin: str | None = None
+    yardstick: bool = False
 
     @cached_property
     def key(self) -> str:
@@ -201,6 +202,7 @@ def _of_entry(
             limit_mm=suite.limit_mm,
             gated=entry.gated,
             plugin=suite.plugin,
+            yardstick=suite.yardstick,
         )
 
 

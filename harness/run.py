@@ -34,7 +34,7 @@ DONE, NOTHING_JUDGED = 0, 3
 TOLD = (
     *("status", "message", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
     *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details"),
-    *("stderr", "answer"),
+    *("cholesky_s", "product_s", "stderr", "answer"),
 )
 CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
 

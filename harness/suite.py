@@ -52,6 +52,7 @@ class SolverEntry(BaseModel):
 class Suite(BaseModel):
     """What a suite file says; scenes are names, or absolute paths of files. `name` is the file's.
 
+    yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of so many unknowns; time_limit_s for the rest.
     """
 
@@ -68,6 +69,7 @@ class Suite(BaseModel):
     time_limit_by_size_s: dict[PositiveInt, PositiveFloat] = {}
     memory_limit_mib: PositiveInt = 8192
     limit_mm: PositiveFloat = 1e-7
+    yardstick: bool = False
     plugin: str | None = None
     solver: Annotated[list[SolverEntry], Some]
 

@@ -31,6 +31,7 @@ from solvers.registry import make_solver
 
 from .machine import resident_mib
 from .records import to_line
+from .yardstick import yardstick
 
 LARGEST_EVENT = 2**16  # bytes; a solver's details beyond it are dropped
 PAGE = 4096
@@ -123,6 +124,8 @@ class Run:
             with self.lap("form_s", form_s):
                 x = data.recover(np.asarray(lam, dtype=float), case)
         self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
+        if job["yardstick"]:
+            self.tell(**yardstick(data.Q))
         if x is None:
             return {"status": answer.status, "answer": None}
         try:

@@ -29,6 +29,7 @@ from .sections import (
     profiles,
     recommendation,
     residual_error,
+    speed,
     stability,
     summary,
     times,
@@ -38,6 +39,7 @@ from .sections.paper import claims, figures3_4, figures5_7, table1, table2, tabl
 SECTIONS: list[Callable[[Results], Section | None]] = [
     summary.section,
     recommendation.section,
+    speed.section,
     claims.section,
     table1.section,
     table2.section,

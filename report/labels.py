@@ -7,7 +7,8 @@ import pandas as pd
 from .numbers import tidy_power
 
 #: In-house first, then the libraries; what is not named here follows by name.
-ORDER = ("ipm", "gi", "newton", "piqp", "proxqp", "clarabel", "osqp", "daqp", "quadprog", "highs")
+IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
+ORDER = (*IN_HOUSE, "piqp", "proxqp", "clarabel", "osqp", "daqp", "quadprog", "highs")
 
 
 def named(cells: pd.DataFrame) -> pd.DataFrame:

@@ -28,6 +28,7 @@ NUMBERS = (
     *("solver_reported_s", "displacement_error_mm", "limit_mm", "reference_bound_mm", "contact_mismatch"),
     *("min_gap_mm", "primal_residual", "dual_residual", "duality_gap", "peak_rss_mib"),
     *("threads_asked", "load_s", "overhead_s", "time_limit_s", "memory_limit_mib", "data_mib"),
+    *("cholesky_s", "product_s"),
 )
 TEXTS = (
     *("key", "suite", "scene", "solver", "form", "variant", "status", "verdict", "machine"),
@@ -35,7 +36,7 @@ TEXTS = (
 )
 CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 
-MEDIANS = [*TIMES, "iterations", "inner_iterations", "solver_reported_s"]
+MEDIANS = [*TIMES, "iterations", "inner_iterations", "solver_reported_s", "cholesky_s", "product_s"]
 LARGEST = ["displacement_error_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 #: From best to worst: a cell takes the worst verdict of its repeats.

@@ -34,6 +34,7 @@ KNOWN = {
     "ipm": (BLUE, "o"),
     "gi": (VERMILLION, "s"),
     "newton": (BLACK, "*"),
+    "ipm-fast": (BLACK, "o"),
     "piqp": (GREEN, "D"),
     "proxqp": (PURPLE, "P"),
     "clarabel": (ORANGE, "X"),

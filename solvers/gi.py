@@ -18,14 +18,15 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from problems.assembly import LoadCase, Matrix, Vector
 from problems.errors import InputError
 
-from .base import FORMS, Answer, Form, Load, Problem, Solver, Status, failed
+from .base import FORMS, Answer, Form, Load, Problem, Solver, failed
 from .goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
 from .growing_factor import GrowingFactor
+from .inverse import inverse_with_factor
+from .kkt import checked
 
 
 @dataclass(frozen=True)
@@ -60,11 +61,10 @@ class GoldfarbIdnani(Solver):
         if data.form == "primal":
             return _Prepared(data, data.Q, None)
         try:
-            U = sla.cholesky(data.Q, check_finite=False)
+            inverse, U = inverse_with_factor(data.Q)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
-        inverse, _ = lapack.dpotri(U)
-        return _Prepared(data, np.asfortranarray(np.triu(inverse) + np.triu(inverse, 1).T), U)
+        return _Prepared(data, inverse, U)
 
     def solve(self, ready: _Prepared | Answer, load: Load, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
@@ -82,9 +82,11 @@ class GoldfarbIdnani(Solver):
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is not None:
             lam = _on_support(ready, load, slacks(result.u)[0], result)
-            status, residual = _checked(result.status, data, load, lam, tolerance)
+            status, residual = checked(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
             details["kkt_residual_mm"] = residual
-            if status == "solved":
+            if result.status == "iteration_limit":
+                status = result.status
+            elif status == "solved":
                 details.pop("cause", None)
             else:
                 details.setdefault("cause", f"rounding: optimal to {residual:.1e} mm only")
@@ -155,15 +157,3 @@ def _refined(ready: _Prepared, load: Load, lam: Vector, C: NDArray[np.intp], fac
         lam += v - ready.G @ u
     lam[C] = 0.0
     return lam
-
-
-def _checked(
-    status: Status, data: Problem, load: Load, lam: Vector, tolerance: float
-) -> tuple[Status, float]:
-    """The status that the optimality conditions of λ ≥ 0 itself bear out, and their residual in mm."""
-    y = data.Q @ lam - load.p
-    residual = max(float((-y).max()), float(abs(y[lam > 0]).max(initial=0.0)))
-    if status == "iteration_limit":
-        return status, residual
-    rounding = 4 * EPS * float((abs(load.p) + abs(data.Q) @ lam).max())
-    return "solved" if residual <= max(tolerance, rounding) else "inaccurate", residual

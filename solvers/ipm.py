@@ -17,7 +17,7 @@ from problems.errors import Fault, InputError
 
 from .base import Answer, Form, Load, Problem, Solver, Status, failed
 from .infeasible_start import mehrotra_start, stp1, stp2
-from .newton_system import SYSTEMS, Direct, OpenLast, Pcg
+from .newton_system import SYSTEMS, NewtonSystem, OpenLast
 from .schemes import SCHEMES, CgExhausted, Newton, Point
 from .start import NoStart, Start, algorithm_4, algorithm_5
 
@@ -33,7 +33,7 @@ Ordering = Literal["lexicographic", "open_last"]
 @dataclass(frozen=True)
 class _Ready:
     problem: Problem
-    system: Direct | Pcg
+    system: NewtonSystem
 
 
 class Ipm(Solver):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg as sla
@@ -32,6 +33,19 @@ class Solved:
     v: Vector
     iterations: int
     converged: bool
+
+
+class NewtonSystem(Protocol):
+    """What the iterations ask of it. `factorisations` counts those of the present load case."""
+
+    @property
+    def factorisations(self) -> int: ...
+
+    def begin(self) -> None:
+        """A new load case."""
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        """v with (Q + D) v = b to the tolerance, in at most `limit` inner iterations."""
 
 
 class Direct:
@@ -102,7 +116,7 @@ class OpenLast(Pcg):
 
 
 #: The option `preconditioner`, in the order of the nodes' numbers.
-SYSTEMS: dict[str, Callable[[Matrix], Direct | Pcg]] = {
+SYSTEMS: dict[str, Callable[[Matrix], NewtonSystem]] = {
     "V": lambda Q: Pcg(CholeskyPlusRoot(Q)),
     "U": lambda Q: Pcg(CholeskyFactor(Q)),
     "none": lambda Q: Pcg(Identity(Q)),

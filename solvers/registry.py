@@ -24,6 +24,8 @@ from .plugin import load_plugin
 SOLVERS = {
     "ipm": "solvers.ipm:Ipm",
     "gi": "solvers.gi:GoldfarbIdnani",
+    "newton": "solvers.newton:ActiveSetNewton",
+    "ipm-fast": "solvers.ipm_fast:FastIpm",
     "osqp": "solvers.with_osqp:Osqp",
     "clarabel": "solvers.with_clarabel:Clarabel",
     "proxqp": "solvers.with_proxqp:ProxQp",
@@ -31,7 +33,8 @@ SOLVERS = {
 }
 
 #: Where the distribution that is installed has another name than the solver.
-DISTRIBUTIONS = {"ipm": "rivetbench", "gi": "rivetbench", "proxqp": "proxsuite", "highs": "highspy"}
+IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
+DISTRIBUTIONS = dict.fromkeys(IN_HOUSE, "rivetbench") | {"proxqp": "proxsuite", "highs": "highspy"}
 
 
 def solver_names() -> list[str]:

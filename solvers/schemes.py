@@ -13,7 +13,7 @@ import numpy as np
 
 from problems.assembly import Matrix, Vector
 
-from .newton_system import Direct, Pcg
+from .newton_system import NewtonSystem
 
 
 class CgExhausted(Exception):
@@ -51,7 +51,7 @@ class Newton:
 
     Q: Matrix
     p: Vector
-    system: Direct | Pcg
+    system: NewtonSystem
     theta: float
     sigma: float
     cg_tolerance: float

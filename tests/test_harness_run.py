@@ -270,3 +270,14 @@ def wait_for(condition: Any) -> Any:
         assert time.monotonic() < deadline, "waited too long"
         time.sleep(0.05)
     return found
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_the_yardstick_stands_beside_each_solve_where_it_is_asked_for(folder: Path, asked: bool) -> None:
+    suite = tiny.write_suite(folder / f"yardstick {asked}", yardstick=asked)
+    code, _ = said_by(run, read_suite(str(suite)), folder / f"yardstick-{asked}")
+    (row,) = rows_of(folder / f"yardstick-{asked}")
+    assert code == 0
+    for name in ("cholesky_s", "product_s"):
+        assert (row[name] is not None) is asked
+        assert not asked or 0 < row[name] < 10

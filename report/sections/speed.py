@@ -1,0 +1,147 @@
+"""How fast, as ratios within one run: to the fastest library, and to what the machine can do at best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pandas as pd
+
+from .. import style
+from ..blocks import Block, Column, Figure, Section, Table, number, word
+from ..labels import IN_HOUSE, in_order
+from ..numbers import MISSING, significant, span, whole
+from ..rows import Results
+from ..shown import styles_of
+
+PANEL = 3.0  # inches
+ROUND = ["scene", "threads", "repeat"]
+
+
+def section(results: Results) -> Section | None:
+    if not results.rows["cholesky_s"].notna().any():
+        return None
+    cases = load_cases(results)
+    blocks: list[Block] = [_ratios(cases), _yardsticks(results.rows), _figure(results, cases)]
+    return Section("Speed, as ratios", blocks)
+
+
+def load_cases(results: Results) -> pd.DataFrame:
+    """The rows within the limit, with `series`, seconds a load case, and these as ratios: `to_cholesky`
+    of the same process, `to_library` of the same round of the repeats, the fastest there in either form.
+    """
+    keys = ["scene", "solver", "form", "variant", "tolerance", "threads"]
+    names = results.cells[[*keys, "series"]]
+    cases = results.rows[results.rows["verdict"] == "within"].merge(names, on=keys)
+    cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
+    library = cases[~cases["solver"].isin(IN_HOUSE)].sort_values("load_case_s")
+    fastest = library.drop_duplicates(ROUND).set_index(ROUND)[["load_case_s", "series"]]
+    cases = cases.join(fastest.add_prefix("library_"), on=ROUND)
+    cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
+    cases["to_library"] = cases["load_case_s"] / cases["library_load_case_s"]
+    return cases
+
+
+def _ratios(cases: pd.DataFrame) -> Table:
+    lines = []
+    for (n, threads), group in cases.groupby(["n", "threads"]):
+        for series in in_order(group, "series"):
+            mine = group[group["series"] == series]
+            line: dict[str, Any] = {"n": n, "threads": threads, "series": series}
+            line |= {"scenes": mine["scene"].nunique(), "runs": len(mine)}
+            for name in ("to_library", "to_cholesky"):
+                by_scene = mine.groupby("scene")[name].median()
+                line |= {name: by_scene.median(), f"{name}_least": mine[name].min()}
+                line |= {f"{name}_most": mine[name].max()}
+            lines.append(line)
+    rivals = ", ".join(in_order(cases[~cases["solver"].isin(IN_HOUSE)], "series")) or "none"
+    caption = (
+        "*Seconds a load case (set-up + solve + the dual form's own cost) as ratios*: to the fastest library "
+        "on the same scene in the same round of repeats, and to one Cholesky factorisation of Q, measured in "
+        "the same process after the solve. The median over the scenes, and in brackets the least to the most "
+        f"of all runs. Only answers within the limit count. Libraries: {rivals}."
+    )
+    columns = [
+        number("n", "n", whole),
+        number("threads", "threads", whole),
+        word("solver (form)", "series"),
+        number("scenes", "scenes", whole),
+        number("runs", "runs", whole),
+        Column("to the fastest library", _spread("to_library")),
+        Column("to one Cholesky of Q", _spread("to_cholesky")),
+    ]
+    return Table("speed-ratios", caption, pd.DataFrame(lines), columns)
+
+
+def _spread(name: str) -> Callable[[Mapping[str, Any]], str]:
+    def text(line: Mapping[str, Any]) -> str:
+        middle = significant(line[name])
+        least, most = (significant(line[f"{name}_{end}"], 2) for end in ("least", "most"))
+        return middle if middle == MISSING else f"{middle} ({span(least, most)})"
+
+    return text
+
+
+def _yardsticks(rows: pd.DataFrame) -> Table:
+    lines = []
+    for (n, threads), group in rows[rows["cholesky_s"].notna()].groupby(["n", "threads"]):
+        m = float(group["m"].iloc[0])
+        line: dict[str, Any] = {"n": n, "m": m, "threads": threads, "runs": len(group)}
+        for name in ("cholesky_s", "product_s"):
+            low, middle, high = group[name].quantile([0.1, 0.5, 0.9])
+            line |= {f"{name}_low": low, name: middle, f"{name}_high": high}
+        line["gflops"] = m**3 / 3 / line["cholesky_s"] / 1e9
+        line["gb_per_s"] = 8 * m**2 / line["product_s"] / 1e9
+        lines.append(line)
+    columns = [
+        number("n", "n", whole),
+        number("m", "m", whole),
+        number("threads", "threads", whole),
+        number("runs", "runs", whole),
+        number("Cholesky of Q, s", "cholesky_s"),
+        Column("10 to 90 %", _range("cholesky_s")),
+        number("10⁹ operations/s", "gflops"),
+        number("product Qv, s", "product_s"),
+        Column("10 to 90 % ", _range("product_s")),
+        number("GB/s read", "gb_per_s"),
+    ]
+    caption = (
+        "*What the machine can do*: a Cholesky factorisation of Q (m³/3 operations) and a product Qv (one "
+        "pass over 8m² bytes), after each solve in its process, the median of three; medians over all runs."
+    )
+    return Table("speed-yardsticks", caption, pd.DataFrame(lines), columns)
+
+
+def _range(name: str) -> Callable[[Mapping[str, Any]], str]:
+    return lambda line: span(significant(line[f"{name}_low"]), significant(line[f"{name}_high"]))
+
+
+def _figure(results: Results, cases: pd.DataFrame) -> Figure:
+    cases = cases[cases["threads"] == cases["threads"].max()]
+    sizes = sorted(cases["n"].unique())
+    drawing = style.figure(PANEL * len(sizes) + 0.3)
+    styles = styles_of(results, results.cells[results.cells["series"].isin(cases["series"])])
+    for axes, n in zip(drawing.subplots(len(sizes), 1, squeeze=False)[:, 0], sizes, strict=True):
+        of_size = cases[cases["n"] == n]
+        for series, look in styles.items():
+            line = of_size[of_size["series"] == series].groupby("active")["to_cholesky"].median()
+            axes.plot(line.index, line.to_numpy(), **look)
+        product = (of_size["product_s"] / of_size["cholesky_s"]).median()
+        for height, what in ((1.0, "one Cholesky of Q"), (product, "one product Qv")):
+            axes.axhline(height, color="#888888", linewidth=1.0, zorder=0.5)
+            axes.annotate(
+                what, (1, height), (3, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
+                va="center", fontsize=7.5, color="#666666",
+            )  # fmt: skip
+        axes.set(yscale="log", ylabel="time, in Cholesky factorisations")
+        style.plain_log(axes.yaxis)
+        style.percent_above(axes, of_size["m"].iloc[0])
+        axes.set_title(f"n = {n:.0f}", pad=5)
+    axes.set_xlabel("active contacts")
+    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
+    caption = (
+        "*Seconds a load case in units of one Cholesky factorisation of Q* of the same process, against the "
+        "active contacts; answers within the limit only, medians of the repeats, at the largest number of "
+        "threads."
+    )
+    return Figure("speed", caption, drawing)
