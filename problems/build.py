@@ -83,16 +83,16 @@ def _build(scene: Scene, progress: Progress) -> tuple[dict[str, Matrix], dict[st
         made = _assemble(scene, scene.joint, progress)
     lap("condensation")
     progress("Cholesky factors of K", 0.0)
-    factors = tuple(_factor(K, name, scene) for K, name in zip(made.blocks, made.parts, strict=True))
+    factors = tuple(factor(K, name, scene) for K, name in zip(made.blocks, made.parts, strict=True))
     lap("cholesky")
     progress("condition number", 0.0)
-    spectrum = [_extreme_eigenvalues(K, U) for K, U in zip(made.blocks, factors, strict=True)]
+    spectrum = [extreme_eigenvalues(K, U) for K, U in zip(made.blocks, factors, strict=True)]
     lambda_min, lambda_max = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
     if lambda_max > LARGEST_CONDITION * lambda_min:
-        raise _indefinite(scene, "cond(K)", lambda_max / lambda_min)
+        raise indefinite(scene, "cond(K)", lambda_max / lambda_min)
     lap("condition")
     progress("Q = AᵀK⁻¹A", 0.0)
-    Q = _schur(made, factors)
+    Q = schur(made, factors)
     if scene.joint is None:
         _check_independent(Q, scene)
     lap("Q")
@@ -129,7 +129,7 @@ def _assemble(scene: Scene, joint: Joint, progress: Progress) -> Assembly:
         try:
             blocks.append(_condensed(scene, joint, part, progress))
         except NotPositiveDefinite as error:
-            raise _indefinite(scene, f"part.{part.name}", str(error)) from error
+            raise indefinite(scene, f"part.{part.name}", str(error)) from error
     nodes = np.tile(joint.nodes, (len(joint.part), 1))
     return Assembly(tuple(blocks), joint.contact_matrix(), nodes, tuple(part.name for part in joint.part))
 
@@ -163,11 +163,12 @@ def _is_clamped(line: int, y: Matrix, part: Part) -> bool:
     return (line == 0 and "south" in part.clamped) or (line == len(y) - 1 and "north" in part.clamped)
 
 
-def _factor(K: Matrix, part: str, scene: Scene) -> Matrix:
+def factor(K: Matrix, part: str, scene: Scene) -> Matrix:
+    """U with K = UᵀU. Raises InputError where K is not positive definite."""
     try:
         return sla.cholesky(K, check_finite=False)
     except np.linalg.LinAlgError as error:
-        raise _indefinite(scene, f"K of {part}", str(error)) from error
+        raise indefinite(scene, f"K of {part}", str(error)) from error
 
 
 def _check_independent(Q: Matrix, scene: Scene) -> None:
@@ -182,13 +183,14 @@ def _check_independent(Q: Matrix, scene: Scene) -> None:
         raise InputError.one(where, f"A[:, {column}]", "dependent", allowed)
 
 
-def _indefinite(scene: Scene, key: str, value: object) -> InputError:
+def indefinite(scene: Scene, key: str, value: object) -> InputError:
+    """What is said of a scene whose K is not positive definite."""
     allowed = "K must be positive definite: is a part held against every rigid motion?"
     own = dict(scene.matrices)
     return InputError.one(own.get("problem") or own.get("K") or f"scene {scene.name}", key, value, allowed)
 
 
-def _extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
+def extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
     """λmin and λmax of K by Lanczos on K⁻¹ and K (dense where K is tiny)."""
     n = len(K)
     if n < 50:
@@ -205,7 +207,7 @@ def _extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
     return float(1 / smallest_inverse), float(largest)
 
 
-def _schur(made: Assembly, factors: tuple[Matrix, ...]) -> Matrix:
+def schur(made: Assembly, factors: tuple[Matrix, ...]) -> Matrix:
     """Q = Σ A_iᵀ K_i⁻¹ A_i with K_i⁻¹ from its Cholesky factor."""
     Q = np.zeros((made.m, made.m))
     for U, rows in zip(factors, made.slices, strict=True):

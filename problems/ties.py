@@ -17,11 +17,11 @@ from .assembly import Assembly, Matrix, Prepared, Vector
 from .build import (
     LARGEST_CONDITION,
     Progress,
-    _extreme_eigenvalues,
-    _factor,
-    _indefinite,
-    _schur,
     cache_key,
+    extreme_eigenvalues,
+    factor,
+    indefinite,
+    schur,
 )
 from .scene import Scene
 
@@ -53,12 +53,12 @@ def _build(
 ) -> tuple[dict[str, Matrix], dict[str, object]]:
     start = time.perf_counter()
     made = _merged(base.assembly, T, k)
-    factors = tuple(_factor(K, name, scene) for K, name in zip(made.blocks, made.parts, strict=True))
-    spectrum = [_extreme_eigenvalues(K, U) for K, U in zip(made.blocks, factors, strict=True)]
+    factors = tuple(factor(K, name, scene) for K, name in zip(made.blocks, made.parts, strict=True))
+    spectrum = [extreme_eigenvalues(K, U) for K, U in zip(made.blocks, factors, strict=True)]
     lambda_min, lambda_max = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
     if lambda_max > LARGEST_CONDITION * lambda_min:
-        raise _indefinite(scene, "cond(K)", lambda_max / lambda_min)
-    arrays = {"Q": _schur(made, factors)}
+        raise indefinite(scene, "cond(K)", lambda_max / lambda_min)
+    arrays = {"Q": schur(made, factors)}
     for i, (K, U) in enumerate(zip(made.blocks, factors, strict=True)):
         arrays |= {f"K{i}": K, f"U{i}": U}
     facts = base.facts | {

@@ -23,7 +23,7 @@ from .start import NoStart, Start, algorithm_4, algorithm_5
 
 STALLED = 10  # iterations without progress before the method gives up
 RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
-TOUCH = 1e-9  # mm: so near is touching, where a contact closes without a force
+TOUCH = 0.1  # mm/N
 EPS = float(np.finfo(float).eps)
 
 StartName = Literal["algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra"]
@@ -42,8 +42,9 @@ class Ipm(Solver):
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ feasibility with
     s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance asked for; the paper tests μ alone, because it
     solves its systems exactly. No feasibility is asked for below the rounding of Qλ − p, which is at most
-    4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). And it goes on until each contact is closed or open to
-    that or 1e-9 mm, min(y_i, q_ii λ_i): one that touches without a force stands off by √(μ q_ii).
+    4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). And it goes on until each contact is closed or open,
+    min(y_i, q_ii λ_i), to that or √(0.1 mm/N · ε_μ): one that touches without a force stands off by
+    √(μ q_ii), which is more than ε_μ vouches for where the contact is soft.
 
     Where the iteration stalls, because what inexact systems leave in s1 outlasts y or because a step ended
     too near to the boundary, it begins anew with a smaller cg_tolerance and theta (details: restarts).
@@ -176,7 +177,7 @@ class Ipm(Solver):
             measure = max(
                 point.mu / tolerance,
                 point.infeasibility / max(self.feasibility, rounding),
-                _undecided(newton, point) / max(TOUCH, rounding),
+                _undecided(newton, point) / max(np.sqrt(TOUCH * tolerance), rounding),
             )
             if measure <= 1:
                 return "solved", "", point
