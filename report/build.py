@@ -16,7 +16,18 @@ from . import style
 from .blocks import Block, Figure, Section, Table
 from .checks import warnings
 from .rows import Results, read
-from .sections import accuracy, breakdown, details, gap_map, machine, problems, summary, times
+from .sections import (
+    accuracy,
+    breakdown,
+    details,
+    gap_map,
+    ladders,
+    machine,
+    problems,
+    rungs,
+    summary,
+    times,
+)
 from .sections.paper import claims, figures3_4, figures5_7, table1, table2, table3, table4
 
 SECTIONS: list[Callable[[Results], Section | None]] = [
@@ -34,8 +45,9 @@ SECTIONS: list[Callable[[Results], Section | None]] = [
     breakdown.section,
     gap_map.section,
     details.section,
-    machine.section,
 ]
+#: The same for the rungs of ladders, which the sections above leave out.
+OF_RUNGS: list[Callable[[Results], Section | None]] = [ladders.section, rungs.section]
 
 
 def write(directory: Path) -> Path:
@@ -51,7 +63,9 @@ def write(directory: Path) -> Path:
     parts = []
     with style.applied():
         for i, part in enumerate(results.by_machine()):
-            sections = [made for section in SECTIONS if (made := section(part))]
+            made = [section(part.of_rungs(True)) for section in OF_RUNGS]
+            made += [section(part.of_rungs(False)) for section in SECTIONS] + [machine.section(part)]
+            sections = [section for section in made if section]
             parts.append((part, [_save(section, target, i) for section in sections]))
     path = target / "report.md"
     path.write_text(_template().render(results=results, parts=parts, warnings=warnings(results)), "utf-8")
