@@ -18,13 +18,20 @@ from .checks import warnings
 from .rows import Results, read
 from .sections import (
     accuracy,
+    amortised,
+    asked_achieved,
     breakdown,
     details,
     gap_map,
     ladders,
     machine,
+    price_list,
     problems,
+    profiles,
+    recommendation,
+    residual_error,
     rungs,
+    stability,
     summary,
     times,
 )
@@ -32,6 +39,7 @@ from .sections.paper import claims, figures3_4, figures5_7, table1, table2, tabl
 
 SECTIONS: list[Callable[[Results], Section | None]] = [
     summary.section,
+    recommendation.section,
     claims.section,
     table1.section,
     table2.section,
@@ -42,6 +50,12 @@ SECTIONS: list[Callable[[Results], Section | None]] = [
     problems.section,
     times.section,
     accuracy.section,
+    price_list.section,
+    asked_achieved.section,
+    residual_error.section,
+    profiles.section,
+    amortised.section,
+    stability.section,
     breakdown.section,
     gap_map.section,
     details.section,
