@@ -112,8 +112,8 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
     One is m's own, where the solver ran out of as much time at this tolerance or a looser one. Else they
     are all those of the next smaller size n' that the same solver, form and settings were measured
     on, if it ran out of its time T' on each, and the time T that m has is at most (n/n')² T': every
-    solver here works with dense matrices, so its time grows with n² at least. (Not for a rung of a
-    ladder: it is not size alone that makes it hard.)
+    solver here works with dense matrices, so its time grows with n² at least. (Not so on the rungs of
+    ladders, where it is not size that makes them hard.)
     """
     same = ("solver", "form", "variant", "options", "threads_asked")
     mine = (m.solver, m.form, m.variant, m.options, m.threads)

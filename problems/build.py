@@ -89,7 +89,7 @@ def _build(scene: Scene, progress: Progress) -> tuple[dict[str, Matrix], dict[st
     spectrum = [extreme_eigenvalues(K, U) for K, U in zip(made.blocks, factors, strict=True)]
     lambda_min, lambda_max = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
     if lambda_max > LARGEST_CONDITION * lambda_min:
-        raise indefinite(scene, "cond(K)", lambda_max / lambda_min)
+        raise indefinite(scene, "cond(K)", lambda_max / lambda_min if lambda_min > 0 else np.inf)
     lap("condition")
     progress("Q = AᵀK⁻¹A", 0.0)
     Q = schur(made, factors)

@@ -23,6 +23,7 @@ from .sections import (
     breakdown,
     details,
     gap_map,
+    ladders,
     machine,
     price_list,
     problems,
@@ -30,6 +31,7 @@ from .sections import (
     recommendation,
     residual_error,
     speed,
+    rungs,
     stability,
     summary,
     times,
@@ -59,8 +61,9 @@ SECTIONS: list[Callable[[Results], Section | None]] = [
     breakdown.section,
     gap_map.section,
     details.section,
-    machine.section,
 ]
+#: The same for the rungs of ladders, which the sections above leave out.
+OF_RUNGS: list[Callable[[Results], Section | None]] = [ladders.section, rungs.section]
 
 
 def write(directory: Path) -> Path:
@@ -76,7 +79,9 @@ def write(directory: Path) -> Path:
     parts = []
     with style.applied():
         for i, part in enumerate(results.by_machine()):
-            sections = [made for section in SECTIONS if (made := section(part))]
+            made = [section(part.of_rungs(True)) for section in OF_RUNGS]
+            made += [section(part.of_rungs(False)) for section in SECTIONS] + [machine.section(part)]
+            sections = [section for section in made if section]
             parts.append((part, [_save(section, target, i) for section in sections]))
     path = target / "report.md"
     path.write_text(_template().render(results=results, parts=parts, warnings=warnings(results)), "utf-8")

@@ -28,7 +28,7 @@ def _machines(results: Results) -> list[str]:
 
 
 def _unfinished(results: Results) -> list[str]:
-    suite = results.suite
+    suite = results.suite | {"scenes": _scenes_to_measure(results)}
     made, planned = len(results.rows), planned_measurements(suite)
     if made >= planned:
         return []
@@ -36,6 +36,13 @@ def _unfinished(results: Results) -> list[str]:
         f"The run is not finished: {made} of {planned} measurements of {suite.get('name', 'the suite')} "
         "are there. Run it again into the same directory and it goes on."
     ]
+
+
+def _scenes_to_measure(results: Results) -> list[str]:
+    """The suite's scenes without those that the model is to refuse."""
+    problems = results.problems
+    refused = set(problems.loc[problems["refused"].notna(), "scene"]) if "refused" in problems else set()
+    return [scene for scene in results.suite.get("scenes", []) if scene not in refused]
 
 
 def planned_measurements(suite: dict[str, Any]) -> int:

@@ -28,7 +28,7 @@ NUMBERS = (
     *("solver_reported_s", "displacement_error_mm", "limit_mm", "reference_bound_mm", "contact_mismatch"),
     *("min_gap_mm", "primal_residual", "dual_residual", "duality_gap", "peak_rss_mib"),
     *("threads_asked", "load_s", "overhead_s", "time_limit_s", "memory_limit_mib", "data_mib"),
-    *("cholesky_s", "product_s"),
+    *("limit_asked_mm", "backward_error", "cholesky_s", "product_s"),
 )
 TEXTS = (
     *("key", "suite", "scene", "solver", "form", "variant", "status", "verdict", "machine"),
@@ -38,6 +38,9 @@ CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 
 MEDIANS = [*TIMES, "iterations", "inner_iterations", "solver_reported_s", "cholesky_s", "product_s"]
 LARGEST = ["displacement_error_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
+
+#: How the names of the ladders' rungs begin, hard/<ladder>/<rung>.
+RUNGS = "hard/"
 
 #: From best to worst: a cell takes the worst verdict of its repeats.
 VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
@@ -63,7 +66,7 @@ class Results:
     @property
     def limit(self) -> str:
         """The accuracy asked for, as text: '1e-7 mm'."""
-        limits = sorted(self.rows["limit_mm"].dropna().unique())
+        limits = sorted(self.rows["limit_asked_mm"].dropna().unique())
         return " / ".join(tidy_power(limit) for limit in limits or [1e-7]) + " mm"
 
     def of_size(self, n: int) -> pd.DataFrame:
@@ -81,6 +84,11 @@ class Results:
         except (OSError, ValueError, BadZipFile):
             return {}
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
+
+    def of_rungs(self, wanted: bool) -> Results:
+        """The results on the rungs of ladders alone, or on everything else."""
+        rows = self.rows[self.rows["scene"].str.startswith(RUNGS) == wanted].reset_index(drop=True)
+        return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 
     def by_machine(self) -> list[Results]:
         """Results apart for each machine, so that no table or mean can mix two of them."""
@@ -156,6 +164,7 @@ def _frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[st
             rows[name] = rows[name].fillna(rows["scene"].map(known[name]))
     for name in ("n", "m", "active"):
         rows[name] = rows[name].fillna(rows.groupby("scene")[name].transform("max"))
+    rows["limit_asked_mm"] = rows["limit_asked_mm"].fillna(rows["limit_mm"])
     rows["threads"] = rows["threads"].fillna(rows["threads_asked"])
     rows["working_mib"] = rows["peak_rss_mib"] - rows["data_mib"]  # what the solver adds to the data
     options = {solver.get("name"): solver for solver in suite.get("solver", [])}

@@ -11,13 +11,13 @@ from solvers.registry import make_solver, solver_names
 CASES: list[tuple[str, Form]] = [
     (name, form) for name in solver_names() for form in make_solver(name, {}).forms
 ]
-IN_HOUSE = [(name, form) for name, form in CASES if name in ("ipm", "gi")]
+IN_HOUSE = [(name, form) for name, form in CASES if name in ("ipm", "gi", "newton", "ipm-fast")]
 
 #: The tolerance handed over; 1e-9 to the others.
-TOLERANCES = {"ipm": 1e-14, "gi": 1e-10}
+TOLERANCES = {"ipm": 1e-14, "gi": 1e-10, "newton": 1e-10, "ipm-fast": 1e-10}
 
 #: These end with the right contact set and solve its equations: no tolerance is left in their answer.
-ACTIVE_SET = ("gi", "quadprog", "daqp")
+ACTIVE_SET = ("gi", "newton", "ipm-fast", "quadprog", "daqp")
 
 
 def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Answer, Vector | None]:

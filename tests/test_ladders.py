@@ -30,6 +30,8 @@ IN_HOUSE: list[tuple[str, Form, float]] = [
     ("ipm", "dual", 1e-14),
     ("gi", "dual", 1e-10),
     ("gi", "primal", 1e-10),
+    ("newton", "dual", 1e-10),
+    ("ipm-fast", "dual", 1e-10),
 ]
 
 
@@ -150,4 +152,4 @@ def test_the_suite_measures_every_rung_with_every_solver() -> None:
     assert {m.scene for m in plan} == set(TAKEN)
     lines = {(m.solver, m.form) for m in plan}
     assert len(plan) == len(TAKEN) * len(lines)
-    assert {m.solver for m in plan if m.gated} == {"ipm", "gi"}
+    assert {m.solver for m in plan if m.gated} == {"ipm", "gi", "newton", "ipm-fast"}

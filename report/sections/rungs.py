@@ -1,0 +1,76 @@
+"""The rungs themselves, what was not solved on them, and what the model refuses."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from ..blocks import Block, Section, Table, number, word
+from ..numbers import as_number, power, whole
+from ..outcomes import with_outcomes
+from ..rows import RUNGS, Results
+
+FIGURES = (
+    *("label", "scene", "status", "verdict", "outcome", "displacement_error_mm", "limit_mm"),
+    *("backward_error", "iterations", "solve_s", "message"),
+)
+
+
+def section(results: Results) -> Section | None:
+    if results.cells.empty or "scene" not in results.problems:
+        return None
+    known = results.problems[results.problems["scene"].str.startswith(RUNGS)]
+    known = known.drop_duplicates("scene", keep="last")
+    blocks: list[Block] = [_taken(results, known)]
+    broken = with_outcomes(results.cells).query("verdict != 'within'")
+    if len(broken):
+        blocks.append(_broken(broken))
+    if "refused" in known and known["refused"].notna().any():
+        blocks.append(_refused(known[known["refused"].notna()]))
+    return Section("The rungs", blocks)
+
+
+def _taken(results: Results, known: pd.DataFrame) -> Table:
+    limits = results.rows.groupby("scene")["limit_mm"].max()
+    table = known[known["scene"].isin(limits.index)].reindex(
+        columns=["scene", "title", "n", "m", "active", "cond_K", "reference_bound_mm", "reference_route"]
+    )
+    for name in ("n", "m", "active", "cond_K", "reference_bound_mm"):
+        table[name] = table[name].map(as_number).astype(float)
+    table["limit_mm"] = table["scene"].map(limits)
+    columns = [
+        word("rung", "scene"),
+        word("what it is", "title"),
+        number("n", "n", whole),
+        number("m", "m", whole),
+        number("active", "active", whole),
+        number("cond(K)", "cond_K", power),
+        number("limit, mm", "limit_mm", power),
+        number("answer known to, mm", "reference_bound_mm", power),
+        word("by", "reference_route"),
+    ]
+    caption = (
+        "*The rungs that are measured.* Chosen, exact: K, f and g were made from the answer without any "
+        "rounding, so it is the truth; else the reference's own proven bound."
+    )
+    return Table("rungs", caption, table, columns)
+
+
+def _broken(cells: pd.DataFrame) -> Table:
+    columns = [
+        word("rung", "scene"),
+        word("solver (form)", "label"),
+        word("status", "status"),
+        number("error, mm", "displacement_error_mm", power),
+        number("limit, mm", "limit_mm", power),
+        number("backward error", "backward_error", power),
+    ]
+    caption = "*Every row without a right answer.*"
+    return Table("rungs-broken", caption, cells.sort_values(["scene", "label"])[[*FIGURES]], columns)
+
+
+def _refused(known: pd.DataFrame) -> Table:
+    table = known[["scene", "title", "refused"]].copy()
+    table["refused"] = table["refused"].replace("", "**taken, though the model cannot carry it**")
+    columns = [word("rung", "scene"), word("what it is", "title"), word("what the model says", "refused")]
+    caption = "*What the model refuses, as it should*: a clear error, and no plausible wrong answer."
+    return Table("rungs-refused", caption, table, columns)

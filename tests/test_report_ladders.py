@@ -1,0 +1,147 @@
+"""The report on ladders, from made-up rows: right or wrong, and whether the solver knew."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from matplotlib.image import imread
+from synthetic_results import no_answer, write_rows
+from synthetic_results import row as any_row
+
+from report import style
+from report.build import write
+from report.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, outcome
+from report.rows import read
+from report.sections.ladders import rungs_in_order
+
+EASY, MIDDLE, HARD, ODD = "hard/steep/1e1", "hard/steep/1e5", "hard/steep/1e9", "hard/odd/one"
+WRONG = {"verdict": "outside", "displacement_error_mm": 3e-3, "limit_mm": 1e-6}
+
+
+@pytest.fixture(autouse=True)
+def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(style, "DPI", 40)
+
+
+def row(scene: str, solver: str, **figures: Any) -> dict[str, Any]:
+    size = {"n": 128, "m": 64, "active": 20, "backward_error": 1e-12, "limit_asked_mm": 1e-7}
+    return any_row("4386/0052", solver) | size | {"scene": scene, "threads": 1} | figures
+
+
+ROWS = [
+    *(row(scene, "ipm") for scene in (EASY, MIDDLE, HARD, ODD)),
+    row(EASY, "a"),
+    row(MIDDLE, "a", **WRONG, status="inaccurate"),
+    row(HARD, "a", **WRONG),
+    row(ODD, "a", **no_answer("crashed")),
+    row(EASY, "b", status="inaccurate"),
+    row(MIDDLE, "b"),
+    row(HARD, "b", **WRONG),
+    row(ODD, "b", verdict="cannot_be_judged"),
+    row(ODD, "b", form="primal", **no_answer("unsupported")),
+]
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> Path:
+    write_rows(tmp_path, ROWS)
+    known = {"n": 128, "m": 64, "active": 20, "reference_bound_mm": 0.0, "reference_route": "chosen, exact"}
+    problems = [
+        {"scene": scene, "title": "made up", "cond_K": cond, **known}
+        for scene, cond in ((EASY, 1e1), (MIDDLE, 1e5), (HARD, 1e13), (ODD, 1e3))
+    ]
+    problems.append({"scene": "hard/odd/loose", "title": "held by nothing", "refused": "K must be definite"})
+    (tmp_path / "problems.jsonl").write_text("".join(json.dumps(p) + "\n" for p in problems), "utf-8")
+    scenes = [ODD, "hard/odd/loose", EASY, MIDDLE, HARD]
+    lines = "".join(f'[[solver]]\nname = "{name}"\nforms = ["dual"]\n' for name in ("ipm", "a", "b"))
+    (tmp_path / "suite.toml").write_text(f"name = 'made-up'\nscenes = {json.dumps(scenes)}\n{lines}", "utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("verdict", "status", "found"),
+    [
+        ("within", "solved", RIGHT),
+        ("within", "iteration_limit", DOUBTED),
+        ("outside", "inaccurate", KNEW),
+        ("outside", "solved", LIED),
+        ("cannot_be_judged", "solved", UNJUDGED),
+        ("no_answer", "time_limit", NONE),
+    ],
+)
+def test_outcomes(verdict: str, status: str, found: str) -> None:
+    assert outcome({"verdict": verdict, "status": status}) == found
+
+
+def test_the_worst_answer_is_counted_and_named(directory: Path) -> None:
+    write(directory)
+    table = pd.read_csv(directory / "report" / "honesty.csv").set_index("label")
+    names = [RIGHT, DOUBTED, KNEW, LIED, NONE, UNJUDGED]
+    assert table[names].T.to_dict("list") == {
+        "ipm (dual)": [4, 0, 0, 0, 0, 0],
+        "a (dual)": [1, 0, 1, 1, 1, 0],
+        "b (dual)": [1, 1, 0, 1, 0, 1],
+    }
+    assert table["rungs"].tolist() == [4, 4, 4]
+    assert table["where"].fillna("").to_dict() == {
+        "ipm (dual)": "",
+        "a (dual)": "steep/1e9",
+        "b (dual)": "steep/1e9",
+    }
+    assert table.loc["a (dual)", "worst_share"] == pytest.approx(3e3)
+    assert table.loc["ipm (dual)", "worst_share"] == pytest.approx(1e-2)
+
+
+def test_each_ladder_breaks_at_its_first_wrong_rung(directory: Path) -> None:
+    write(directory)
+    table = pd.read_csv(directory / "report" / "breaking-points.csv", keep_default_na=False)
+    assert list(table) == ["label", "odd", "steep"]  # as the suite lists them
+    assert table.to_numpy().tolist() == [
+        ["ipm (dual)", "–", "–"],
+        ["a (dual)", "one", "1e5"],
+        ["b (dual)", "one", "1e9 ×"],
+    ]
+
+
+def test_in_house_solvers_are_held_to_their_bound_up_to_1e12(directory: Path) -> None:
+    text = write(directory).read_text("utf-8")
+    assert "right in 3 of 3 rows up to cond(K) = 1e12; in all their 4 rows, no wrong answer is called" in text
+    write_rows(directory, [r | (WRONG if r["solver"] == "ipm" and r["scene"] == EASY else {}) for r in ROWS])
+    text = write(directory).read_text("utf-8")
+    assert "right in 2 of 3 rows up to cond(K) = 1e12; in all their 4 rows, 1 wrong answer is called" in text
+
+
+def test_what_the_model_refuses_is_listed_and_not_awaited(directory: Path) -> None:
+    text = write(directory).read_text("utf-8")
+    assert re.search(r"\| hard/odd/loose +\| held by nothing +\| K must be definite +\|", text)
+    assert "not finished" not in text
+
+
+def test_rungs_and_scenes_are_reported_apart(directory: Path) -> None:
+    text = write(directory).read_text("utf-8")
+    assert re.findall("^## (.*)", text, re.M) == [
+        "Where each solver breaks, and whether it knows",
+        "The rungs",
+        "Machine and method",
+    ]
+    assert imread(directory / "report" / "ladders.png")[..., :3].std() > 0.05
+    write_rows(directory, [*ROWS, any_row("4386/0052", "ipm")])
+    both = write(directory).read_text("utf-8")
+    assert "## Summary" in both
+    assert "hard/steep" not in both[both.index("## Summary") : both.index("## Machine")]
+
+
+def test_without_a_rung_there_is_no_section_on_ladders(tmp_path: Path) -> None:
+    text = write(write_rows(tmp_path, [any_row("4386/0052", "ipm")])).read_text("utf-8")
+    assert "breaks" not in text
+    assert not (tmp_path / "report" / "ladders.png").exists()
+
+
+def test_rungs_that_the_suite_does_not_list_come_as_they_were_measured(tmp_path: Path) -> None:
+    results = read(write_rows(tmp_path, [row(HARD, "ipm"), row(EASY, "ipm")]))
+    assert rungs_in_order(results, results.cells) == {"steep": ["1e9", "1e1"]}
