@@ -11,11 +11,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from . import cache, line_loads
+from . import cache
 from .assembly import Vector
 from .build import cache_key
 from .effect import PartLoadEffect, PartModel
 from .joint import Joint, Part
+from .line_loads import line_loads
 from .scene import Scene, plain
 
 
@@ -25,7 +26,7 @@ def condensed_load(effect: PartLoadEffect, scene: Scene, joint: Joint) -> Vector
     A load on the whole part and its condensation push the junction nodes alike: the work of f_i on the
     motions that the junction imposes goes to f_j, and its work on the others does not move the junction.
     """
-    modules = [inspect.getmodule(effect.load), inspect.getmodule(condensed_load), line_loads]
+    modules = [inspect.getmodule(made) for made in (effect.load, PartModel, condensed_load, line_loads)]
     sources = [inspect.getsource(module) for module in modules if module]
     key = cache.digest("condensed load", cache_key(scene), plain(effect), sources)
     found = cache.load(key)

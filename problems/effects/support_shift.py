@@ -50,7 +50,9 @@ class SupportShift(PartLoadEffect):
         f = np.zeros(model.plate.size)
         for effect in model.effects:
             if isinstance(effect, Supports):
-                for point in set(effect.points) & set(self.points):
+                for point in effect.points:
+                    if point not in self.points:
+                        continue
                     e = model.plate.evaluate(*point)
                     f += effect.stiffness_per_point * self.shift * e.toarray()[0]
         return f
