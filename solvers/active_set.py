@@ -32,8 +32,10 @@ def solve_from(C: Set, sets: ContactSets, tolerance: float, max_sets: int) -> An
     lam = np.maximum(trial.lam, 0.0)
     y = trial.y if (trial.lam >= 0).all() else product(sets.Q, lam) - sets.p
     status, residual = checked(sets.Q, sets.p, lam, y, tolerance)
-    if wrong.any() and status == "inaccurate":
-        status = "iteration_limit"
     details: dict[str, Any] = {"closed": int(found.C.sum()), "kkt_residual_mm": residual}
     details |= {"factorisations": sets.factorisations, "single_exchanges": single}
+    if status == "inaccurate":
+        status = "iteration_limit" if wrong.any() else "inaccurate"
+        tried = f"{passes} contact sets" if wrong.any() else "rounding"
+        details["cause"] = f"{tried}: optimal to {residual:.1e} mm only"
     return Answer(status, lam, iterations=passes, details=details)

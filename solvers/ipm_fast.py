@@ -16,12 +16,12 @@ from problems.assembly import Matrix
 from problems.errors import Fault, InputError
 
 from .active_set import solve_from
-from .base import Answer, Form, Load, Problem, Solver, Status
+from .base import Answer, Form, Load, Problem, Solver, failed
 from .contact_sets import ContactSets
 from .infeasible_start import stp2
 from .inverse import inverse_with_factor
 from .newton_system import Direct, NewtonSystem
-from .schemes import Newton, mehrotra
+from .schemes import Newton, Point, mehrotra
 from .single_precision import SinglePrecision
 from .start import NoStart, algorithm_5
 
@@ -32,6 +32,7 @@ REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: what is left of y = Qλ �
 MAX_ITERATIONS = 100
 MAX_SETS = 1000
 STALLED = 10
+LIMIT = {"cause": f"{MAX_ITERATIONS} iterations"}
 TOLD = 1e-8  # of the μ at the start: before, a contact that looks closed may only not have moved yet
 UNDECIDED = 1 / 16  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 
@@ -46,11 +47,11 @@ class _Ready:
 class FastIpm(Solver):
     """Interior point with a finish on the active set.
 
-    When μ = λᵀy/m has fallen to 1e-8 of its start and at most m/16 contacts are undecided,
-    C = {q_ii λ_i > y_i} is where `active_set.solve_from` begins, whose status is the answer's. Without
-    the finish it stops when the natural residual max|min(q_ii λ_i, (Qλ − p)_i)| is at most the tolerance,
-    in mm, or has not fallen for 10 iterations. Iterations are Newton matrices, inner iterations the
-    contact sets of the finish.
+    When μ = λᵀy/m has fallen to 1e-8 of its start and at most m/16 contacts are undecided, or the
+    interior point is as good as it gets, C = {q_ii λ_i > y_i} is where `active_set.solve_from` begins,
+    whose status is the answer's. As good as it gets: the natural residual max|min(q_ii λ_i, (Qλ − p)_i)|
+    is at most the tolerance, in mm, or has not fallen for 10 iterations. That, too, is the end without
+    the finish. Iterations are Newton matrices, inner iterations the contact sets of the finish.
 
     Options
     -------
@@ -67,44 +68,52 @@ class FastIpm(Solver):
             raise InputError([Fault("ipm-fast", k, v, "must be true or false") for k, v in wrong.items()])
         self.finish, self.single, self.start_at_gaps = finish, single, start_at_gaps
 
-    def prepare(self, data: Problem) -> _Ready:
-        """Q in single precision, and Q⁻¹ for the finish."""
+    def prepare(self, data: Problem) -> _Ready | Answer:
+        """Q in single precision, and Q⁻¹ for the finish; where Q has no factor, the answer that says so."""
         system: NewtonSystem = SinglePrecision(data.Q) if self.single else Direct(data.Q)
-        return _Ready(data, system, inverse_with_factor(data.Q)[0] if self.finish else None)
+        try:
+            return _Ready(data, system, inverse_with_factor(data.Q)[0] if self.finish else None)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
 
-    def solve(self, ready: _Ready, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
+        try:
+            return self._solved(ready, load, tolerance)
+        except (np.linalg.LinAlgError, NoStart) as error:
+            return failed(str(error))
+
+    def _solved(self, ready: _Ready, load: Load, tolerance: float) -> Answer:
         Q, p, system = ready.problem.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()
         newton = Newton(Q, p, system, THETA, 0.0, REFINEMENT, np.inf)
-        try:
-            start = stp2(Q, p, RHO, LEAST_GAP) if self.start_at_gaps else algorithm_5(Q, p)
-        except NoStart as error:
-            return Answer("failed", None, iterations=0, details={"cause": str(error)})
+        start = stp2(Q, p, RHO, LEAST_GAP) if self.start_at_gaps else algorithm_5(Q, p)
         point = newton.at(start.lam, start.y)
-        told, least, stalled = TOLD * point.mu, np.inf, 0
         details: dict[str, Any] = {"start": {"mu": point.mu}}
+        told, least, stalled = TOLD * point.mu, np.inf, 0
         for k in range(MAX_ITERATIONS):
             ratio = compliance * point.lam / point.y
             undecided = int(((ratio > 0.1) & (ratio < 10)).sum())
-            if self.finish and point.mu <= told and undecided <= UNDECIDED * len(p):
-                sets = ContactSets(Q, p, ready.inverse)
-                answer = solve_from(ratio > 1, sets, tolerance, MAX_SETS)
-                details |= answer.details | {"mu": point.mu, "undecided": undecided}
-                return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             residual = float(abs(np.minimum(compliance * point.lam, point.y - point.s1)).max())
             stalled = 0 if residual < least else stalled + 1
             least = min(least, residual)
-            details |= {"mu": point.mu, "natural_residual_mm": residual}
-            if not self.finish and (residual <= tolerance or stalled == STALLED):
-                status: Status = "solved" if residual <= tolerance else "inaccurate"
-                details["factorisations"] = system.factorisations
-                return Answer(status, point.lam, iterations=k, details=details)
-            try:
-                point = mehrotra(newton, point)
-            except np.linalg.LinAlgError as error:
-                cause = f"Q + D is no longer positive definite: {error}"
-                return Answer("failed", None, iterations=k, details=details | {"cause": cause})
+            details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
+            done = residual <= tolerance or stalled == STALLED
+            if self.finish and (done or (point.mu <= told and undecided <= UNDECIDED * len(p))):
+                answer = solve_from(ratio > 1, ContactSets(Q, p, ready.inverse), tolerance, MAX_SETS)
+                details |= answer.details
+                return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
+            if done:
+                return self._ended(point, k, residual <= tolerance, details)
+            point = mehrotra(newton, point)
             if not np.isfinite(point.mu):
                 return Answer("failed", None, iterations=k, details=details | {"cause": "λ or y overflowed"})
-        return Answer("iteration_limit", point.lam, iterations=MAX_ITERATIONS, details=details)
+        return Answer("iteration_limit", point.lam, iterations=MAX_ITERATIONS, details=details | LIMIT)
+
+    def _ended(self, point: Point, iterations: int, solved: bool, details: dict[str, Any]) -> Answer:
+        if solved:
+            return Answer("solved", point.lam, iterations=iterations, details=details)
+        cause = f"rounding: optimal to {details['natural_residual_mm']:.1e} mm only"
+        return Answer("inaccurate", point.lam, iterations=iterations, details=details | {"cause": cause})

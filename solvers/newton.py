@@ -19,7 +19,7 @@ from problems.assembly import Matrix, Vector
 from problems.errors import InputError
 
 from .active_set import solve_from
-from .base import Answer, Form, Load, Problem, Solver
+from .base import Answer, Form, Load, Problem, Solver, failed
 from .block_pivoting import block_pivoting
 from .bordered_factor import Set
 from .contact_sets import ContactSets, product
@@ -59,16 +59,25 @@ class ActiveSetNewton(Solver):
         self.nested = nested
         self.max_sets = max_sets
 
-    def prepare(self, data: Problem) -> _Ready:
-        """Q⁻¹, and the cells."""
+    def prepare(self, data: Problem) -> _Ready | Answer:
+        """Q⁻¹, and the cells; where Q has no factor, the answer that says so."""
         assembly = data.assembly
         widths = WIDTHS if self.nested else ()
         cells = tuple(cells_of(assembly.contact_nodes, assembly.m, width) for width in widths)
-        return _Ready(data, inverse_with_factor(data.Q)[0], cells)
+        try:
+            return _Ready(data, inverse_with_factor(data.Q)[0], cells)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
 
-    def solve(self, ready: _Ready, load: Load, tolerance: float) -> Answer:
-        C, coarse = _first_guess(ready, load.p, tolerance)
-        answer = solve_from(C, ContactSets(ready.problem.Q, load.p, ready.inverse), tolerance, self.max_sets)
+    def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
+        try:
+            C, coarse = _first_guess(ready, load.p, tolerance)
+            sets = ContactSets(ready.problem.Q, load.p, ready.inverse)
+            answer = solve_from(C, sets, tolerance, self.max_sets)
+        except np.linalg.LinAlgError as error:
+            return failed(str(error))
         return replace(answer, inner_iterations=coarse)
 
 
