@@ -19,7 +19,7 @@ STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no
 
 #: heading, width, and what stands in it.
 COLUMNS = [
-    ("scene", -14, lambda row: row["scene"]),
+    ("scene", -23, lambda row: row["scene"]),
     ("solver", -14, lambda row: f"{row['solver']} {row['variant']}".strip()),
     ("form", -6, lambda row: row["form"]),
     ("tol", 6, lambda row: f"{row['tolerance']:.0e}"),

@@ -79,6 +79,8 @@ class GoldfarbIdnani(Solver):
         slacks = _primal_slacks(ready, load) if ready.factor is None else _dual_slacks(ready, load)
         limit = int(self.max_pivots * len(ready.G)) + 10
         result = goldfarb_idnani(ready.G, slacks, tolerance, limit)
+        if not np.isfinite(result.u).all():
+            return failed("rounding: the multipliers are no longer finite", result.pivots)
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is not None:
             lam = _on_support(ready, load, slacks(result.u)[0], result)

@@ -98,6 +98,10 @@ class _State:
         self.u_base = self.u.copy()
         return size
 
+    def slacks(self) -> Vector:
+        """s, of the multipliers as they are now."""
+        return self.base + self.G @ (self.u - self.u_base)
+
     def refine(self, slacks: Slacks) -> Vector:
         """Powell: s from the original data, and u_C so that s_C = 0; drops what is then negative in u."""
         while True:
@@ -114,7 +118,7 @@ class _State:
     def pivot_until_feasible(self, limit: Vector) -> None:
         """Add violated constraints, worst first, until s ≥ −limit."""
         while self.pivots < self.max_pivots:
-            s = self.base + self.G @ (self.u - self.u_base)
+            s = self.slacks()
             s[self.is_active] = 0.0
             violated = np.flatnonzero(s < -limit)
             if not violated.size:

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 from problems.assembly import Assembly, LoadCase, Prepared
 from solvers.base import Answer, Form, Load, Problem
 from solvers.gi import GoldfarbIdnani
-from solvers.goldfarb_idnani import goldfarb_idnani
+from solvers.goldfarb_idnani import _State, goldfarb_idnani
 from solvers.growing_factor import BLOCK, GrowingFactor
 
 
@@ -108,6 +108,40 @@ def test_the_limit_on_pivots_is_kept_and_said() -> None:
     result = goldfarb_idnani(G, lambda u: (-np.ones(50) + G @ u, np.ones(50)), 1e-12, 5)
     assert result.status == "iteration_limit"
     assert result.pivots == 5
+
+
+def full_state(G: np.ndarray) -> _State:
+    """Every constraint active, with the multipliers 1, 2, …"""
+    state = _State(G, 100)
+    for k in range(len(G)):
+        d = state.factor.solve_transposed(G[:k, k])
+        state.factor.append(d, float(np.sqrt(G[k, k] - d @ d)))
+        state.C.append(k)
+    state.is_active[:] = True
+    state.u[:] = np.arange(1.0, len(G) + 1)
+    return state
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_refinement_leaves_no_negative_multiplier_and_no_active_slack(seed: int) -> None:
+    """What becomes negative is dropped, and the others are made to fit what is left."""
+    G = definite(12, seed)
+    s0 = np.random.default_rng(seed).standard_normal(12)
+    state = full_state(G)
+    state.refine(lambda u: (s0 + G @ u, abs(s0)))
+    assert 0 < len(state.C) < 12
+    assert (state.u >= 0).all()
+    assert not state.u[~state.is_active].any()
+    np.testing.assert_allclose((s0 + G @ state.u)[state.C], 0.0, atol=1e-9)
+
+
+def test_the_rounding_of_a_large_matrix_does_not_weigh_on_refined_slacks() -> None:
+    """Here the terms of Gu are 1e13 times the slacks, as those of a part that hardly anything holds."""
+    state = full_state(np.eye(4) + 1e13)
+    state.refer_to(lambda u: (np.full(4, 0.25), np.ones(4)))
+    np.testing.assert_array_equal(state.slacks(), 0.25)
+    state.u[0] += 2.0**-50
+    np.testing.assert_allclose(state.slacks(), 0.25 + 1e13 * 2.0**-50, rtol=1e-12)
 
 
 def two_contacts_of_one_node(Q: np.ndarray, form: Form) -> Answer:
