@@ -77,10 +77,6 @@ class Sum:
         self.size += abs(term)
         self.terms += 1
 
-    def add_product(self, a: Vector, b: Vector) -> None:
-        for term in two_product(a, b):
-            self.add(term)
-
     def enclosed(self) -> Enclosed:
         value = self.hi + self.lo
         error = U * abs(value) + gamma(self.terms) ** 2 * self.size + self.error

@@ -103,6 +103,8 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             entry.pop("tolerances", None)
         if change.time_limit_s is not None:
             entry.pop("time_limit_s", None)
+        if change.repeats is not None:
+            entry.pop("repeats", None)
     changes = {
         "tolerances": list(change.tolerances),
         "repeats": change.repeats,
@@ -128,7 +130,8 @@ def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
 
 def expand(suite: Suite) -> list[Measurement]:
     """All measurements of a suite, by scene. Repeats are interleaved, each round shuffled with a seed
-    of its own, so that a drift of the machine does not fall on one solver.
+    of its own, so that a drift of the machine does not fall on one solver. What differs in the
+    tolerance alone keeps the suite's order, so that a loose one can tell that a tight one has no time.
 
     Raises InputError where nothing is left to measure or two files have the same scene name.
     """
@@ -147,17 +150,29 @@ def expand(suite: Suite) -> list[Measurement]:
         raise InputError(faults)
     plan: dict[str, Measurement] = {}
     for source, name in names.items():
-        entries = [entry for entry in suite.solver if _takes(entry, name, source)]
-        for repeat in range(suite.repeats):
-            once = [made for entry in entries for made in _of_entry(suite, entry, name, source, repeat)]
-            if suite.repeats > 1:
-                random.Random(f"{name} {repeat}").shuffle(once)
-            for measurement in once:
+        entries = [(e, e.repeats or suite.repeats) for e in suite.solver if _takes(e, name, source)]
+        rounds = max((repeats for _, repeats in entries), default=0)
+        for repeat in range(rounds):
+            due = [entry for entry, repeats in entries if repeat < repeats]
+            once = [made for entry in due for made in _of_entry(suite, entry, name, source, repeat)]
+            for measurement in _shuffled(once, f"{name} {repeat}") if rounds > 1 else once:
                 plan.setdefault(measurement.key, measurement)
     if not plan:
         restricted = {entry.name: entry.scenes for entry in suite.solver}
         raise InputError.one(suite.name, "scenes", suite.scenes, f"no solver is for these: {restricted}")
     return list(plan.values())
+
+
+def _shuffled(once: list[Measurement], seed: str) -> list[Measurement]:
+    """In random order, but those that differ in their tolerance alone among each other as they were."""
+
+    def kind(m: Measurement) -> tuple[str, str, str, int]:
+        return m.solver, m.form, m.variant, m.threads
+
+    kinds = [kind(m) for m in once]
+    random.Random(seed).shuffle(kinds)
+    queues = {each: iter([m for m in once if kind(m) == each]) for each in set(kinds)}
+    return [next(queues[each]) for each in kinds]
 
 
 def _of_entry(

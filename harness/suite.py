@@ -43,6 +43,7 @@ class SolverEntry(BaseModel):
     options: dict[str, Any] = {}
     tolerances: Annotated[list[PositiveFloat], Some] | None = None
     scenes: Annotated[list[str], Some] | None = None
+    repeats: PositiveInt | None = None
     gated: bool = True
     time_limit_s: PositiveFloat | None = None
 

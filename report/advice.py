@@ -58,7 +58,9 @@ def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list
 
 def _beaten(cells: pd.DataFrame, best: list[str]) -> list[str]:
     """Where another line is clearly faster than the one recommended."""
-    seconds = seconds_within(cells)
+    series = cells.loc[cells["label"].isin(best), "series"]
+    rivals = cells["label"].isin(best) | ~cells["series"].isin(series)  # not the same at other tolerances
+    seconds = seconds_within(cells[rivals])
     active = cells.drop_duplicates("scene").set_index("scene")["active"]
     recommended = seconds[best].min(axis=1)
     fastest = seconds.idxmin(axis=1)

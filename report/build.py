@@ -16,11 +16,28 @@ from . import style
 from .blocks import Block, Figure, Section, Table
 from .checks import warnings
 from .rows import Results, read
-from .sections import accuracy, breakdown, details, gap_map, machine, problems, summary, times
+from .sections import (
+    accuracy,
+    amortised,
+    asked_achieved,
+    breakdown,
+    details,
+    gap_map,
+    machine,
+    price_list,
+    problems,
+    profiles,
+    recommendation,
+    residual_error,
+    stability,
+    summary,
+    times,
+)
 from .sections.paper import claims, figures3_4, figures5_7, table1, table2, table3, table4
 
 SECTIONS: list[Callable[[Results], Section | None]] = [
     summary.section,
+    recommendation.section,
     claims.section,
     table1.section,
     table2.section,
@@ -31,6 +48,12 @@ SECTIONS: list[Callable[[Results], Section | None]] = [
     problems.section,
     times.section,
     accuracy.section,
+    price_list.section,
+    asked_achieved.section,
+    residual_error.section,
+    profiles.section,
+    amortised.section,
+    stability.section,
     breakdown.section,
     gap_map.section,
     details.section,

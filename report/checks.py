@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fnmatch import fnmatchcase
+from itertools import product
 from typing import Any
 
 from .numbers import counted, listed
@@ -38,15 +39,17 @@ def _unfinished(results: Results) -> list[str]:
 
 
 def planned_measurements(suite: dict[str, Any]) -> int:
-    """How many rows the expanded suite file asks for."""
-    total = 0
+    """How many rows the expanded suite file asks for; what two entries ask for counts once."""
+    planned = set()
     for solver in suite.get("solver", []):
         patterns = solver.get("scenes", ["*"])
         scenes = [s for s in suite.get("scenes", []) if any(fnmatchcase(s, glob) for glob in patterns)]
         tolerances = solver.get("tolerances", suite.get("tolerances", [None]))
-        once = len(scenes) * len(solver.get("forms", [None])) * len(tolerances)
-        total += once * len(suite.get("threads", [None])) * suite.get("repeats", 1)
-    return total
+        what = [(solver.get("name"), solver.get("variant", ""))]
+        repeats = range(solver.get("repeats", suite.get("repeats", 1)))
+        threads = suite.get("threads", [None])
+        planned |= {*product(what, scenes, solver.get("forms", [None]), tolerances, threads, repeats)}
+    return len(planned)
 
 
 def _versions(results: Results) -> list[str]:

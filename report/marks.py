@@ -17,11 +17,14 @@ BESIDE = 5.5  # points between marks that would fall on one another
 HOLLOW: dict[str, Any] = {"linestyle": "", "markersize": 6, "markerfacecolor": "none", "zorder": 4}
 
 
-def unfinished(axes: Axes, cells: pd.DataFrame, x: str, styles: dict[str, dict[str, Any]]) -> None:
+def unfinished(
+    axes: Axes, cells: pd.DataFrame, x: str, styles: dict[str, dict[str, Any]], *, inside: bool = False
+) -> None:
     """On a logarithmic axis of seconds: open triangles, in the colour of their series, at the time limit
     of runs that it stopped; crosses at the upper edge for runs without an answer for another reason.
 
-    `x`: the column of their places along the axis; marks of one place stand side by side.
+    `x`: the column of their places along the axis; marks of one place stand side by side. The limit is
+    named right of the axes, or `inside` at the left.
     """
     missed = cells[~cells["verdict"].isin(ANSWERED)]
     if missed.empty:
@@ -32,8 +35,9 @@ def unfinished(axes: Axes, cells: pd.DataFrame, x: str, styles: dict[str, dict[s
     for limit in late["time_limit_s"].unique():
         axes.axhline(limit, color="#AAAAAA", linewidth=0.8, zorder=0.5)
         axes.annotate(
-            f"limit {significant(limit, 2)} s", (1, limit), (3, 0), xycoords=("axes fraction", "data"),
-            textcoords="offset points", va="center", fontsize=7.5, color="#666666",
+            f"limit {significant(limit, 2)} s", (0 if inside else 1, limit), (3, 1.5 if inside else 0),
+            xycoords=("axes fraction", "data"), textcoords="offset points",
+            va="bottom" if inside else "center", fontsize=7.5, color="#666666",
         )  # fmt: skip
     low, high = axes.get_ylim()
     axes.set_ylim(low, high * (high / low) ** 0.08)

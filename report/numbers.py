@@ -65,6 +65,11 @@ def listed(words: list[str]) -> str:
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
+def span(least: str, most: str) -> str:
+    """'3 to 8', or '3' where both are the same."""
+    return least if least == most else f"{least} to {most}"
+
+
 def counted(number: int, word: str) -> str:
     """'1 scene', '2 scenes'."""
     return f"{number} {word}" if number == 1 else f"{number} {word}s"

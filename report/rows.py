@@ -69,19 +69,6 @@ class Results:
         """The cells of one size that were attempted (a form that a solver does not take is not)."""
         return self.cells[(self.cells["n"] == n) & (self.cells["status"] != "unsupported")]
 
-    @property
-    def tightest(self) -> pd.DataFrame:
-        """The cells that were run, at the tightest tolerance of each series: one line of a figure each."""
-        tried = self.cells[~self.cells["status"].isin(["unsupported", "not_run"])]
-        least = tried.groupby("series")["tolerance"].transform("min")
-        return tried[(tried["tolerance"] == least) | least.isna()]
-
-    def middle_scene(self, n: int) -> str | None:
-        """Of the scenes of a size, the one with the middle number of active contacts."""
-        cells = self.of_size(n)
-        scenes = cells.drop_duplicates("scene").sort_values(["active", "scene"])["scene"].tolist()
-        return scenes[len(scenes) // 2] if scenes else None
-
     def scene_arrays(self, scene: str) -> dict[str, NDArray[np.float64]] | None:
         """The arrays of a scene's file; empty where it is damaged, None without a file or contact nodes."""
         path = self.directory / "scenes" / (scene.replace("/", "_") + ".npz")
@@ -187,10 +174,12 @@ def cells_of(rows: pd.DataFrame) -> pd.DataFrame:
     """One line a scene and solver. Of its repeats: the worst verdict with its status, the largest error
     and memory, the median of each time over those that have it.
 
-    Adds `load_case_s` = setup + solve + form, what one load case costs; `once_s` = convert + prepare,
-    paid once an assembly; `total_s`, both; `repeats`; `label`, the name of the line; and `series`,
-    that name without the tolerance.
+    Adds `load_case_s` = setup + solve + form, what one load case costs, with its `least_s` and `most_s`
+    over the repeats; `once_s` = convert + prepare, paid once an assembly; `total_s`, both; `repeats`;
+    `label`, the name of the line; and `series`, that name without the tolerance.
     """
+    timed = rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()
+    rows = rows.assign(load_case_s=rows[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(timed))
     cell = rows.groupby(CELL, dropna=False, sort=False).ngroup()
     severity = rows["verdict"].map({verdict: i for i, verdict in enumerate(VERDICTS)}).fillna(len(VERDICTS))
     ranked = rows.assign(cell=cell, severity=severity).sort_values("severity", ascending=False, kind="stable")
@@ -201,7 +190,8 @@ def cells_of(rows: pd.DataFrame) -> pd.DataFrame:
     cells["repeats"] = repeats.size()
     cells["verdict"] = cells["verdict"].where(cells["verdict"].isin(VERDICTS), "no_answer")
     answered = cells["verdict"].isin(ANSWERED) & cells["solve_s"].notna()
-    cells["load_case_s"] = cells[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(answered)
+    for name, figure in (("load_case_s", "median"), ("least_s", "min"), ("most_s", "max")):
+        cells[name] = repeats["load_case_s"].agg(figure).where(answered)
     cells["once_s"] = cells[["convert_s", "prepare_s"]].sum(axis=1).where(answered)
     cells["total_s"] = cells["load_case_s"] + cells["once_s"]
     return named(cells)

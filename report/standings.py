@@ -66,6 +66,7 @@ def standings(results: Results) -> pd.DataFrame:
         outside = line[line["verdict"] == "outside"]
         record = {
             "label": label,
+            "series": line["series"].iloc[0],
             "solver": line["solver"].iloc[0],
             "form": line["form"].iloc[0],
             "scenes": len(line),
@@ -86,7 +87,8 @@ def standings(results: Results) -> pd.DataFrame:
     if table.empty:
         return table
     table["share"] = table["within"] / table["scenes"]
-    table = table.sort_values(["share", "within", "slower"], ascending=[False, False, True], kind="stable")
+    keys = {"share": False, "within": False, "slower": True, "no_answer": True, "worst_error_mm": True}
+    table = table.sort_values([*keys], ascending=[*keys.values()], kind="stable")
     return table.drop(columns=["share", "slower"]).reset_index(drop=True)
 
 

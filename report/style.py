@@ -1,15 +1,16 @@
 """One look for all figures, readable in greyscale and by colour-blind readers.
 
-A solver keeps its colour and marker in every figure of every report; solid lines and filled markers
-are the dual form, dashed lines and hollow markers the primal. Colours are those of Okabe and Ito
-(2008), without their yellow.
+A solver keeps its colour and marker in every figure of every report; filled markers on solid lines are
+the dual form, hollow ones on dashed lines the primal; variants differ in dashes, tint and
+the part of the marker that is filled. Colours are those of Okabe and Ito (2008), without their yellow.
 """
 
 from __future__ import annotations
 
+import math
 from contextlib import AbstractContextManager
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -27,6 +28,7 @@ SKY, ORANGE, BLACK, GREY = "#56B4E9", "#E69F00", "#000000", "#7F7F7F"
 
 WIDTH = 9.0  # inches; at 100 pixels an inch this is the width of a page of text on a screen
 DPI = 160
+COLUMNS = 4  # of a legend below a figure
 
 KNOWN = {
     "ipm": (BLUE, "o"),
@@ -42,8 +44,15 @@ KNOWN = {
 }
 #: For solvers not named above: each pair differs from theirs. Open triangles are kept for unfinished runs.
 SPARE = [(color, marker) for marker in "dvH8" for color in (BLACK, GREY, ORANGE, BLUE, VERMILLION, SKY)]
-#: Marker size and tint (0: the full colour, 1: white) of a solver's first, second, … variant.
-VARIANTS = ((6.5, 0.0), (5.0, 0.45), (8.0, 0.2), (4.0, 0.6), (9.0, 0.35))
+#: Marker size, tint (0: the full colour, 1: white), filled part of the marker and dashes of a solver's
+#: first, second, … variant: the dual form's and the primal's.
+VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "right"], Any, Any], ...] = (
+    (6.5, 0.0, "full", "-", (0, (4, 2))),
+    (6.5, 0.3, "bottom", (0, (1, 1.2)), (0, (2, 1, 1, 1))),
+    (7.5, 0.0, "left", (0, (7, 1.5, 1, 1.5)), (0, (6, 2, 1, 2, 1, 2))),
+    (5.5, 0.45, "top", (0, (3, 1, 1, 1, 1, 1)), (0, (1, 3))),
+    (8.5, 0.3, "right", (0, (10, 2)), (0, (8, 4))),
+)
 
 RC: Any = {
     "font.size": 9.0,
@@ -79,6 +88,13 @@ def figure(height: float) -> Figure:
     return Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.07))
 
 
+def figure_above(height: float, handles: list[Line2D]) -> Figure:
+    """A figure of that height with its legend below it."""
+    drawing = figure(height + 0.2 * math.ceil(len(handles) / COLUMNS))
+    drawing.legend(handles=handles, loc="outside lower center", ncols=COLUMNS, handlelength=3.2)
+    return drawing
+
+
 def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Keyword arguments of `Axes.plot` for each series of some cells: filled markers on solid lines for
     the dual form, hollow ones on dashed lines for the primal.
@@ -89,7 +105,7 @@ def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
     for (solver, form), lines in cells.groupby(["solver", "form"]):
         full, marker = looks[solver]
         for i, series in enumerate(sorted(lines["series"].unique())):
-            size, tint = VARIANTS[i % len(VARIANTS)]
+            size, tint, filled, solid, dashed = VARIANTS[i % len(VARIANTS)]
             red, green, blue = (c + tint * (1 - c) for c in to_rgb(full))
             color = to_hex((red, green, blue))
             styles[series] = {
@@ -99,7 +115,9 @@ def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
                 "markeredgecolor": color,
                 "markerfacecolor": color if form == "dual" else "white",
                 "markeredgewidth": 1.3,
-                "linestyle": "-" if form == "dual" else (0, (4, 2)),
+                "fillstyle": filled,
+                "markerfacecoloralt": "white",
+                "linestyle": solid if form == "dual" else dashed,
                 "linewidth": 1.6,
             }
     return styles

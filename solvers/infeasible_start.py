@@ -9,10 +9,10 @@ w = λ, the multipliers are the gaps y, and the residual is s1 = y − (Qλ − 
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg as sla
 
 from problems.assembly import Matrix, Vector
 
+from .newton_system import Direct
 from .start import Start
 
 
@@ -46,11 +46,8 @@ def mehrotra_start(Q: Matrix, p: Vector) -> Start:
     """
     y_bar = np.full(len(p), float(abs(p).max()) or 1.0)
     lam_bar = y_bar * len(p) / float(np.trace(Q))
-    # The affine step of Algorithm 2 with σ = 0: (Q + D) Δλ = −(Qλ̄ − p), D = d I, Δy = −ȳ − dΔλ.
-    d = y_bar[0] / lam_bar[0]
-    H = np.array(Q, order="F")
-    H[np.diag_indices_from(H)] += d
-    factor = sla.cho_factor(H, overwrite_a=True, check_finite=False)
-    dlam = sla.cho_solve(factor, p - Q @ lam_bar, check_finite=False)
-    dy = -y_bar - d * dlam
+    # The affine step of Algorithm 2 with σ = 0: (Q + D) Δλ = −(Qλ̄ − p), D = ȳ/λ̄, Δy = −ȳ − dΔλ.
+    D = y_bar / lam_bar
+    dlam = Direct(Q).solve(D, p - Q @ lam_bar, tolerance=0.0, limit=0).v
+    dy = -y_bar - D * dlam
     return Start(np.maximum(lam_bar, abs(lam_bar + dlam)), np.maximum(y_bar, abs(y_bar + dy)))

@@ -62,16 +62,14 @@ class Pcg:
     def __init__(self, V: Preconditioner) -> None:
         self.V = V
 
+        self.begin()
+
     def begin(self) -> None:
         """A new load case."""
-        self.V.factorisations = 0
-
-    @property
-    def factorisations(self) -> int:
-        return self.V.factorisations
+        self.factorisations = 0
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
-        self.V.update(D)
+        self.factorisations += self.V.update(D)
         limit = min(limit, LIMIT * len(b))
         cg = conjugate_gradients(self.V.multiply, self.V.to_transformed(b), tolerance, limit)
         return Solved(self.V.from_transformed(cg.z), cg.iterations, cg.converged)
@@ -90,15 +88,14 @@ class OpenLast(Pcg):
         super().__init__(self.first)
 
     def begin(self) -> None:
-        self.V = self.first
         super().begin()
+        self.V = self.first
         self.late = False
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
         if self.late:
-            made = self.V.factorisations
             self.V = CholeskyPlusRoot(self.Q, np.argsort(D, kind="stable"))
-            self.V.factorisations = made + 1
+            self.factorisations += 1
         solved = super().solve(D, b, tolerance, limit)
         self.late = solved.iterations > REORDER
         return solved

@@ -16,13 +16,11 @@ from problems.assembly import Matrix, Vector
 
 
 class Preconditioner(ABC):
-    """V for one D at a time. `factorisations` counts those made after the data preparation."""
-
-    factorisations = 0
+    """V for one D at a time."""
 
     @abstractmethod
-    def update(self, D: Vector) -> None:
-        """Take a new D ≥ 0, (m,)."""
+    def update(self, D: Vector) -> int:
+        """Take a new D ≥ 0, (m,); returns how many factorisations that took."""
 
     @abstractmethod
     def multiply(self, v: Vector) -> Vector:
@@ -44,8 +42,9 @@ class Identity(Preconditioner):
         self.Q = np.asfortranarray(Q)
         self.D = np.zeros(len(Q))
 
-    def update(self, D: Vector) -> None:
+    def update(self, D: Vector) -> int:
         self.D = D
+        return 0
 
     def multiply(self, v: Vector) -> Vector:
         return blas.dsymv(1.0, self.Q, v) + self.D * v
@@ -64,8 +63,9 @@ class CholeskyFactor(Preconditioner):
         self.U = np.asfortranarray(sla.cholesky(Q, check_finite=False))
         self.D = np.zeros(len(Q))
 
-    def update(self, D: Vector) -> None:
+    def update(self, D: Vector) -> int:
         self.D = D
+        return 0
 
     def multiply(self, v: Vector) -> Vector:
         return v + self.to_transformed(self.D * self.from_transformed(v))
@@ -92,18 +92,15 @@ class CholeskyPlusRoot(Preconditioner):
 
     def __init__(self, Q: Matrix, order: NDArray[np.intp] | None = None) -> None:
         self.order = order
-        self.factor(Q)
-
-    def factor(self, Q: Matrix) -> None:
-        """Factor Q in the present order."""
-        permuted = Q if self.order is None else Q[np.ix_(self.order, self.order)]
+        permuted = Q if order is None else Q[np.ix_(order, order)]
         self.V = np.asfortranarray(sla.cholesky(permuted, check_finite=False))
         self.diagonal = np.diag(self.V).copy()
         self.S = np.zeros(len(Q))
 
-    def update(self, D: Vector) -> None:
+    def update(self, D: Vector) -> int:
         self.S = np.sqrt(D if self.order is None else D[self.order])
         np.fill_diagonal(self.V, self.diagonal + self.S)
+        return 0
 
     def multiply(self, v: Vector) -> Vector:
         """V⁻ᵀHV⁻¹ v by two triangular solves and no product with Q.
@@ -138,14 +135,14 @@ class Splitting(Preconditioner):
         self.Q = np.asfortranarray(Q)
         self.diagonal = np.diag(Q).copy()
 
-    def update(self, D: Vector) -> None:
+    def update(self, D: Vector) -> int:
         self.D = D
         self.I = np.flatnonzero(self.diagonal >= D)
         self.root = np.sqrt(D + self.diagonal)
         block = self.Q[np.ix_(self.I, self.I)]
         block[np.diag_indices_from(block)] += D[self.I]
         self.U = np.asfortranarray(sla.cholesky(block, overwrite_a=True, check_finite=False))
-        self.factorisations += 1
+        return 1
 
     def multiply(self, v: Vector) -> Vector:
         t = self.from_transformed(v)

@@ -232,6 +232,11 @@ def test_a_run_without_any_answer_does_not_pass(folder: Path) -> None:
     assert said_by(gate, folder / "failed")[0] == 3
 
 
+def heed_interrupts() -> None:
+    """As in a terminal: a shell starts what it puts in the background with SIGINT ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize(("ending", "code"), [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)])
 def test_an_ended_run_keeps_its_rows_and_goes_on(folder: Path, ending: signal.Signals, code: int) -> None:
     here = folder / ending.name
@@ -248,7 +253,7 @@ def test_an_ended_run_keeps_its_rows_and_goes_on(folder: Path, ending: signal.Si
     (here / "faulty.py").write_text(tiny.FAULTY)
     rows = here / "out" / records.MEASUREMENTS
     command = [sys.executable, "-m", "harness", "run", str(suite), "--out", str(here / "out")]
-    going = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE)
+    going = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, preexec_fn=heed_interrupts)
     workers = wait_for(lambda: rows.exists() and rows.read_bytes() and psutil.Process(going.pid).children())
     second = harness("run", suite, "--out", here / "out")
     assert second.exit_code == 2

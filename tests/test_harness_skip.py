@@ -43,10 +43,19 @@ def test_too_slow_on_every_smaller_scene_is_not_run(large):
     assert out_of_time_before(large, 6112, rows) == "4386/0107, 4386/1471"
 
 
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-3])
+def test_out_of_time_at_a_looser_tolerance_is_not_run(large, tolerance):
+    rows = [row("6112/0600", 6112, limit=40.0, tolerance=tolerance)]
+    assert out_of_time_before(large, 6112, rows) == f"6112/0600 at {tolerance:g}"
+
+
 @pytest.mark.parametrize(
     "rows",
     [
         [],
+        [row("6112/0600", 6112, limit=40.0, tolerance=1e-10)],  # a tighter one says nothing
+        [row("6112/0600", 6112, limit=39.0, tolerance=1e-3)],  # it has more time now
+        [row("6112/0600", 6112, "solved", limit=40.0, tolerance=1e-3)],
         [row("4386/0107", 4386), row("4386/1471", 4386, "solved")],  # in time on one of them
         [row("6112/2300", 6112)],  # another scene of the same size says nothing
         [row("11308/0220", 11308)],  # nor does a larger one

@@ -10,7 +10,7 @@ import tiny
 
 from harness.plan import Measurement, Overrides, expand, overridden
 from harness.run import refuse_what_cannot_fit
-from harness.suite import Suite, read_suite, suite_names, to_toml, validated
+from harness.suite import Suite, checked, read_suite, suite_names, to_toml, validated
 from problems.errors import InputError
 
 TWO = """
@@ -57,6 +57,28 @@ def test_repeats_are_interleaved_and_shuffled_the_same_way_each_time(tmp_path: P
     assert len({frozenset(one) for one in rounds}) == 1
 
 
+def test_a_shuffled_round_keeps_the_order_of_the_tolerances(tmp_path: Path) -> None:
+    tolerances = [1e-2, 1e-5, 1e-3, 1e-8]
+    solvers = [{"name": name, "forms": ["dual"], "tolerances": tolerances} for name in ("ipm", "gi", "piqp")]
+    data = {"scenes": ["4386/0107"], "repeats": 3, "solver": solvers}
+    plan = expand(checked(data, tmp_path / "suite.toml"))
+    for repeat in range(3):
+        names = [m.solver for m in plan if m.repeat == repeat]
+        assert names != sorted(names, key=["ipm", "gi", "piqp"].index)  # it is shuffled
+        for name in set(names):
+            assert [m.tolerance for m in plan if (m.solver, m.repeat) == (name, repeat)] == tolerances
+
+
+def test_an_entry_may_have_repeats_of_its_own(tmp_path: Path) -> None:
+    own = {"name": "ipm", "forms": ["dual"], "tolerances": [1e-6], "repeats": 3}
+    rest = {"name": "ipm", "forms": ["dual"], "tolerances": [1e-2, 1e-6]}
+    data = {"scenes": ["4386/0107"], "solver": [rest, own]}
+    plan = expand(checked(data, tmp_path / "suite.toml"))
+    assert sorted((m.tolerance, m.repeat) for m in plan) == [(1e-6, 0), (1e-6, 1), (1e-6, 2), (1e-2, 0)]
+    once = overridden(checked(data, tmp_path / "suite.toml"), Overrides(repeats=1))
+    assert {m.repeat for m in expand(once)} == {0}
+
+
 def test_what_is_written_beside_the_rows_reads_back_the_same(tmp_path: Path) -> None:
     suite = read_suite(str(tiny.write_suite(tmp_path, TWO, title='a "quoted" title — ü')))
     assert validated(tomllib.loads(to_toml(suite)), tmp_path / "suite.toml") == suite
@@ -94,7 +116,7 @@ def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> N
 
 
 def test_unknown_suite_names_the_known_ones() -> None:
-    with pytest.raises(InputError, match=r"did you mean default\? allowed: default, gate"):
+    with pytest.raises(InputError, match=r"did you mean default\? allowed: accuracy, default, gate"):
         read_suite("defualt")
 
 

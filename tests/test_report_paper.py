@@ -132,10 +132,16 @@ def test_table_1_counts_and_late_iterations(tmp_path: Path) -> None:
 def test_table_2_counts_the_loads(tmp_path: Path) -> None:
     stp1, stp2 = ipm("start", "stp1"), ipm("start", "stp2")
     rows = changed(paper_rows(), lambda r: stp1(r) and r["active"] in (52, 107), iterations=19)
+    for row in rows:
+        if stp1(row) and row["active"] in (52, 107):
+            row["details"]["start"]["mu"] = 400.0 if row["active"] == 52 else 200.0
     rows = changed(rows, lambda r: stp2(r) and r["active"] == 418, **late(20.0))
     text = "\n".join(_shown(table2.section(results(tmp_path, rows))))
     assert "**7 of 9 loads** here (1 without an answer of all three), and on 8 of 10 in the printed" in text
     assert "It needs more at 52, 107 active" in text
+    assert "Against STP2 alone it needs no more on 9 of 9" in text
+    assert "STP1 alone it needs no more on 8 of 10; on the others it needs 1 more" in text
+    assert "from a gap μ₀ 2.5 to 5.0 times as large" in text
     line = next(line for line in text.splitlines() if re.match(r"\| +418 ", line))
     words = [w.strip() for w in re.split(r"(?<!\\)\|", line)[1:-1]]
     assert words[:3] == ["418", "418", "22 \\| 24"]
@@ -204,7 +210,7 @@ def test_a_crossing_beside_a_stopped_run_is_an_interval(tmp_path: Path) -> None:
     # stopped before the other's time: nothing follows
     early = changed(rows, lambda r: gi("dual")(r) and r["active"] < 300, **late(1.5))
     pair = compared(cells_of_paper(results(tmp_path / "early", early)), 4386, "GI dual", "IPM")
-    assert str(pair) == "none: GI dual is faster from 40 to 80 % (1 scenes could not be compared)"
+    assert str(pair) == "none: GI dual is faster from 40 to 80 % (1 scene could not be compared)"
 
 
 def test_worst_cases(tmp_path: Path) -> None:

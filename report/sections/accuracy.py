@@ -1,100 +1,94 @@
-"""Time against the accuracy that was achieved: a work–precision diagram."""
+"""Time against the accuracy that was achieved: a work–precision diagram a size."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from .. import style
-from ..blocks import Figure, Section
-from ..labels import in_order
-from ..rows import Results
+from .. import marks, style
+from ..blocks import Figure, Section, Text
+from ..precision import ENOUGH, WRONG, in_view, looks, pareto, with_errors
+from ..rows import ANSWERED, Results
+from ..shown import drawn, left_out, scenes, sizes
 
-PANEL = 2.9  # inches
-EXACT = 1e-16  # mm: where an error of zero is drawn
-APART = 0.06  # of a panel's height: the least distance between two names in it
+STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, "solid_joinstyle": "miter"}
 
 
 def section(results: Results) -> Section | None:
-    scenes = [scene for n in results.sizes if (scene := results.middle_scene(n))]
-    cells = results.cells[results.cells["scene"].isin(scenes)]
-    points = cells.dropna(subset=["load_case_s", "displacement_error_mm"])
-    if points.empty:
+    cells = in_view(with_errors(drawn(results)))
+    figures = [figure for n in sizes(results) if (figure := _figure(results, cells, n))]
+    if not figures:
         return None
-    points = points.assign(error=points["displacement_error_mm"].clip(lower=EXACT))
-    scenes = [scene for scene in scenes if scene in set(points["scene"])]
-    styles = style.line_styles(results.cells)
-    drawing = style.figure(PANEL * len(scenes) + 0.3)
-    panels = drawing.subplots(len(scenes), 1, sharex=True, squeeze=False)[:, 0]
-    limit = points["limit_mm"].max()
-    limit = limit if limit > 0 else 1e-7
-    panels[0].set(xscale="log", xlim=(points["error"].min() / 300, max(points["error"].max(), limit) * 6))
-    panels[0].xaxis.set_major_locator(LogLocator(numticks=12))
-    panels[0].xaxis.set_minor_locator(NullLocator())
-    for axes, scene in zip(panels, scenes, strict=True):
-        _panel(axes, points[points["scene"] == scene], limit, styles)
-    axes.set_xlabel("displacement error, mm (max norm)")
-    handles = style.legend_entries({series: styles[series] for series in in_order(points, "series")})
-    drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
-    caption = (
-        "*Seconds a load case against the displacement error that was achieved*, both of the same run, on "
-        "the middle scene of each size. Down and left is better; right of the dotted line at "
-        f"{results.limit} is not accurate enough. The grey staircase is the Pareto front: its corners "
-        "are beaten by nothing that is both faster and more accurate. Shaded: errors below the "
-        "bound on the reference's own. Points of one solver at several tolerances are joined. Runs without "
-        "an answer have no place here."
+    words = (
+        "Seconds a load case against the displacement error that was achieved, both of the same run; down "
+        f"and left is better, and right of the dotted line at {results.limit} is not accurate enough. The "
+        "grey staircase is the Pareto front: its corners are beaten by nothing that is both faster and more "
+        f"accurate. Runs of one solver at {ENOUGH} tolerances or more are joined, the loosest first; bars "
+        "span the repeats. Open triangles stand at the time limit of runs that did not finish, crosses at "
+        "the upper edge for runs that gave no answer for another reason; both above the smallest error that "
+        "the solver did reach, at the right edge where it reached none. Errors smaller than the bound on the "
+        f"reference's own are drawn at that bound, those above {WRONG:g} mm there."
     )
-    return Section("Time against achieved accuracy", [Figure("time-accuracy", caption, drawing)])
+    return Section("Time against achieved accuracy", [Text(words + left_out(results)), *figures])
 
 
-def _panel(axes: Axes, points: pd.DataFrame, limit: float, styles: dict[str, dict[str, Any]]) -> None:
+def _figure(results: Results, cells: pd.DataFrame, n: int) -> Figure | None:
+    """The scenes of a size with the fewest and with the most active contacts, side by side."""
+    of_size = [s for s in scenes(results, n) if cells.loc[cells["scene"] == s, "error"].notna().any()]
+    ends = list(dict.fromkeys(of_size[:1] + of_size[-1:]))
+    if not ends:
+        return None
+    cells = cells[cells["scene"].isin(ends)]
+    styles = looks(results, cells)
+    handles = [*style.legend_entries(styles), *marks.entries(cells)]
+    drawing = style.figure_above(3.4, handles)
+    panels = drawing.subplots(1, len(ends), sharex=True, sharey=True, squeeze=False)[0]
+    limit = cells["limit_mm"].max()
+    limit = limit if limit > 0 else 1e-7
+    low, high = min(cells["error"].min(), limit), max(cells["error"].max(), limit)
+    panels[0].set(xscale="log", yscale="log", xlim=(low / 4, high * 6), ylabel="time a load case, s")
+    panels[0].xaxis.set_major_locator(LogLocator(numticks=9))
+    panels[0].xaxis.set_minor_locator(NullLocator())
+    for axes, scene in zip(panels, ends, strict=True):
+        here = cells[cells["scene"] == scene]
+        _curves(axes, here.dropna(subset=["error"]), styles)
+        axes.axvline(limit, color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
+        active = here["active"].iloc[0]
+        axes.set_title(f"n = {n}" + (f", {active:.0f} active" if active == active else ""))
+        axes.set_xlabel("displacement error, mm (max norm)")
+    for axes, scene in zip(panels, ends, strict=True):
+        _unfinished(axes, cells[cells["scene"] == scene], styles)
+    for axes, scene in zip(panels, ends, strict=True):
+        staircase(axes, pareto(cells[cells["scene"] == scene].dropna(subset=["error"])), "load_case_s")
+    style.plain_log(panels[0].yaxis)
+    return Figure(f"time-accuracy-{n}", f"*Time against achieved accuracy, n = {n}.*", drawing)
+
+
+def _curves(axes: Axes, points: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
     for series, line in points.groupby("series"):
+        look = styles[str(series)]
         ordered = line.sort_values("tolerance", ascending=False)
-        axes.plot(ordered["error"], ordered["load_case_s"], **styles[str(series)])
-    axes.set(yscale="log", ylabel="time a load case, s")
-    low, high = points["load_case_s"].min(), points["load_case_s"].max()
-    axes.set_ylim(low / 1.8, high * 1.5)
-    left, right = axes.get_xlim()
-    front = pareto(points)
-    errors, seconds = front["error"].tolist(), front["load_case_s"].tolist()
-    staircase: dict[str, Any] = {
-        "color": "#CFCFCF",
-        "linewidth": 3.5,
-        "zorder": 1,
-        "solid_joinstyle": "miter",
-    }
-    axes.step([errors[0], *errors, right], [high * 2, *seconds, seconds[-1]], where="post", **staircase)
-    for label, error, time in _named(front[front["error"] <= limit], math.log(high / low)):
-        beside: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "top", "fontsize": 8}
-        axes.annotate(label, (error, time), (-6, -5), **beside)
-    axes.axvline(limit, color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
-    bound = points["reference_bound_mm"].max()
-    if bound > left:
-        axes.axvspan(left, bound, color="#F0F0F0", zorder=0)
-    style.plain_log(axes.yaxis)
-    n, active = points["n"].iloc[0], points["active"].iloc[0]
-    axes.set_title(f"n = {n:.0f}" + (f", {active:.0f} active" if active == active else ""))
+        axes.plot(ordered["error"], ordered["load_case_s"], **look)
+        several = line[line["most_s"] > line["least_s"]]
+        axes.vlines(several["error"], several["least_s"], several["most_s"], color=look["color"], linewidth=1)
 
 
-def pareto(points: pd.DataFrame) -> pd.DataFrame:
-    """The points that no other beats in both `error` and `load_case_s`, by growing error."""
-    ordered = points.sort_values(["error", "load_case_s"])
-    return ordered[ordered["load_case_s"] < ordered["load_case_s"].cummin().shift(fill_value=float("inf"))]
+def _unfinished(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
+    missed = cells[~cells["verdict"].isin(ANSWERED)].drop_duplicates(["series", "status"])
+    reached = missed["series"].map(cells.groupby("series")["error"].min())
+    at = reached.fillna(axes.get_xlim()[1] / 2)
+    marks.unfinished(axes, missed.assign(at=at), "at", styles, inside=True)
 
 
-def _named(front: pd.DataFrame, height: float) -> Iterator[tuple[str, float, float]]:
-    """Label and place of the corners to name: from the fastest on, one of each series, none close
-    above the last."""
-    series: set[str] = set()
-    last = -math.inf
-    columns = ("series", "label", "error", "load_case_s")
-    for name, label, error, seconds in front.sort_values("load_case_s")[[*columns]].to_numpy().tolist():
-        if name not in series and math.log(seconds) - last > height * APART:
-            yield label, error, seconds
-            series.add(name)
-            last = math.log(seconds)
+def staircase(axes: Axes, front: pd.DataFrame, time: str) -> None:
+    """A Pareto front as a staircase from the upper to the right edge of axes that are otherwise done."""
+    if front.empty:
+        return
+    errors, seconds = front["error"].tolist(), front[time].tolist()
+    (_, right), (_, top) = axes.get_xlim(), axes.get_ylim()
+    across, up = np.array([errors[0], *errors, right]), np.array([top, *seconds, seconds[-1]])
+    axes.plot(across, up, drawstyle="steps-post", scalex=False, scaley=False, **STAIRCASE)

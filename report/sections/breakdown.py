@@ -11,8 +11,9 @@ from matplotlib.patches import Patch
 
 from .. import style
 from ..blocks import Figure, Section
-from ..numbers import significant
+from ..numbers import significant, whole
 from ..rows import TIMES, Results
+from ..shown import best, left_out, middle_scenes, of_tolerances
 
 ROW = 0.2  # inches
 STEPS = {
@@ -25,9 +26,10 @@ STEPS = {
 
 
 def section(results: Results) -> Section | None:
-    cells = results.tightest
-    scenes = [scene for n in results.sizes if (scene := results.middle_scene(n))]
-    shown = [lines for scene in scenes if len(lines := _answered(cells[cells["scene"] == scene]))]
+    cells = best(results)
+    shown = [
+        lines for scene in middle_scenes(results) if len(lines := _answered(cells[cells["scene"] == scene]))
+    ]
     if not shown:
         return None
     heights = [0.3 + ROW * len(lines) for lines in shown]
@@ -40,8 +42,11 @@ def section(results: Results) -> Section | None:
     drawing.legend(handles=handles, loc="outside lower center", ncols=3)
     caption = (
         "*Where the time goes*, on the middle scene of each size, the fastest at the top; at the right, all "
-        "steps together in seconds. Runs without an answer are left out. What all solvers share, the "
+        "steps together in seconds, and iterations × milliseconds of solve an iteration (of an active-set "
+        "method, changes of its set). Runs without an answer are left out. What all solvers share, the "
         "Cholesky factor of K and Q, was built before and is not in it."
+        + of_tolerances(results)
+        + left_out(results)
     )
     return Section("Where the time goes", [Figure("time-steps", caption, drawing)])
 
@@ -59,8 +64,11 @@ def _panel(axes: Axes, lines: pd.DataFrame) -> None:
         look: dict[str, Any] = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.6}
         axes.barh(places, share, left=left, height=0.72, **look)
         left += share
-    for place, seconds in zip(places, lines["total_s"], strict=True):
-        text = f"{significant(seconds)} s"
+    for place, line in enumerate(lines.to_dict("records")):
+        text = f"{significant(line['total_s'])} s"
+        if line["iterations"] > 0:
+            each = significant(1000 * line["solve_s"] / line["iterations"])
+            text += f",  {whole(line['iterations'])} × {each} ms"
         axes.annotate(text, (100, place), (6, 0), textcoords="offset points", va="center", fontsize=8.5)
     axes.set(xlim=(0, 100), ylim=(len(lines) - 0.5, -0.5))
     axes.set_yticks(places, lines["series"])

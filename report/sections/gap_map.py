@@ -11,11 +11,12 @@ from .. import style
 from ..blocks import Block, Figure, Section, Text
 from ..maps import Array, draw, grid_of, outline
 from ..rows import Results
+from ..shown import middle_scene
 
 
 def section(results: Results) -> Section | None:
     for n in reversed(results.sizes):
-        scene = results.middle_scene(n)
+        scene = middle_scene(results, n)
         arrays = results.scene_arrays(scene) if scene else None
         if scene and arrays is not None:
             unread = Text(f"The file of scene {scene} could not be read.")

@@ -8,8 +8,10 @@ from typing import Any
 from ..advice import advice
 from ..blocks import Block, Column, Figure, Section, Table, Text, number, word
 from ..numbers import counted, listed, power, whole
+from ..precision import ENOUGH
 from ..rows import Results
 from ..scoreboard import scoreboard
+from ..shown import left_out, sidelined
 from ..standings import TIE, compare, standings
 
 
@@ -17,7 +19,10 @@ def section(results: Results) -> Section | None:
     table = standings(results)
     if table.empty:
         return None
+    several = table.groupby("series")["label"].transform("size") >= ENOUGH
+    table = table[~(several & table["series"].duplicated())]
     limit = results.limit
+    rare = sidelined(results)["label"]
     comparisons = [compare(results, n) for n in results.sizes]
     columns = [
         word("solver (form)", "label"),
@@ -41,6 +46,8 @@ def section(results: Results) -> Section | None:
         "within the limit on more than half of a size's scenes, the others show –. What failed is counted, "
         "never averaged in."
     )
+    if several.any():
+        means += f" Of {ENOUGH} tolerances or more of a solver, the best; the tables of the scenes have all."
     blocks: list[Block] = [
         Text("### Which solver to use"),
         Text("\n".join(words for n in results.sizes if (words := advice(results, n)))),
@@ -50,9 +57,9 @@ def section(results: Results) -> Section | None:
             f"*Every solver on every scene, the best at the top.* Blue: within {limit}, seconds a load case; "
             "the darker, the nearer to the fastest of the scene (palest: 100 times as long). Hatched: "
             "outside the limit, with its error in mm. Grey: no answer, and why (not run: out of time "
-            "already on every scene of the next smaller size). Empty: not in the suite. At the right, the "
-            "number of scenes within the limit.",
-            scoreboard(results.cells, table),
+            "already at a looser tolerance, or on every scene of the next smaller size). Empty: not asked "
+            "for. At the right, the number of scenes within the limit." + left_out(results),
+            scoreboard(results.cells, table[~table["label"].isin(rare)]),
         ),
         Text("### Answers within the limit, then time"),
         Table("summary", means, table, columns),

@@ -7,31 +7,38 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from .. import marks, style
 from ..blocks import Figure, Section
-from ..labels import in_order
 from ..rows import ANSWERED, Results
+from ..shown import best, left_out, of_tolerances, styles_of
 
 PANEL = 3.0  # inches
-OUTSIDE: dict[str, Any] = {"marker": "x", "color": "black", "markersize": 6.5, "linestyle": "", "zorder": 3}
+OUTSIDE: dict[str, Any] = {
+    "marker": "x",
+    "markersize": 8,
+    "markeredgewidth": 1.8,
+    "linestyle": "",
+    "zorder": 5,
+    "path_effects": [withStroke(linewidth=4, foreground="white")],
+}
 #: What the marks of `panel` mean, for captions.
 MARKS = (
-    "Crossed out: answered, but not within {limit}. Open triangles, in the solver's colour, stand at the "
-    "time limit of runs that did not finish; crosses at the upper edge, for runs that gave no answer for "
-    "another reason."
+    "Crosses on a line, in its colour: answered, but not within {limit}. Open triangles stand at the time "
+    "limit of runs that did not finish; crosses at the upper edge, for runs that gave no answer for another "
+    "reason."
 )
 
 
 def section(results: Results) -> Section | None:
-    cells = results.tightest
+    cells = best(results)
     cells = cells[cells.groupby("n")["active"].transform("nunique") > 1]
     if cells["load_case_s"].notna().sum() == 0:
         return None
     sizes = sorted(cells["n"].unique())
-    looks = style.line_styles(results.cells)
-    styles = {series: looks[series] for series in in_order(cells, "series")}
+    styles = styles_of(results, cells)
     drawing = style.figure(PANEL * len(sizes) + 0.3)
     for axes, n in zip(drawing.subplots(len(sizes), 1, squeeze=False)[:, 0], sizes, strict=True):
         of_size = cells[cells["n"] == n]
@@ -42,15 +49,10 @@ def section(results: Results) -> Section | None:
     axes.set_xlabel("active contacts")
     handles = [*style.legend_entries(styles), *entries(cells)]
     drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
-    several = (
-        " Of several tolerances, the tightest."
-        if results.cells["series"].nunique() < results.cells["label"].nunique()
-        else ""
-    )
     caption = (
         "*Seconds a load case (set-up + solve + the dual form's own cost) against the active contacts*, "
-        f"below in number, above in % of m.{several} Solid and filled: dual form; dashed and hollow: primal. "
-        + MARKS.format(limit=results.limit)
+        f"below in number, above in % of m.{of_tolerances(results)} Solid and filled: dual form; dashed "
+        "and hollow: primal. " + MARKS.format(limit=results.limit) + left_out(results)
     )
     return Section("Time against active contacts", [Figure("time-active", caption, drawing)])
 
@@ -61,7 +63,7 @@ def panel(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) ->
         line = cells[(cells["series"] == series) & cells["load_case_s"].notna()].sort_values("active")
         axes.plot(line["active"], line["load_case_s"], **look)
         outside = line[line["verdict"] != "within"]
-        axes.plot(outside["active"], outside["load_case_s"], **OUTSIDE)
+        axes.plot(outside["active"], outside["load_case_s"], color=look["color"], **OUTSIDE)
     axes.set_yscale("log")
     axes.margins(x=0.07, y=0.08)
     marks.unfinished(axes, cells, "active", styles)
@@ -73,5 +75,5 @@ def panel(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) ->
 
 def entries(cells: pd.DataFrame) -> list[Line2D]:
     """Legend entries for those of the panel's marks that occur."""
-    outside = [Line2D([], [], label="not within the limit", **OUTSIDE)]
+    outside = [Line2D([], [], label="not within the limit", color=style.GREY, **OUTSIDE)]
     return [*(outside if cells["verdict"].isin(ANSWERED[1:]).any() else []), *marks.entries(cells)]

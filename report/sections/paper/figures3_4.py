@@ -14,7 +14,7 @@ from ...rows import Results
 from .selection import SCALING, is_paper
 
 PROBLEMS = (1, 3)  # those of Figure 3
-SHARE = 0.12  # of the strip's length: the fragment that is shown
+SHARE = 0.15  # of the strip's length: the fragment that is shown
 FASTENERS = 3  # of Figure 4
 
 
@@ -41,7 +41,7 @@ def _grids(results: Results) -> Block | None:
             found[problem] = nodes
     if not found:
         return None
-    drawing = style.figure(3.4)
+    drawing = style.figure(3.2)
     panels: list[Axes] = list(drawing.subplots(1, len(found), sharex=True, sharey=True, squeeze=False)[0])
     for axes, (problem, nodes) in zip(panels, found.items(), strict=True):
         left = nodes[:, 0].min()
@@ -72,7 +72,7 @@ def _gap(results: Results) -> Block | None:
 def _drawn(scene: str, arrays: dict[str, Array]) -> Figure:
     nodes, before, after = (arrays[name] for name in ("contact_nodes", "gap_before", "gap_after"))
     width, height = np.ptp(nodes, axis=0)
-    drawing = style.figure(7.6 * max(height / width, 0.07) + 1.1)
+    drawing = style.figure(7.6 * max(height / width, 0.07) + 0.8)
     axes = drawing.add_subplot()
     norm = Normalize(min(0.0, float(after.min())), float(max(after.max(), before.max(), 1e-12)))
     drawn = draw(axes, nodes, after, norm, "viridis")

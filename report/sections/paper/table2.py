@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from ...blocks import Column, Section, Table, Text, number, word
-from ...numbers import MISSING, as_number, counted, power, significant, tidy_power, whole
+from ...numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
 from ...printed import TABLE_2
 from ...rows import ANSWERED, Results
 from .selection import cells_of_paper, figures_of, first, ipm, is_paper, records, seconds_text
@@ -46,6 +46,7 @@ def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
             line[f"{start}_s"] = row["load_case_s"] if row and answered else None
             line[f"{start}_says"] = seconds_text(row) if row else "not measured"
             line[f"{start}_key"] = row["key"] if row else ""
+            line[f"{start}_mu"] = figures_of(row, "start").get("mu") if row else None
             line[f"{start}_iterations_printed"], line[f"{start}_s_printed"] = printed.get(start, (None, None))
         lines.append(line)
     return lines
@@ -97,7 +98,22 @@ def _counted(lines: list[dict[str, Any]]) -> str:
         + (f" ({missing} without an answer of all three)" if missing else "")
         + f", and on {sum(map(bool, printed))} of {len(printed)} in the printed table."
     )
-    return words + (f" It needs more at {', '.join(where)} active (printed count)." if where else "")
+    words += f" It needs more at {', '.join(where)} active (printed count)." if where else ""
+    return " ".join([words, *(_against(rival, lines) for rival in RIVALS)])
+
+
+def _against(rival: str, lines: list[dict[str, Any]]) -> str:
+    """On how many loads Algorithm 5 needs no more than this one, and how far above it starts elsewhere."""
+    names = [f"{start}_{what}" for start in ("algorithm_5", rival) for what in ("iterations", "mu")]
+    known = pd.DataFrame(lines)[names].apply(pd.to_numeric, errors="coerce").dropna()
+    mine, mu, other, least = (known[name] for name in names)
+    more, above = (mine - other)[mine > other], (mu / least)[mine > other]
+    text = f"Against {STARTS[rival]} alone it needs no more on {len(known) - len(more)} of {len(known)}"
+    if more.empty:
+        return text + "."
+    times = span(significant(above.min(), 2), significant(above.max(), 2))
+    by = span(whole(more.min()), whole(more.max()))
+    return f"{text}; on the others it needs {by} more, from a gap μ₀ {times} times as large."
 
 
 def _starts(cells: pd.DataFrame) -> Table:
@@ -134,7 +150,6 @@ def _starts(cells: pd.DataFrame) -> Table:
 
 def _range(name: str, style: Callable[[object], str]) -> Callable[[Mapping[str, Any]], str]:
     def text(row: Mapping[str, Any]) -> str:
-        least, most = style(row[f"{name}_least"]), style(row[f"{name}_most"])
-        return least if least == most else f"{least} to {most}"
+        return span(style(row[f"{name}_least"]), style(row[f"{name}_most"]))
 
     return text

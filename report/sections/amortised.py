@@ -1,0 +1,91 @@
+"""Many load cases on one assembly: what is paid once is shared by them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure as Drawing
+
+from .. import style
+from ..blocks import Column, Figure, Section, Table, number
+from ..numbers import MISSING, counted, significant, tidy_power, whole
+from ..precision import ACCURACIES, in_view, judged, looks, pareto, settings, swept
+from ..rows import Results
+from ..shown import middle_scenes
+from .accuracy import staircase
+
+LOAD_CASES = (1, 10, 100, 1000)
+PANEL = 2.6  # inches
+
+
+def section(results: Results) -> Section | None:
+    cells = swept(results)
+    answered = in_view(cells[cells["scene"].isin(middle_scenes(results))].dropna(subset=["error"]))
+    if answered.empty:
+        return None
+    caption = (
+        f"*One load case, and one of {LOAD_CASES[-1]} on the same assembly*, on the middle scene of each "
+        "size: seconds a load case against the error achieved. Left, the solver's own conversion and "
+        f"preparation are paid in full; right, {LOAD_CASES[-1]} load cases share them. The Cholesky factor "
+        "of K and Q, which all solvers share, is in neither."
+    )
+    figure = Figure("amortised", caption, _drawing(results, answered))
+    return Section("Many load cases on one assembly", [figure, _table(cells)])
+
+
+def _drawing(results: Results, answered: pd.DataFrame) -> Drawing:
+    scenes, ends = answered["scene"].unique(), (LOAD_CASES[0], LOAD_CASES[-1])
+    styles = looks(results, answered)
+    drawing = style.figure_above(PANEL * len(scenes) + 0.3, style.legend_entries(styles))
+    panels = drawing.subplots(len(scenes), len(ends), sharex=True, sharey="row", squeeze=False)
+    low, high = answered["error"].min(), answered["error"].max()
+    panels[0, 0].set(xscale="log", xlim=(low / 4, high * 4))
+    for line, scene in zip(panels, scenes, strict=True):
+        points = answered[answered["scene"] == scene]
+        for axes, load_cases in zip(line, ends, strict=True):
+            shown = points.assign(cost=points["load_case_s"] + points["once_s"] / load_cases)
+            for series, look in styles.items():
+                curve = shown[shown["series"] == series].sort_values("tolerance", ascending=False)
+                axes.plot(curve["error"], curve["cost"], **look)
+            axes.set_yscale("log")
+            axes.set_title(f"n = {points['n'].iloc[0]:.0f}, {counted(load_cases, 'load case')}")
+        for axes, load_cases in zip(line, ends, strict=True):
+            cost = points["load_case_s"] + points["once_s"] / load_cases
+            staircase(axes, pareto(points.assign(cost=cost), "cost"), "cost")
+        line[0].set_ylabel("time a load case, s")
+        style.plain_log(line[0].yaxis)
+    for axes in panels[-1]:
+        axes.set_xlabel("displacement error, mm (max norm)")
+    return drawing
+
+
+def _table(cells: pd.DataFrame) -> Table:
+    lines = [_line(of_size, accuracy) for _, of_size in cells.groupby("n") for accuracy in ACCURACIES]
+    columns = [number("n", "n", whole), number("error ≤, mm", "accuracy_mm", tidy_power)]
+    columns += [Column(counted(k, "load case"), partial(_shown, load_cases=k), "left") for k in LOAD_CASES]
+    caption = (
+        "*The fastest settings for so many load cases on one assembly*, with seconds a load case, its share "
+        "of what is paid once included: the geometric mean over the scenes of the size, of settings "
+        "that reach the error on all of them."
+    )
+    return Table("amortised", caption, pd.DataFrame(lines), columns)
+
+
+def _line(cells: pd.DataFrame, accuracy: float) -> dict[str, Any]:
+    line: dict[str, Any] = {"n": cells["n"].iloc[0], "accuracy_mm": accuracy}
+    line["judged"] = judged(cells, accuracy)
+    for load_cases in LOAD_CASES:
+        seconds = settings(cells, accuracy, load_cases) if line["judged"] else pd.Series(dtype=float)
+        line[f"fastest_{load_cases}"] = str(seconds.index[0]) if len(seconds) else ""
+        line[f"seconds_{load_cases}"] = float(seconds.iloc[0]) if len(seconds) else None
+    return line
+
+
+def _shown(line: Mapping[str, Any], load_cases: int) -> str:
+    if not line["judged"]:
+        return "cannot be judged"
+    name = line[f"fastest_{load_cases}"]
+    return f"{name}: {significant(line[f'seconds_{load_cases}'])} s" if name else MISSING

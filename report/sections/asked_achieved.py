@@ -1,0 +1,76 @@
+"""The tolerance that was asked for against the error that came: whose tolerance can be trusted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure as Drawing
+
+from .. import style
+from ..blocks import Figure, Section, Table, number, word
+from ..labels import in_order, named
+from ..numbers import whole
+from ..precision import in_view, looks, swept
+from ..rows import Results
+
+
+def section(results: Results) -> Section | None:
+    cells = in_view(swept(results)).dropna(subset=["error", "tolerance"])
+    if cells.empty:
+        return None
+    words = (
+        "*Error against the tolerance asked for*, the worst of the scenes of each size. Below the dotted "
+        "diagonal the error is smaller than the tolerance. A tolerance is the number given to the solver, "
+        "which may measure a gap, a force or an energy by it: what counts is whether its line follows the "
+        "diagonal, at whatever distance, and where it stops to. Runs without an answer are left out."
+    )
+    columns = [
+        word("solver (form)", "series"),
+        number("said solved", "solved", whole),
+        number("error above the tolerance", "above_tolerance", whole),
+        number("largest error / tolerance", "worst_ratio"),
+        number(f"tolerance ≤ {results.limit.removesuffix(' mm')}", "tight", whole),
+        number(f"of these outside {results.limit}", "tight_outside", whole),
+    ]
+    caption = (
+        "*Whose tolerance can be trusted*: runs, every repeat counted, of which the solver said that they "
+        "were solved. The bound on the reference's own error is taken off the error in its favour."
+    )
+    figure = Figure("asked-achieved", words, _drawing(results, cells))
+    table = Table("asked-achieved", caption, trust(results), columns)
+    return Section("Tolerance asked, error achieved", [figure, table])
+
+
+def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
+    sizes, styles = sorted(cells["n"].unique()), looks(results, cells)
+    drawing = style.figure_above(3.2, style.legend_entries(styles))
+    panels = drawing.subplots(1, len(sizes), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, n in zip(panels, sizes, strict=True):
+        worst = cells[cells["n"] == n].groupby(["series", "tolerance"], as_index=False)["error"].max()
+        for series, look in styles.items():
+            line = worst[worst["series"] == series]
+            axes.plot(line["tolerance"], line["error"], **look)
+        axes.axline((1e-6, 1e-6), (1e-5, 1e-5), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
+        axes.set(xscale="log", yscale="log", title=f"n = {n:.0f}", xlabel="tolerance asked for")
+    panels[0].set_ylabel("displacement error, mm")
+    return drawing
+
+
+def trust(results: Results) -> pd.DataFrame:
+    """A line a series: of its runs called solved, how many miss the tolerance, and the limit although the
+    tolerance was no larger.
+    """
+    rows = named(results.rows)
+    said = (rows["status"] == "solved") & rows["displacement_error_mm"].notna() & (rows["tolerance"] > 0)
+    rows = rows[said]
+    error = (rows["displacement_error_mm"] - rows["reference_bound_mm"].fillna(0.0)).clip(lower=0.0)
+    rows = rows.assign(ratio=error / rows["tolerance"], tight=rows["tolerance"] <= rows["limit_mm"])
+    rows["broken"] = rows["tight"] & (error > rows["limit_mm"])
+    lines: list[dict[str, Any]] = []
+    for series in in_order(rows, "series"):
+        runs = rows[rows["series"] == series]
+        line = {"series": series, "solved": len(runs), "above_tolerance": int((runs["ratio"] > 1).sum())}
+        line |= {"tight": int(runs["tight"].sum()), "tight_outside": int(runs["broken"].sum())}
+        lines.append(line | {"worst_ratio": runs["ratio"].max()})
+    return pd.DataFrame(lines)

@@ -1,0 +1,94 @@
+"""Performance profiles (Dolan and Moré, Mathematical Programming 91:201-213, 2002) at the limit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure as Drawing
+
+from .. import style
+from ..blocks import Figure, Section, Table, number, word
+from ..labels import in_order
+from ..numbers import counted, listed, whole
+from ..precision import judged, with_errors
+from ..rows import Results
+from ..shown import left_out, sidelined, styles_of
+
+FEWEST = 5  # load cases that a profile stands on
+MOST = 0.75  # of the scenes that a series was asked for, to be compared
+FACTORS = {1.0: "fastest", 2.0: "τ ≤ 2", 10.0: "τ ≤ 10"}
+
+
+def section(results: Results) -> Section | None:
+    cells = compared(results)
+    times = ratios(cells)
+    if len(times) < FEWEST or len(times.columns) < 2:
+        return None
+    others = asked(results)
+    left = in_order(others[~others["series"].isin(times)], "series")
+    caption = (
+        f"*Performance profiles over {counted(len(times), 'load case')}*: the share of them that a solver "
+        f"answers to within {results.limit}, with the best of its tolerances, in at most τ times the time of "
+        "the fastest. Left end: how often it is the fastest; right end: how many it answers at all. What "
+        "failed, missed the limit or was not run for want of time counts as never. Left out are load cases "
+        "that not every solver was asked for, or that nothing answered, or whose reference cannot judge the "
+        "limit."
+        + (f" Asked for fewer than three quarters of the scenes: {listed(left)}." if left else "")
+        + left_out(results)
+    )
+    figure = Figure("profiles", caption, _drawing(results, times))
+    return Section("Performance profiles", [figure, _table(times, results)])
+
+
+def asked(results: Results) -> pd.DataFrame:
+    """The cells of the plan but for the sidelined variants, those not run for want of time among them."""
+    return results.cells[results.cells["status"] != "unsupported"].drop(sidelined(results).index)
+
+
+def compared(results: Results) -> pd.DataFrame:
+    """The cells, with errors, of the series asked for MOST of the scenes, on those scenes that all of them
+    were asked for.
+    """
+    cells = asked(results)
+    table = cells.pivot_table(index="scene", columns="series", values="n", aggfunc="size").notna()
+    often = table.columns[table.mean() >= MOST]
+    common = table.index[table[often].all(axis=1)]
+    return with_errors(cells[cells["series"].isin(often) & cells["scene"].isin(common)])
+
+
+def ratios(cells: pd.DataFrame) -> pd.DataFrame:
+    """Time over that of the fastest, by scene and series; infinite where the limit was not met."""
+    known = [s for s, of in cells.groupby("scene") if judged(of, of["limit_mm"].max())]
+    good = cells[(cells["error"] <= cells["limit_mm"]) & cells["scene"].isin(known)]
+    times = good.pivot_table(index="scene", columns="series", values="load_case_s", aggfunc="min")
+    times = times.reindex(columns=in_order(cells, "series"))
+    return times.div(times.min(axis=1), axis=0).fillna(np.inf)
+
+
+def _drawing(results: Results, times: pd.DataFrame) -> Drawing:
+    styles = styles_of(results, results.cells[results.cells["series"].isin(times)])
+    right = 1.3 * float(times.where(np.isfinite(times)).max().max())
+    drawing = style.figure(3.6)
+    axes = drawing.subplots()
+    for series, look in styles.items():
+        met, counts = np.unique(times[series][np.isfinite(times[series])], return_counts=True)
+        shares = counts.cumsum() / len(times)
+        axes.plot(met, shares, **style.marker_only(look))
+        taus, steps = np.array([1.0, *met, max(right, 2.0)]), np.array([0.0, *shares, shares.max(initial=0)])
+        axes.plot(taus, steps, drawstyle="steps-post", **style.line_only(look))
+    axes.set(xscale="log", xlim=(0.97, max(right, 2.0)), ylim=(-0.04, 1.06))
+    axes.set(xlabel="τ: time over that of the fastest", ylabel="share of the load cases")
+    style.plain_log(axes.xaxis)
+    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
+    return drawing
+
+
+def _table(times: pd.DataFrame, results: Results) -> Table:
+    lines = pd.DataFrame({"series": times.columns, "load_cases": len(times)})
+    lines["answered"] = np.isfinite(times).sum().to_numpy()
+    columns = [word("solver (form)", "series"), number("load cases", "load_cases", whole)]
+    columns.append(number(f"within {results.limit}", "answered", whole))
+    for factor, heading in FACTORS.items():
+        lines[f"within_{factor:g}"] = (times <= factor).sum().to_numpy()
+        columns.append(number(heading, f"within_{factor:g}", whole))
+    return Table("profiles", "*The profiles in numbers*, of load cases.", lines, columns)

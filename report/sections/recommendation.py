@@ -1,0 +1,56 @@
+"""For an error of at most X on size Y, which solver with which settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from ..blocks import Section, Table, number, word
+from ..numbers import listed, power, significant, tidy_power, whole
+from ..precision import ACCURACIES, judged, settings, swept
+from ..rows import Results
+from ..standings import TIE
+
+
+def section(results: Results) -> Section | None:
+    cells = swept(results)
+    if cells.empty:
+        return None
+    lines = [recommended(of_size, x) for _, of_size in cells.groupby("n") for x in ACCURACIES]
+    columns = [
+        number("n", "n", whole),
+        number("error ≤, mm", "accuracy_mm", tidy_power),
+        word("use", "use"),
+        number("with tolerance", "tolerance", tidy_power),
+        number("s a load case", "seconds"),
+        word(f"as fast, to within {TIE - 1:.0%}", "ties"),
+    ]
+    caption = (
+        "*The fastest settings whose error was small enough on every scene of the size*; seconds are the "
+        "geometric mean over the scenes, without what is paid once an assembly."
+    )
+    table = Table("recommendation", caption, pd.DataFrame(lines), columns)
+    return Section("Which settings for which accuracy", [table])
+
+
+def recommended(cells: pd.DataFrame, accuracy: float) -> dict[str, Any]:
+    """The fastest settings of one size whose error is ≤ accuracy on all its scenes, and their equals."""
+    line: dict[str, Any] = {"n": cells["n"].iloc[0], "accuracy_mm": accuracy, "use": "nothing reaches it"}
+    line |= {"tolerance": None, "seconds": None, "ties": ""}
+    if not judged(cells, accuracy):
+        bound = power(cells["reference_bound_mm"].max(), 2)
+        return line | {"use": f"cannot be judged: the references are known to {bound} mm"}
+    seconds = settings(cells, accuracy)
+    if seconds.empty:
+        return line
+    known = cells.drop_duplicates("label").set_index("label").loc[seconds.index].assign(seconds=seconds)
+    known = known.drop_duplicates("series")  # of several tolerances, the fastest
+    best, *others = known.to_dict("records")
+    ties = [_tie(other) for other in others if other["seconds"] <= TIE * best["seconds"]]
+    line |= {"use": best["series"], "tolerance": best["tolerance"], "seconds": best["seconds"]}
+    return line | {"ties": listed(ties) if ties else ""}
+
+
+def _tie(line: dict[Any, Any]) -> str:
+    return f"{line['series']} at {tidy_power(line['tolerance'])} ({significant(line['seconds'])} s)"

@@ -1,0 +1,111 @@
+"""KKT residuals against the displacement error: a small residual is no proof of a small error."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure as Drawing
+
+from .. import style
+from ..blocks import Block, Figure, Section, Table, Text, number, word
+from ..labels import in_order
+from ..numbers import power, tidy_power, whole
+from ..precision import EXACT, swept
+from ..rows import Results
+from ..shown import styles_of
+
+RESIDUALS = {"primal_residual": "mm", "dual_residual": "N", "duality_gap": "N·mm"}
+
+SMALL = {"markersize": 4.0, "markeredgewidth": 1.0}
+
+
+def section(results: Results) -> Section | None:
+    cells = swept(results).dropna(subset=["error", *RESIDUALS])
+    if cells.empty:
+        return None
+    cells = cells.assign(**{name: cells[name].abs().clip(lower=EXACT) for name in RESIDUALS})
+    caption = (
+        "*Displacement error against the residuals* of every answer, all scenes. Were a residual a proof, "
+        f"nothing would stand at the upper left. Dotted: {results.limit}. A residual of zero is drawn at "
+        f"{tidy_power(EXACT)}."
+    )
+    blocks: list[Block] = [
+        Text(sentence(cells, results)),
+        Figure("residual-error", caption, _drawing(results, cells)),
+        _table(cells, results),
+    ]
+    return Section("Residual against error", blocks)
+
+
+def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
+    styles = {s: style.marker_only(look) | SMALL for s, look in styles_of(results, cells).items()}
+    drawing = style.figure_above(3.2, style.legend_entries(styles))
+    panels = drawing.subplots(1, len(RESIDUALS), sharey=True)
+    for axes, (name, unit) in zip(panels, RESIDUALS.items(), strict=True):
+        for series, look in styles.items():
+            line = cells[cells["series"] == series]
+            axes.plot(line[name], line["error"], **look)
+        axes.set(xscale="log", yscale="log", xlabel=f"{name.replace('_', ' ')}, {unit}")
+        axes.axhline(cells["limit_mm"].max(), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
+    panels[0].set_ylabel("displacement error, mm")
+    return drawing
+
+
+def sentence(cells: pd.DataFrame, results: Results) -> str:
+    """The starkest pair on one scene: an answer outside the limit, all three residuals of which are no
+    larger, and one smaller, than those of an answer within it.
+    """
+    pair = deceptive(cells)
+    if pair is None:
+        return (
+            f"No answer outside {results.limit} has all three residuals as small as those of an answer "
+            "within it on the same scene: here the residuals together did tell the two apart."
+        )
+    bad, good = cells.loc[[*pair]].to_dict("records")
+    return (
+        f"A small residual is no proof. On scene {bad['scene']}, {bad['label']} has residuals "
+        f"({_residuals(bad)}) no larger than {good['label']} ({_residuals(good)}), and yet "
+        f"an error of {power(bad['error'], 2)} mm against {power(good['error'], 2)} mm."
+    )
+
+
+def deceptive(cells: pd.DataFrame) -> tuple[int, int] | None:
+    """Index of the two answers of `sentence`, of all such pairs that with the largest ratio of errors."""
+    most, pair = 0.0, None
+    for _, scene in cells.groupby("scene"):
+        bad, good = scene[scene["error"] > scene["limit_mm"]], scene[scene["error"] <= scene["limit_mm"]]
+        if bad.empty or good.empty:
+            continue
+        left, right = (of[[*RESIDUALS]].to_numpy() for of in (bad, good))
+        no_larger = (left[:, None, :] <= right[None, :, :]).all(axis=2)
+        one_smaller = (left[:, None, :] < right[None, :, :]).any(axis=2)
+        ratios = bad["error"].to_numpy()[:, None] / good["error"].to_numpy() * (no_larger & one_smaller)
+        i, j = np.unravel_index(ratios.argmax(), ratios.shape)
+        if ratios[i, j] > most:
+            most, pair = float(ratios[i, j]), (bad.index.tolist()[i], good.index.tolist()[j])
+    return pair
+
+
+def _residuals(line: dict[Hashable, object]) -> str:
+    return ", ".join(f"{power(line[name], 2)} {unit}" for name, unit in RESIDUALS.items())
+
+
+def _table(cells: pd.DataFrame, results: Results) -> Table:
+    lines = []
+    for series in in_order(cells, "series"):
+        runs = cells[cells["series"] == series]
+        small = runs[runs["primal_residual"] <= runs["limit_mm"]]
+        line = {"series": series, "answers": len(runs), "small_residual": len(small)}
+        line |= {"outside": int((small["error"] > small["limit_mm"]).sum())}
+        lines.append(line | {"worst_error_mm": small["error"].max()})
+    columns = [
+        word("solver (form)", "series"),
+        number("answers", "answers", whole),
+        number(f"primal residual ≤ {results.limit}", "small_residual", whole),
+        number("of these outside it", "outside", whole),
+        number("their largest error, mm", "worst_error_mm", power),
+    ]
+    caption = "*What a primal residual within the limit is worth*: how often the error was not."
+    return Table("residual-error", caption, pd.DataFrame(lines), columns)

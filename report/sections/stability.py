@@ -1,0 +1,81 @@
+"""How far the repeats of a time lie apart, and which times are not to be relied on, and why."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from ..blocks import Block, Section, Table, Text, number, word
+from ..labels import named
+from ..numbers import counted, whole
+from ..rows import ANSWERED, CELL, Results
+
+SPREAD = 0.2  # most less least, over the median: a time that spreads by more is called unstable
+SHORT = 0.05  # seconds: below, the clock and the start of threads tell
+
+
+def section(results: Results) -> Section | None:
+    table = spreads(results)
+    repeated = table[table["repeats"] > 1]
+    if repeated.empty:
+        return None
+    unstable = repeated[repeated["spread"] > SPREAD].sort_values("spread", ascending=False)
+    once = len(table) - len(repeated)
+    words = (
+        f"Of {counted(len(repeated), 'time')} measured several times, {len(unstable)} spread by more than "
+        f"{SPREAD:.0%} of the median; half of them by at most {repeated['spread'].median():.1%}."
+    )
+    if once:
+        were = "was" if once == 1 else "were"
+        words += f" The other {counted(once, 'time')} {were} measured once: take them to be no more stable."
+    blocks: list[Block] = [Text(words)]
+    if len(unstable):
+        blocks.append(_table(unstable))
+    return Section("How stable the times are", blocks)
+
+
+def spreads(results: Results) -> pd.DataFrame:
+    """A line a cell with answers: of the seconds a load case of its repeats, median, least, most, `spread`
+    = (most − least) / median, and `why` they may spread.
+    """
+    rows = named(results.rows)
+    rows = rows[rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()]
+    rows = rows.assign(seconds=rows[["setup_s", "solve_s", "form_s"]].sum(axis=1))
+    lines = [_line(runs) for _, runs in rows.groupby(CELL, dropna=False, sort=False)]
+    return pd.DataFrame(lines, columns=[*lines[0]] if lines else ["repeats", "spread"])
+
+
+def _line(runs: pd.DataFrame) -> dict[str, Any]:
+    seconds = runs["seconds"]
+    line: dict[str, Any] = {"label": runs["label"].iloc[0], "scene": runs["scene"].iloc[0]}
+    line |= {"repeats": len(runs), "median_s": seconds.median(), "least_s": seconds.min()}
+    line |= {"most_s": seconds.max(), "spread": (seconds.max() - seconds.min()) / seconds.median()}
+    return line | {"why": why(runs)}
+
+
+def why(runs: pd.DataFrame) -> str:
+    """What differs between the repeats of one measurement, the likeliest cause of their spread first."""
+    for name, words in (("iterations", "iterations"), ("inner_iterations", "inner iterations")):
+        least, most = runs[name].min(), runs[name].max()
+        if most > least:
+            return f"{whole(least)} to {whole(most)} {words}: the solver does not repeat itself"
+    if runs["seconds"].median() < SHORT:
+        return f"shorter than {SHORT:g} s: the start of threads and the clock tell"
+    slowest = runs.sort_values("seconds")["recorded_at"].iloc[-1]
+    return f"the same iterations each time: the machine, slowest at {slowest}"
+
+
+def _table(unstable: pd.DataFrame) -> Table:
+    columns = [
+        word("solver (form)", "label"),
+        word("scene", "scene"),
+        number("repeats", "repeats", whole),
+        number("median, s", "median_s"),
+        number("least, s", "least_s"),
+        number("most, s", "most_s"),
+        number("spread, %", "percent", whole),
+        word("why", "why"),
+    ]
+    caption = "*Times not to be relied on*, the most unstable first: most less least, over the median."
+    return Table("unstable-times", caption, unstable.assign(percent=100 * unstable["spread"]), columns)

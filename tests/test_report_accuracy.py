@@ -1,0 +1,336 @@
+"""The sections on what accuracy costs, from rows whose facts were planted."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from accuracy_results import HIGH, LOW, answer, sweep
+from matplotlib.image import imread
+from synthetic_results import no_answer, row, write_rows
+
+from report import style
+from report.blocks import Figure, Section, Table, Text
+from report.build import write
+from report.checks import planned_measurements
+from report.precision import pareto, settings, swept, with_errors
+from report.rows import Results, read
+from report.sections import (
+    accuracy,
+    amortised,
+    asked_achieved,
+    price_list,
+    profiles,
+    recommendation,
+    residual_error,
+    stability,
+    summary,
+)
+from report.shown import best
+
+SECTIONS = [amortised, asked_achieved, price_list, profiles, recommendation, residual_error, stability]
+
+
+@pytest.fixture(autouse=True)
+def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(style, "DPI", 40)
+
+
+def results(directory: Path, rows: list[dict[str, Any]]) -> Results:
+    return read(write_rows(directory, rows))
+
+
+def changed(rows: list[dict[str, Any]], solver: str, **figures: Any) -> list[dict[str, Any]]:
+    return [r | figures if r["solver"] == solver else r for r in rows]
+
+
+def table(section: Section | None, name: str) -> Table:
+    assert section is not None
+    return next(block for block in section.blocks if isinstance(block, Table) and block.name == name)
+
+
+def text(section: Section | None) -> str:
+    assert section is not None
+    return "\n".join(block.markdown for block in section.blocks if isinstance(block, Text))
+
+
+def prices(found: Results) -> Any:
+    return table(price_list.section(found), "price-list").data.set_index("series")
+
+
+def advised(found: Results) -> Any:
+    return table(recommendation.section(found), "recommendation").data.set_index("accuracy_mm")
+
+
+@pytest.mark.parametrize("module", SECTIONS)
+def test_without_a_sweep_there_is_no_section(tmp_path: Path, module: Any) -> None:
+    rows = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
+    assert module.section(results(tmp_path / "two", rows)) is None
+    assert module.section(results(tmp_path / "none", [])) is None
+
+
+def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> None:
+    rows = [answer(LOW, "honest", 7, 1.3, 5e-8, repeat=1), *sweep()]
+    rows += [answer(f"4386/{k}", "honest", 7, 1.0, 1e-9) for k in (200, 300, 400)]
+    rows += [answer(f"4386/{k}", "liar", 7, 2.0, 1e-9) for k in (200, 300, 400)]
+    written = write(write_rows(tmp_path, rows)).read_text("utf-8")
+    for title in (
+        *("Which settings for which accuracy", "Time against achieved accuracy", "Price list of accuracy"),
+        *("Tolerance asked, error achieved", "Residual against error", "Performance profiles"),
+        *("Many load cases on one assembly", "How stable the times are"),
+    ):
+        assert f"## {title}\n" in written
+    for picture in (tmp_path / "report").glob("*.png"):
+        assert imread(picture)[..., :3].std() > 0.04, f"{picture} is blank"
+    assert "nan" not in written.replace("-", " ").lower().split()
+
+
+def panels(found: Results) -> Any:
+    section = accuracy.section(found)
+    assert section is not None
+    (figure,) = (block for block in section.blocks if isinstance(block, Figure))
+    return figure.drawing.axes
+
+
+def drawn_lines(axes: Any, seconds: float) -> list[tuple[str, int]]:
+    """Line style and number of points of every line through that time."""
+    return [
+        (str(line.get_linestyle()), len(line.get_xdata()))
+        for line in axes.lines
+        if any(y == pytest.approx(seconds) for y in line.get_ydata()) and line.get_zorder() > 1
+    ]
+
+
+def test_three_tolerances_make_a_curve_and_two_are_points(tmp_path: Path) -> None:
+    rows = [answer(LOW, "curve", k, 0.7 + k, 10.0**-k) for k in (3, 5, 7)]
+    rows += [answer(LOW, "points", k, 0.5 + k, 10.0**-k) for k in (3, 5)]
+    (axes,) = panels(results(tmp_path, rows))
+    assert drawn_lines(axes, 5.7) == [("-", 3)]
+    assert drawn_lines(axes, 5.5) == [("None", 2)]
+
+
+def test_the_diagram_shows_the_fewest_and_the_most_contacts(tmp_path: Path) -> None:
+    rows = [answer(f"4386/{k}", "a", 7, 1.0, 1e-9) for k in (900, 100, 500)]
+    titles = [axes.get_title() for axes in panels(results(tmp_path, rows))]
+    assert titles == ["n = 4386, 100 active", "n = 4386, 900 active"]
+
+
+def test_unfinished_runs_stand_at_their_limit_above_the_smallest_error_reached(tmp_path: Path) -> None:
+    axes, _ = panels(results(tmp_path, sweep()))
+    (mark,) = (line for line in axes.lines if line.get_marker() == "^")
+    assert (mark.get_xdata()[0], mark.get_ydata()[0]) == pytest.approx((10.0**-4 / 2, 68.0))
+
+
+def test_the_front_is_drawn_through_what_nothing_beats(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", 3, 1.0, 1e-3), answer(LOW, "b", 5, 2.0, 1e-5), answer(LOW, "c", 4, 3.0, 1e-4)]
+    (axes,) = panels(results(tmp_path, rows))
+    (front,) = (line for line in axes.lines if line.get_drawstyle() == "steps-post")
+    assert front.get_xdata()[:3].tolist() == [1e-5, 1e-5, 1e-3]
+    assert front.get_ydata()[1:].tolist() == [2.0, 1.0, 1.0]
+
+
+def test_an_error_counts_at_least_as_the_bound_on_the_references(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", 9, 1.0, e, reference_bound_mm=1e-11, repeat=k) for k, e in enumerate((0, 1e-12))]
+    rows += [answer(LOW, "b", 9, 1.0, 3e-11, reference_bound_mm=1e-11)]
+    cells = with_errors(results(tmp_path, rows).cells).set_index("solver")
+    assert cells["error"].to_dict() == {"a": 1e-11, "b": 3e-11}
+
+
+def test_a_front_may_be_of_any_time(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", 3, 1.0, 1e-3, prepare_s=9.0), answer(LOW, "b", 5, 2.0, 1e-5)]
+    points = with_errors(results(tmp_path, rows).cells)
+    assert pareto(points)["solver"].tolist() == ["b", "a"]
+    assert pareto(points, "total_s")["solver"].tolist() == ["b"]
+
+
+def test_prices_are_the_fastest_measured_run_that_is_accurate_enough(tmp_path: Path) -> None:
+    line = prices(results(tmp_path, sweep())).loc["honest (dual)"]
+    # errors are half the tolerance: 10^-k is first met at k digits, which take 0.01 · 2^k s
+    assert [line[f"seconds_1e-{k}"] for k in (3, 5, 7, 9)] == pytest.approx([0.08, 0.32, 1.28, 5.12])
+    assert line["factor_a_digit"] == pytest.approx(2.0)
+
+
+def test_the_factor_a_digit_follows_the_times(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", k, 0.01 * 5**k, 10.0**-k) for k in (3, 4, 5, 6)]
+    assert prices(results(tmp_path / "a", rows)).loc["a (dual)", "factor_a_digit"] == pytest.approx(5.0)
+    short = [answer(LOW, "a", k, 0.01 * 5**k, 10.0 ** (-3 - k / 10)) for k in (3, 4, 5, 6)]
+    assert math.isnan(prices(results(tmp_path / "b", short)).loc["a (dual)", "factor_a_digit"])
+
+
+def test_a_price_is_the_geometric_mean_over_the_scenes(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", k, 1.0, 10.0**-k / 2) for k in (3, 5, 7)]
+    rows += [answer(HIGH, "a", k, 4.0, 10.0**-k / 2) for k in (3, 5, 7)]
+    assert prices(results(tmp_path, rows)).loc["a (dual)", "seconds_1e-7"] == pytest.approx(2.0)
+
+
+def test_what_was_not_reached_is_shown_as_such(tmp_path: Path) -> None:
+    rows = [*sweep(), answer(LOW, "once", 9, 1.0, 1e-9)]
+    rows += [row(s, "lost", tolerance=1e-6, **no_answer("crashed")) for s in (LOW, HIGH)]
+    found = table(price_list.section(results(tmp_path, rows)), "price-list")
+    shown = {record["series"]: record for record in found.data.to_dict("records")}
+    words = {
+        name: [column.show(line) for column in found.columns[2:6]]  # type: ignore[arg-type]
+        for name, line in shown.items()
+    }
+    assert words["late (dual)"] == ["1.00 s", "> 68.0 s", "> 68.0 s", "> 68.0 s"]
+    assert words["coarse (dual)"] == ["2.00 s", "2.00 s", "not reached (3.0e-6)", "not reached (3.0e-6)"]
+    assert words["once (dual)"] == ["–"] * 4
+    assert words["lost (dual)"] == ["no answer"] * 4
+
+
+def test_a_reference_too_coarse_for_an_accuracy_does_not_judge_it(tmp_path: Path) -> None:
+    found = results(tmp_path, [r | {"reference_bound_mm": 1e-9} for r in sweep()])
+    line = prices(found).loc["honest (dual)"]
+    assert line["state_1e-7"] == "reached"
+    assert line["state_1e-9"] == "cannot be judged"
+    assert advised(found).loc[1e-9, "use"] == "cannot be judged: the references are known to 1.0e-9 mm"
+    many = table(amortised.section(found), "amortised")
+    assert many.columns[2].show(many.data.iloc[-1].to_dict()) == "cannot be judged"  # type: ignore[arg-type]
+
+
+def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:
+    trust = asked_achieved.trust(results(tmp_path, sweep())).set_index("series")
+    assert trust.loc["liar (dual)", "worst_ratio"] == pytest.approx(900, rel=0.02)
+    # its error is 900 times the tolerance, on two scenes: outside at 7, 8 and 9 digits, not at 10
+    assert trust.loc["liar (dual)", ["solved", "above_tolerance", "tight", "tight_outside"]].tolist() == [
+        *(18, 18, 8, 6),
+    ]
+    assert trust.loc["honest (dual)", ["above_tolerance", "tight", "tight_outside"]].tolist() == [0, 8, 0]
+
+
+def test_only_runs_called_solved_can_break_their_word(tmp_path: Path) -> None:
+    rows = changed(sweep(), "liar", status="inaccurate")
+    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("series")
+    assert "liar (dual)" not in trust.index
+
+
+def test_what_the_reference_leaves_open_is_in_the_solvers_favour(tmp_path: Path) -> None:
+    rows = [answer(LOW, "a", k, 1.0, 10.0**-k + 5e-11, reference_bound_mm=6e-11) for k in (6, 8, 10)]
+    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("series")
+    assert trust.loc["a (dual)", "above_tolerance"] == 0
+
+
+def test_small_residuals_beside_a_large_error_are_named(tmp_path: Path) -> None:
+    tiny = {"primal_residual": 1e-15, "dual_residual": 1e-12, "duality_gap": 1e-13}
+    section = residual_error.section(results(tmp_path, changed(sweep(), "coarse", **tiny)))
+    # the largest ratio: 5e-3 mm at 2 digits against 5e-11 mm of honest at 10
+    assert "A small residual is no proof. On scene" in text(section)
+    assert "coarse (dual) 1e-2 has residuals (1.0e-15 mm, 1.0e-12 N, 1.0e-13 N·mm)" in text(section)
+    assert "an error of 5.0e-3 mm against 5.0e-11 mm" in text(section)
+    line = table(section, "residual-error").data.set_index("series").loc["coarse (dual)"]
+    assert [line["small_residual"], line["outside"], line["worst_error_mm"]] == [8, 8, 5e-3]
+
+
+def test_residuals_that_do_tell_are_said_to(tmp_path: Path) -> None:
+    rows = [
+        r | {"primal_residual": e, "dual_residual": e, "duality_gap": e}
+        for r in sweep()
+        if (e := r["displacement_error_mm"]) is not None
+    ]
+    section = residual_error.section(results(tmp_path, rows))
+    assert "did tell the two apart" in text(section)
+
+
+def test_one_small_residual_beside_a_large_one_deceives_nobody(tmp_path: Path) -> None:
+    rows = [answer(LOW, "good", k, 1.0, 1e-9, primal_residual=1e-9, dual_residual=1e-9) for k in (5, 7, 9)]
+    rows.append(answer(LOW, "bad", 7, 1.0, 1e-5, primal_residual=1e-12, dual_residual=1e-3))
+    assert "did tell the two apart" in text(residual_error.section(results(tmp_path, rows)))
+
+
+def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
+    seconds = {"a": (1.0, 1.0, 1.0, 6.0, 8.0), "b": (3.0, 2.0, 1.0, 2.0, 1.0), "c": (0.1,) * 5}
+    rows = [
+        answer(f"4386/{k}", solver, 7, t, 1e-6 if solver == "c" else 1e-9)
+        for solver, times in seconds.items()
+        for k, t in enumerate(times, start=100)
+    ]
+    rows += [answer("4386/100", "seldom", 7, 0.01, 1e-9), answer("4386/100", "a", 9, 5.0, 1e-10)]
+    late = answer("4386/105", "b", 7, 9.0, 1e-9) | no_answer("time_limit")
+    rows += [answer("4386/105", "a", 7, 9.0, 1e-9), late, answer("4386/105", "c", 7, 0.1, 1e-6)]
+    found = table(profiles.section(results(tmp_path, rows)), "profiles").data.set_index("series")
+    counts = found[["load_cases", "answered", "within_1", "within_2", "within_10"]]
+    assert counts.loc["a (dual)"].tolist() == [6, 6, 4, 4, 6]  # ratios 1, 1, 1, 3, 8 and 1
+    assert counts.loc["b (dual)"].tolist() == [6, 5, 3, 4, 5]  # ratios 3, 2, 1, 1, 1 and none
+    assert counts.loc["c (dual)"].tolist() == [6, 0, 0, 0, 0]
+    assert "seldom (dual)" not in found.index
+    few = [r for r in rows if r["scene"] < "4386/104"]
+    assert profiles.section(results(tmp_path / "few", few)) is None
+
+
+def test_what_is_paid_once_loses_its_weight_with_the_load_cases(tmp_path: Path) -> None:
+    both = (LOW, HIGH)
+    rows = sweep() + [answer(s, "plain", k, 3.0, 10.0**-k / 2) for s in both for k in (3, 5, 7)]
+    found = table(amortised.section(results(tmp_path, rows)), "amortised").data.set_index("accuracy_mm")
+    # honest at 7 digits: 1.28 s, and 100 s once; plain: 3 s, and nothing once. liar reaches 1e-7 at 24 s
+    assert found.loc[1e-7, "fastest_10"] == "plain (dual) 1e-7"
+    assert found.loc[1e-7, "fastest_100"] == "honest (dual) 1e-7"
+    assert found.loc[1e-7, ["seconds_10", "seconds_100"]].tolist() == pytest.approx([3.0, 2.28])
+
+
+def test_settings_must_reach_the_accuracy_on_every_scene(tmp_path: Path) -> None:
+    rows = [r for r in sweep() if r["solver"] == "honest"]
+    rows += [answer(LOW, "lucky", 7, 0.001, 1e-9), answer(HIGH, "lucky", 7, 0.001, 1e-6)]
+    cells = swept(results(tmp_path, rows))
+    assert settings(cells, 1e-7).index[0] == "honest (dual) 1e-7"
+    assert settings(cells, 1e-5).index[0] == "lucky (dual)"
+
+
+def test_the_recommendation_follows_the_times(tmp_path: Path) -> None:
+    line = advised(results(tmp_path / "a", sweep())).loc[1e-7]
+    assert line[["use", "tolerance"]].tolist() == ["honest (dual)", 1e-7]
+    assert line["seconds"] == pytest.approx(1.28)
+    slower = changed(sweep(), "honest", solve_s=50.0)
+    found = advised(results(tmp_path / "b", slower))
+    assert found.loc[1e-7, ["use", "tolerance"]].tolist() == ["liar (dual)", 1e-10]
+    assert found.loc[1e-9, "use"] == "honest (dual)"
+    coarse = [r for r in sweep() if r["solver"] in ("coarse", "late")]
+    found = advised(results(tmp_path / "c", coarse))
+    assert found.loc[1e-3, "use"] == "late (dual)"
+    assert found.loc[1e-9, "use"] == "nothing reaches it"
+
+
+def test_ties_are_named(tmp_path: Path) -> None:
+    both = (LOW, HIGH)
+    rows = sweep() + [answer(s, "twin", k, 0.0101 * 2**k, 10.0**-k / 2) for s in both for k in (3, 5, 7)]
+    assert advised(results(tmp_path, rows)).loc[1e-7, "ties"] == "twin (dual) at 1e-7 (1.29 s)"
+
+
+def test_unstable_times_are_warned_of_with_the_reason(tmp_path: Path) -> None:
+    def repeats(digits: int, seconds: tuple[float, ...], **figures: list[Any]) -> list[dict[str, Any]]:
+        return [
+            answer(LOW, "a", digits, s, 1e-9, repeat=i) | {name: v[i] for name, v in figures.items()}
+            for i, s in enumerate(seconds)
+        ]
+
+    rows = repeats(7, (1.0, 1.1, 1.05)) + repeats(8, (1.0, 2.0, 1.6), recorded_at=["x", "noon", "z"])
+    rows += repeats(9, (1.0, 3.0), iterations=[20, 31]) + repeats(6, (0.01, 0.03))
+    rows.append(answer(LOW, "b", 9, 1.0, 1e-9))
+    section = stability.section(results(tmp_path, rows))
+    assert "Of 4 times measured several times, 3 spread by more than 20%" in text(section)
+    assert "The other 1 time was measured once" in text(section)
+    found = table(section, "unstable-times").data.set_index("label")
+    line = found.loc["a (dual) 1e-8"]
+    assert line[["median_s", "least_s", "most_s"]].tolist() == [1.6, 1.0, 2.0]
+    assert line["spread"] == pytest.approx(1.0 / 1.6)
+    assert line["why"] == "the same iterations each time: the machine, slowest at noon"
+    assert found.loc["a (dual) 1e-9", "why"] == "20 to 31 iterations: the solver does not repeat itself"
+    assert found.loc["a (dual) 1e-6", "why"].startswith("shorter than 0.05 s")
+
+
+def test_the_best_of_several_tolerances_stands_for_a_solver(tmp_path: Path) -> None:
+    found = results(tmp_path, sweep())
+    # honest is within 1e-7 mm from 7 digits on, and the fastest there; liar at 10 digits alone
+    lines = best(found).drop_duplicates("label").set_index("series")["tolerance"]
+    assert lines[["honest (dual)", "liar (dual)"]].tolist() == [1e-7, 1e-10]
+    shown = table(summary.section(found), "summary").data["label"]
+    assert {"honest (dual) 1e-7", "liar (dual) 1e-10"} < set(shown)
+    assert not shown.str.removeprefix("honest (dual) ")[shown.str.startswith("honest")].ne("1e-7").any()
+
+
+def test_what_two_entries_of_a_suite_ask_for_is_planned_once() -> None:
+    one = {"name": "a", "forms": ["dual"], "tolerances": [1e-3, 1e-5, 1e-7]}
+    again = {"name": "a", "forms": ["dual"], "tolerances": [1e-5], "scenes": ["4386/*"], "repeats": 3}
+    suite = {"scenes": [LOW, "6112/0600"], "threads": [2], "solver": [one, again]}
+    assert planned_measurements(suite) == 2 * 3 + 2
