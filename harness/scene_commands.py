@@ -34,7 +34,7 @@ def solve(
 
     \b
     Examples:
-      python -m harness solve gallery/strip-on-tool --out results/strip
+      python -m harness solve gallery/heavy-sheet-on-tool --out results/sheet
       python -m harness solve my-scene.toml --solver piqp --out results/mine
 
     \b

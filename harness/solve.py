@@ -21,7 +21,7 @@ from problems.effect import ForceEffect, PartLoadEffect, TieEffect
 from problems.errors import InputError
 from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
-from solvers.base import FORMS, Load, Problem
+from solvers.base import Form, Load, Problem, Solver
 
 from .judge import LIMIT_MM, judge
 from .ledger import Entry, ledger, not_called_for
@@ -68,6 +68,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     steps = Steps(console)
     with steps.step("reading the scene"):
         scene = read_scene(source)
+    chosen = _solver(solver) if solver else None
     with steps.step("matrices"):
         data = prepared(scene, steps.building)
     with steps.step("the effects, each alone"):
@@ -78,9 +79,9 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     meets = bool((p > 0).any())
     with steps.step("answer with a proven bound"):
         known = reference(scene.key, data, load)
-    if solver and meets:
+    if solver and chosen and meets:
         with steps.step(f"solving with {solver}"):
-            x, lam, said = _with_solver(solver, data, Load(load.f, load.g, p), load, tolerance)
+            x, lam, said = _answer(solver, chosen, data, Load(load.f, load.g, p), tolerance)
         verdict = judge(data, load, known, x, lam, LIMIT_MM)
         said |= {"verdict": verdict.verdict, "judged_error_mm": verdict.displacement_error_mm}
     else:
@@ -120,19 +121,23 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     return SOLVED if record["verdict"] == "within" else NOT_SOLVED
 
 
-def _with_solver(
-    name: str, data: Prepared, load: Load, case: LoadCase, tolerance: float
-) -> tuple[Vector, Vector, dict[str, Any]]:
-    from solvers.registry import make_solver
+def _solver(name: str) -> Solver:
+    from solvers.registry import make_solver  # slow to import: not without a solver
 
-    chosen = make_solver(name, {})
-    form = "dual" if "dual" in chosen.forms else FORMS[0]
-    state = chosen.prepare(chosen.convert(Problem(data, form)))
-    answer = chosen.solve(chosen.setup(state, load, tolerance), load, tolerance)
+    return make_solver(name, {})
+
+
+def _answer(
+    name: str, solver: Solver, data: Prepared, load: Load, tolerance: float
+) -> tuple[Vector, Vector, dict[str, Any]]:
+    """x (n,), λ (m,) or NaN where there is none, and what the solver says. Raises InputError without an x."""
+    form: Form = "dual" if "dual" in solver.forms else "primal"
+    state = solver.prepare(solver.convert(Problem(data, form)))
+    answer = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
     lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
     x = answer.x
     if form == "dual" and answer.lam is not None:
-        x = data.recover(lam, case)
+        x = data.recover(lam, LoadCase(load.f, load.g))
     if x is None:
         raise InputError.one("--solver", name, answer.status, "gave no answer; try another solver")
     said = {"method": f"{name}, {form} form, tolerance {tolerance:g}", "status": answer.status}

@@ -61,13 +61,15 @@ def _build(
     arrays = {"Q": schur(made, factors)}
     for i, (K, U) in enumerate(zip(made.blocks, factors, strict=True)):
         arrays |= {f"K{i}": K, f"U{i}": U}
+    seconds = base.facts["seconds"]
+    assert isinstance(seconds, dict)
     facts = base.facts | {
         "parts": made.parts,
         "cond_K": lambda_max / lambda_min,
         "lambda_min": lambda_min,
         "lambda_max": lambda_max,
         "cond_blocks": [s[1] / s[0] for s in spectrum],
-        "seconds": {"parts": base.facts["seconds"], "ties": time.perf_counter() - start},
+        "seconds": seconds | {"ties": time.perf_counter() - start},
     }
     return arrays, facts
 

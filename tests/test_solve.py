@@ -142,10 +142,16 @@ def test_an_answer_outside_the_limit_fails(tmp_path: Path) -> None:
     assert "outside" in shown.getvalue()
 
 
-def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from solvers import registry
+def no_factor(Q: Any, p: Any, closed: Any) -> tuple[Any, Any, float, float]:
+    """In the place of active_set._solve_on: fails where a contact is closed, so that a QP is solved."""
+    if closed.any():
+        pytest.fail("a contact was closed")
+    return np.zeros(len(p)), -p, 0.0, 0.0
 
-    monkeypatch.setattr(registry, "make_solver", lambda *_: pytest.fail("a QP solver was made"))
+
+def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solvers.with_piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
+    monkeypatch.setattr("harness.active_set._solve_on", no_factor)
     record = run(tmp_path, APART, solver="piqp")
     assert not record["qp"]
     assert record["code"] == 0
@@ -321,6 +327,9 @@ def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
         assert "preload" in lines[0]
         assert "in N" in lines[0]
         assert "mm⁴" in lines[1]
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match="no such solver"):
+        run(tmp_path, APART, solver="piqq")
     assert not (tmp_path / "out").exists()
     (tmp_path / "file").touch()
     good = tmp_path / "good.toml"
