@@ -16,7 +16,7 @@ from .numbers import power, significant, whole
 
 ROW = 0.26  # inches
 GAP = 0.3  # between sizes, in columns
-HEADED = 1.5  # columns that the heading of a size takes at least
+HEADED = 1.8  # columns that the heading of a size takes at least
 FEWEST = 7.0  # columns that the figure has room for at least: cells of few scenes stay small
 WIDEST = 19.0  # columns of a strip at most, unless one size has more
 SLOWEST = 100.0  # times the fastest of a scene: the pale end of the shading

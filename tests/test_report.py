@@ -20,6 +20,7 @@ from report.numbers import power, significant
 from report.precision import pareto
 from report.rows import read
 from report.scoreboard import scoreboard
+from report.sections import times as active
 from report.shown import drawn, left_out, middle_scenes
 from report.standings import compare, standings
 
@@ -243,6 +244,16 @@ def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> 
     assert [len(axes.patches) for axes in (upper, lower)] == [13, 14]
     boxes = [[t.get_window_extent() for t in axes.get_xticklabels()] for axes in (upper, lower)]
     assert not any(a.overlaps(b) for of_axes in boxes for a, b in pairwise(of_axes))
+
+
+def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
+    rows = [row(f"4386/{k}", "a", **times(solve_s=1.0)) for k in (100, 200, 400)]
+    rows += [row("4386/300", "a", **no_answer("time_limit")), row("4386/300", "b")]
+    section = active.section(read(write_rows(tmp_path, rows)))
+    assert section is not None
+    (axes,) = section.blocks[0].drawing.axes[:1]  # type: ignore[union-attr]
+    seconds = axes.lines[0].get_ydata()
+    assert [math.isnan(s) for s in seconds] == [False, False, True, False]
 
 
 def test_pareto_front() -> None:

@@ -171,9 +171,17 @@ def test_table_3_fits_what_the_rows_say_and_says_what_is_missing(tmp_path: Path)
     assert fits.loc["working time", "GI dual"] == pytest.approx(3.0, abs=0.02)
     assert fits.loc["working time", ["GI dual, sizes", "GI primal, sizes"]].tolist() == [5, 4]
     assert "(4 sizes only)" in fits.loc["working time", "GI primal, shown"]
+    assert fits.loc["of it the solver's own", ["IPM", "GI dual"]].tolist() == pytest.approx([3.0, 3.0])
     absolute = made.blocks[1]  # type: ignore[union-attr]
     assert len(absolute.data) == 4 * len(SCALING)  # type: ignore[union-attr]
     assert "> 33" in absolute.markdown  # type: ignore[union-attr]
+
+
+def test_times_too_short_for_the_clock_give_no_exponent(tmp_path: Path) -> None:
+    rows = changed(paper_rows(), gi("primal"), prepare_s=1.4e-5)
+    fits = table3.section(results(tmp_path, rows)).blocks[0].data.set_index("quantity")  # type: ignore[union-attr]
+    assert fits.loc["of it the solver's own", "GI primal, shown"] == "–"
+    assert fits.loc["data preparation", "GI primal"] == pytest.approx(3.0, abs=0.05)
 
 
 def test_table_4(tmp_path: Path) -> None:

@@ -38,6 +38,8 @@ QUANTITIES = (
     Quantity("s_per_pivot", "s a pivot", None, 2),
     Quantity("working_mib", "working memory, MiB", 2, 2),
 )
+TIMES = ("preparation_s", "prepare_s", "working_s")
+SHORTEST = 1e-3  # seconds: a time below says nothing of how the work grows
 #: Steps of building an assembly that the paper counts as data preparation.
 PREPARATION = ("cholesky", "Q")
 
@@ -100,6 +102,8 @@ def fitted(lines: pd.DataFrame, name: str, key: str) -> Exponent | None:
         return None
     of_method = lines[lines["method"] == name]
     values = [as_number(v) or 0.0 for v in of_method[key]]
+    if key in TIMES:
+        values = [v if v >= SHORTEST else 0.0 for v in values]
     return exponent(of_method["n"].tolist(), values)
 
 

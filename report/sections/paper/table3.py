@@ -55,8 +55,8 @@ def _exponents(lines: pd.DataFrame) -> Table:
         "solver itself prepares once (the inverse or factor of Q). Working time: seconds a load case. The "
         "paper's order of the interior-point method's working time is n^2.5 times the CG iterations of "
         "a system, that is √m outer iterations of n² a CG iteration; Goldfarb–Idnani's is n_act·n², n³ where "
-        "the share of active contacts stays the same. Runs that were not answered within the limit "
-        "take no part in the times; the table below names them."
+        "the share of active contacts stays the same. Runs that were not answered within the limit, "
+        "which the table below names, take no part in the times, nor do times below a millisecond."
     )
     return Table("paper-table3", caption, pd.DataFrame(records), columns)
 
