@@ -61,7 +61,7 @@ class Ipm(Solver):
     rho : of stp1 and stp2, the residual allowed as a share of λᵀy. epsilon : of stp2, its least gap, mm.
     cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
     feasibility : mm; what inexact systems may leave in y = Qλ − p.
-    max_iterations : of the scheme. max_cg : of the conjugate gradients in all.
+    max_iterations : of the scheme, each time it begins. max_cg : of the conjugate gradients in all.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
