@@ -25,7 +25,7 @@ from .vtu import write_vtu
 #: Marks of what stands on the junction, by the kind of the effect.
 MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 STRIP, TALLEST = 7.4, 5.5  # inches: the width of a map over the whole page, the largest height of one
-NARROW, UPRIGHT = 0.45, 2.0  # height over width of a junction: maps below one another, all side by side
+NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps below one another, all side by side
 
 
 def write(directory: Path) -> Path:
