@@ -12,7 +12,7 @@ carried out here they need a factor of G_CC instead of their (n, n) matrices.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,11 +22,15 @@ from numpy.typing import NDArray
 from problems.assembly import LoadCase, Matrix, Vector
 from problems.errors import InputError
 
+from .active_set import solve_from
 from .base import FORMS, Answer, Form, Load, Problem, Solver, failed
+from .contact_sets import ContactSets
 from .goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
 from .growing_factor import GrowingFactor
 from .inverse import inverse_with_factor
 from .kkt import checked
+
+FINISHING_SETS = 1000
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,8 @@ class GoldfarbIdnani(Solver):
     Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) by more than
     rounding explains. In the dual form the answer is then checked as it is returned: λ ≥ 0 and, with
     y = Qλ − p, max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Q|λ)) mm make it "solved",
-    anything else "inaccurate". Iterations are changes of the active set.
+    anything else "inaccurate". Iterations are changes of the active set. Where the rounding of Q⁻¹ leaves
+    it inaccurate, block principal pivoting goes on from its set (details: finishing_sets).
 
     Options
     -------
@@ -91,10 +96,24 @@ class GoldfarbIdnani(Solver):
             elif status == "solved":
                 details.pop("cause", None)
             else:
-                details.setdefault("cause", f"rounding: optimal to {residual:.1e} mm only")
+                return _finished(ready, load, lam, tolerance, result.pivots, details)
             return Answer(status, lam, None, result.pivots, details=details)
         x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
         return Answer(result.status, result.u, x, result.pivots, details=details)
+
+
+def _finished(
+    ready: _Prepared, load: Load, lam: Vector, tolerance: float, pivots: int, details: dict[str, Any]
+) -> Answer:
+    """Where the rounding of Q⁻¹ misleads the pivots: block pivoting from the set that they have reached."""
+    sets = ContactSets(ready.problem.Q, load.p, ready.G)
+    answer = solve_from(lam > 0, sets, tolerance, FINISHING_SETS)
+    details |= {"finishing_sets": answer.iterations, "kkt_residual_mm": answer.details["kkt_residual_mm"]}
+    if answer.status == "solved":
+        details.pop("cause", None)
+    else:
+        details |= {"cause": answer.details["cause"]}
+    return replace(answer, iterations=pivots, details=details)
 
 
 def _primal_slacks(ready: _Prepared, load: Load) -> Slacks:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as sla
 import scipy.sparse as sp
 from scipy.optimize import nnls
+from small import make_load, make_prepared, solve_by_nnls
 
 from problems.assembly import Assembly, LoadCase, Prepared
 from solvers.base import Answer, Form, Load, Problem
@@ -168,3 +171,18 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(Q: np.
     answer = two_contacts_of_one_node(Q, form)
     assert (answer.status, answer.lam) == ("failed", None)
     assert "definite" in answer.details["cause"]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_pivots_that_a_rough_inverse_misleads_are_finished_by_others(noise: float) -> None:
+    prepared = make_prepared(3, 40)
+    case, load = make_load(3, prepared)
+    solver = GoldfarbIdnani()
+    ready = solver.prepare(Problem(prepared, "dual"))
+    assert not isinstance(ready, Answer)
+    rough = np.random.default_rng(0).uniform(1 - noise, 1 + noise, ready.G.shape)
+    answer = solver.solve(replace(ready, G=np.asfortranarray(ready.G * (rough + rough.T) / 2)), load, 1e-10)
+    assert answer.status == "solved"
+    assert ("finishing_sets" in answer.details) is (noise > 0)
+    assert answer.lam is not None
+    np.testing.assert_allclose(answer.lam, solve_by_nnls(prepared, case)[1], atol=1e-6)
