@@ -39,7 +39,9 @@ def write(directory: Path) -> Path:
     figures = _figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
-            drawing.savefig(directory / f"{name}.png", dpi=style.DPI, bbox_inches="tight")
+            # Titles overhang narrow maps; elsewhere the second layout would only take time.
+            narrow = drawing.get_figwidth() < style.WIDTH
+            drawing.savefig(directory / f"{name}.png", dpi=style.DPI, bbox_inches="tight" if narrow else None)
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
