@@ -87,33 +87,34 @@ class GoldfarbIdnani(Solver):
         if not np.isfinite(result.u).all():
             return failed("rounding: the multipliers are no longer finite", result.pivots)
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
-        if ready.factor is not None:
-            lam = _on_support(ready, load, slacks(result.u)[0], result)
-            status, residual = checked(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
-            details["kkt_residual_mm"] = residual
-            if result.status == "iteration_limit":
-                status = result.status
-            elif status == "solved":
-                details.pop("cause", None)
-            else:
-                return _finished(ready, load, lam, tolerance, result.pivots, details)
-            return Answer(status, lam, None, result.pivots, details=details)
-        x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
-        return Answer(result.status, result.u, x, result.pivots, details=details)
+        if ready.factor is None:
+            x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
+            return Answer(result.status, result.u, x, result.pivots, details=details)
+        if result.status == "inaccurate":
+            return _finished(ready, load, result, tolerance, details)
+        lam = _on_support(ready, load, slacks(result.u)[0], result)
+        status, residual = checked(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
+        if status == "inaccurate" and result.status == "solved":
+            return _finished(ready, load, result, tolerance, details)
+        details["kkt_residual_mm"] = residual
+        status = "solved" if status == "solved" else result.status
+        return Answer(status, lam, None, result.pivots, details=details)
 
 
 def _finished(
-    ready: _Prepared, load: Load, lam: Vector, tolerance: float, pivots: int, details: dict[str, Any]
+    ready: _Prepared, load: Load, result: GiResult, tolerance: float, details: dict[str, Any]
 ) -> Answer:
     """Where the rounding of Q⁻¹ misleads the pivots: block pivoting from the set that they have reached."""
+    closed = np.ones(len(load.p), dtype=bool)
+    closed[result.active] = False
     sets = ContactSets(ready.problem.Q, load.p, ready.G)
-    answer = solve_from(lam > 0, sets, tolerance, FINISHING_SETS)
+    answer = solve_from(closed, sets, tolerance, FINISHING_SETS)
     details |= {"finishing_sets": answer.iterations, "kkt_residual_mm": answer.details["kkt_residual_mm"]}
     if answer.status == "solved":
         details.pop("cause", None)
     else:
         details |= {"cause": answer.details["cause"]}
-    return replace(answer, iterations=pivots, details=details)
+    return replace(answer, iterations=result.pivots, details=details)
 
 
 def _primal_slacks(ready: _Prepared, load: Load) -> Slacks:

@@ -24,6 +24,7 @@ from .start import NoStart, Start, algorithm_4, algorithm_5
 STALLED = 10  # iterations without progress before the method gives up
 RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
 TOUCH = 0.1  # mm/N
+FEASIBLE = 1e-3  # mm/√(N·mm)
 EPS = float(np.finfo(float).eps)
 
 StartName = Literal["algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra"]
@@ -60,7 +61,8 @@ class Ipm(Solver):
     sigma : the centring of algorithm_2, in [0, 1].
     rho : of stp1 and stp2, the residual allowed as a share of λᵀy. epsilon : of stp2, its least gap, mm.
     cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
-    feasibility : mm; what inexact systems may leave in y = Qλ − p.
+    feasibility : mm; what inexact systems may leave in y = Qλ − p. By default 1e-3 √ε_μ: the error that μ
+        leaves goes with √μ as well.
     max_iterations : of the scheme, each time it begins. max_cg : of the conjugate gradients in all.
     """
 
@@ -78,7 +80,7 @@ class Ipm(Solver):
         rho: float = 0.1,
         epsilon: float = 0.01,
         cg_tolerance: float = 1e-3,
-        feasibility: float = 1e-10,
+        feasibility: float | None = None,
         max_iterations: int = 200,
         max_cg: float = np.inf,
     ) -> None:
@@ -94,7 +96,7 @@ class Ipm(Solver):
             ("rho", rho, rho > 0, "must be positive"),
             ("epsilon", epsilon, epsilon > 0, "must be positive, mm"),
             ("cg_tolerance", cg_tolerance, 0 < cg_tolerance < 1, "must lie in (0, 1)"),
-            ("feasibility", feasibility, feasibility > 0, "must be positive, mm"),
+            ("feasibility", feasibility, feasibility is None or feasibility > 0, "must be positive, mm"),
             ("max_iterations", max_iterations, max_iterations >= 1, "must be at least 1"),
             ("max_cg", max_cg, max_cg >= 1, "must be at least 1"),
         ]
@@ -171,12 +173,13 @@ class Ipm(Solver):
 
     def _iterate(self, newton: Newton, point: Point, tolerance: float) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8; the last finite point with what is to be said of it."""
+        feasibility = self.feasibility or FEASIBLE * np.sqrt(tolerance)
         smallest, stalled = np.inf, 0
         for _ in range(self.max_iterations):  # step 4
             rounding = _rounding(newton, point.lam)
             measure = max(
                 point.mu / tolerance,
-                point.infeasibility / max(self.feasibility, rounding),
+                point.infeasibility / max(feasibility, rounding),
                 _undecided(newton, point) / max(np.sqrt(TOUCH * tolerance), rounding),
             )
             if measure <= 1:

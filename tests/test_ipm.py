@@ -156,10 +156,22 @@ def test_a_contact_that_touches_without_a_force_is_not_left_standing_off(complia
     np.testing.assert_allclose(np.array([1.0, 1.0]) * compliance * answer.lam, [0.0, 1.0], atol=touch)
 
 
+def test_a_looser_tolerance_takes_fewer_iterations_and_vouches_for_less() -> None:
+    Q, p = definite(30, 9), np.random.default_rng(9).standard_normal(30)
+    counts = []
+    for tolerance in (1e-2, 1e-6, 1e-10, 1e-14):
+        answer = solved(Q, p, tolerance=tolerance)
+        assert answer.status == "solved"
+        assert answer.details["mu"] <= tolerance
+        assert answer.details["infeasibility"] <= 1e-3 * np.sqrt(tolerance)
+        counts.append(answer.iterations)
+    assert counts == sorted(set(counts))
+
+
 def test_no_feasibility_is_asked_for_below_rounding() -> None:
     Q = definite(20, 6, condition=1e3)
     p = 1e12 * np.random.default_rng(6).standard_normal(20)
-    answer = solved(Q, p, tolerance=1.0)
+    answer = solved(Q, p, tolerance=1.0, feasibility=1e-10)
     assert answer.status == "solved"
     assert answer.lam is not None
     size = abs(p).max() + abs(Q).max() * answer.lam.sum()
