@@ -12,7 +12,7 @@ from matplotlib.patches import Patch, Rectangle
 from . import style
 from .outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED
 
-ROW, COLUMN = 0.19, 0.19  # inches
+ROW, COLUMN = 0.18, 0.15  # inches
 GAP = 0.6  # between ladders, in columns
 ABROAD = 1.9  # inches beside the cells, for the names of the lines
 
@@ -77,7 +77,7 @@ def _panel(
         x += GAP
     room = (style.WIDTH - ABROAD) / COLUMN
     axes.set(xlim=(-0.6, max(x - GAP, room) - 0.4), ylim=(len(order) - 0.4, -0.6))
-    axes.set_xticks(ticks, names, rotation=90, fontsize=7)
+    axes.set_xticks(ticks, names, rotation=90, fontsize=6.5)
     axes.set_yticks(range(len(order)), order, fontsize=8)
     axes.tick_params(length=0)
     axes.grid(visible=False)

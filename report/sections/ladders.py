@@ -77,7 +77,7 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
         record |= {name: int(counts.get(name, 0)) for name in (RIGHT, DOUBTED, KNEW, LIED, NONE, UNJUDGED)}
         solved = line["status"] == "solved"
         record["worst_share"] = share[solved].max()
-        record["worst_backward_error"] = line.loc[solved, "backward_error"].max()
+        record["backward_error"] = line.loc[solved, "backward_error"].median()
         record["where"] = ", ".join(_short(line[line["outcome"] == LIED]))
         records.append(record)
     columns = [word("solver (form)", "label"), number("rungs", "rungs", whole)]
@@ -85,7 +85,7 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
     columns.append(Column("**wrong, called solved**", _bold(LIED)))
     columns += [
         number("largest error / limit of what was called solved", "worst_share", power),
-        number("largest backward error of it", "worst_backward_error", power),
+        number("median backward error of it", "backward_error", power),
     ]
     caption = (
         "*Honesty.* A wrong answer that is called solved is the worst that a solver can give. Backward "
