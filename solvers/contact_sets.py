@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import blas
 
 from problems.assembly import Matrix, Vector
 
@@ -19,7 +20,7 @@ from .bordered_factor import BorderedFactor, Set
 #: A border of more than this share of the base costs about what a factorisation of its own does.
 BORDER = 1 / 8
 #: From this share of the columns on, a product with all of the matrix is faster than one with a copy.
-COPY = 1 / 4
+COPY = 1 / 8
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class _Open(_Principal):
 
     def __init__(self, inverse: Matrix, p: Vector, compliance: Vector) -> None:
         super().__init__(inverse)
-        self.unconstrained = inverse @ p
+        self.unconstrained = product(inverse, p)
         self.compliance = compliance
 
     def at(self, C: Set) -> Trial:
@@ -119,8 +120,11 @@ def gaps(Q: Matrix, p: Vector, C: Set, lam: Vector) -> Trial:
 
 
 def product(G: Matrix, v: Vector) -> Vector:
-    """G v for a v with zeros."""
+    """G v for G symmetric, stored by columns: a triangle of it is read, or the columns where v is not zero.
+
+    Only scipy's BLAS is called: NumPy has threads of its own, which would wait in turn, spinning.
+    """
     support = np.flatnonzero(v)
     if support.size > COPY * len(v):
-        return G @ v
-    return G[:, support] @ v[support]
+        return blas.dsymv(1.0, G, v)
+    return blas.dgemv(1.0, G.T[support].T, v[support]) if support.size else np.zeros(len(v))
