@@ -11,16 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import blas
 
 from problems.assembly import Matrix, Vector
 
 from .bordered_factor import BorderedFactor, Set
+from .product import product
 
 #: A border of more than this share of the base costs about what a factorisation of its own does.
 BORDER = 1 / 8
-#: From this share of the columns on, a product with all of the matrix is faster than one with a copy.
-COPY = 1 / 8
 
 
 @dataclass(frozen=True)
@@ -117,14 +115,3 @@ def gaps(Q: Matrix, p: Vector, C: Set, lam: Vector) -> Trial:
     """The trial of λ: y = Qλ − p, and max|y_C| as its rounding."""
     y = product(Q, lam) - p
     return Trial(lam, y, float(abs(y[C]).max(initial=0.0)))
-
-
-def product(G: Matrix, v: Vector) -> Vector:
-    """G v for G symmetric, stored by columns: a triangle of it is read, or the columns where v is not zero.
-
-    Only scipy's BLAS is called: NumPy has threads of its own, which would wait in turn, spinning.
-    """
-    support = np.flatnonzero(v)
-    if support.size > COPY * len(v):
-        return blas.dsymv(1.0, G, v)
-    return blas.dgemv(1.0, G.T[support].T, v[support]) if support.size else np.zeros(len(v))

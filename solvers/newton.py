@@ -22,9 +22,10 @@ from .active_set import solve_from
 from .base import Answer, Form, Load, Problem, Solver, failed
 from .block_pivoting import block_pivoting
 from .bordered_factor import Set
-from .contact_sets import ContactSets, product
+from .contact_sets import ContactSets
 from .inverse import inverse_with_factor
 from .nested import Cells, cells_of, representatives
+from .product import product
 
 WIDTHS = (4, 2)  # of the cells, in contacts
 COARSE_PASSES = 10  # a guess need not be right

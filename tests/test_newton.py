@@ -12,10 +12,11 @@ from problems.assembly import Prepared
 from solvers.base import Load, Problem
 from solvers.block_pivoting import block_pivoting
 from solvers.bordered_factor import BorderedFactor
-from solvers.contact_sets import ContactSets, gaps, product
+from solvers.contact_sets import ContactSets, gaps
 from solvers.inverse import BLOCK, inverse_with_factor
 from solvers.nested import cells_of, representatives
 from solvers.newton import ActiveSetNewton
+from solvers.product import product
 
 
 def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:
