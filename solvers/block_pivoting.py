@@ -12,8 +12,7 @@ from problems.assembly import Vector
 from .bordered_factor import Set
 from .contact_sets import Trial
 
-FULL_EXCHANGES = 3  # without a new smallest count of wrong signs, before forces go first
-FORCES_FIRST = 50  # such passes, before single exchanges begin
+FORCES_FIRST = 50  # passes without a new smallest count of wrong signs, before single exchanges begin
 ROUNDING = 10.0  # a sign within so many times the rounding that is seen is not wrong
 
 
@@ -39,11 +38,11 @@ def block_pivoting(
 ) -> Outcome:
     """From C on, at most `passes` sets.
 
-    Each pass exchanges every wrong index. After three passes without a new smallest count of them, as
-    long as a force is negative only such contacts open, and others close once none is (as Hungerländer
-    and Rendl 2015 reach a feasible point); that ends the swings that a few forces on a stiff part cause.
-    After fifty of these only the last wrong index is exchanged, until there is a new smallest count:
-    finite for Q positive definite, in exact arithmetic (Júdice and Pires 1994).
+    Each pass exchanges every wrong index. Until there is a new smallest count of them, as long as a force
+    is negative only such contacts open, and others close once none is (as Hungerländer and Rendl 2015
+    reach a feasible point); that ends the swings that a few forces on a stiff part cause. After fifty such
+    passes only the last wrong index is exchanged, until there is a new smallest count: finite for Q
+    positive definite, in exact arithmetic (Júdice and Pires 1994).
     """
     fewest, stale, single = len(C) + 1, 0, 0
     for k in range(1, passes + 1):
@@ -53,12 +52,12 @@ def block_pivoting(
         if not count or k == passes:
             break
         fewest, stale = (count, 0) if count < fewest else (fewest, stale + 1)
-        if stale > FULL_EXCHANGES + FORCES_FIRST:
+        if stale > FORCES_FIRST:
             single += 1
             last = np.flatnonzero(wrong)[-1]
             wrong = np.zeros(len(C), dtype=bool)
             wrong[last] = True
-        elif stale > FULL_EXCHANGES and (wrong & C).any():
+        elif stale and (wrong & C).any():
             wrong &= C
         C = C ^ wrong
     return Outcome(C, trial, k, single, not count)
