@@ -10,8 +10,9 @@ import numpy as np
 from .base import Answer
 from .block_pivoting import block_pivoting, wrong_signs
 from .bordered_factor import Set
-from .contact_sets import ContactSets, Trial, product
+from .contact_sets import ContactSets, Trial
 from .kkt import checked
+from .product import product
 
 ENOUGH = 0.1  # of the tolerance: |y_C| that needs no refinement
 FINER_SETS = 30  # tried at most for signs that are wrong by less than the tolerance

@@ -12,7 +12,7 @@ from problems.assembly import Vector
 from .bordered_factor import Set
 from .contact_sets import Trial
 
-FULL_EXCHANGES = 3  # without a new smallest count of wrong signs, before single exchanges begin
+FORCES_FIRST = 50  # passes without a new smallest count of wrong signs, before single exchanges begin
 ROUNDING = 10.0  # a sign within so many times the rounding that is seen is not wrong
 
 
@@ -38,25 +38,26 @@ def block_pivoting(
 ) -> Outcome:
     """From C on, at most `passes` sets.
 
-    Each pass exchanges every wrong index. After three passes without a new smallest count of them only
-    the last one is exchanged, until there is a new one: finite for Q positive definite, in exact
-    arithmetic (Júdice and Pires 1994).
+    Each pass exchanges every wrong index. Until there is a new smallest count of them, as long as a force
+    is negative only such contacts open, and others close once none is (as Hungerländer and Rendl 2015
+    reach a feasible point); that ends the swings that a few forces on a stiff part cause. After fifty such
+    passes only the last wrong index is exchanged, until there is a new smallest count: finite for Q
+    positive definite, in exact arithmetic (Júdice and Pires 1994).
     """
-    fewest, chances, single = len(C) + 1, FULL_EXCHANGES, 0
+    fewest, stale, single = len(C) + 1, 0, 0
     for k in range(1, passes + 1):
         trial = at(C)
         wrong = wrong_signs(C, trial, compliance, tolerance)
         count = int(wrong.sum())
         if not count or k == passes:
             break
-        if count < fewest:
-            fewest, chances = count, FULL_EXCHANGES
-        elif chances:
-            chances -= 1
-        else:
+        fewest, stale = (count, 0) if count < fewest else (fewest, stale + 1)
+        if stale > FORCES_FIRST:
             single += 1
             last = np.flatnonzero(wrong)[-1]
             wrong = np.zeros(len(C), dtype=bool)
             wrong[last] = True
+        elif stale and (wrong & C).any():
+            wrong &= C
         C = C ^ wrong
     return Outcome(C, trial, k, single, not count)

@@ -15,11 +15,10 @@ import numpy as np
 from problems.assembly import Matrix, Vector
 
 from .bordered_factor import BorderedFactor, Set
+from .product import product
 
 #: A border of more than this share of the base costs about what a factorisation of its own does.
 BORDER = 1 / 8
-#: From this share of the columns on, a product with all of the matrix is faster than one with a copy.
-COPY = 1 / 4
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class _Open(_Principal):
 
     def __init__(self, inverse: Matrix, p: Vector, compliance: Vector) -> None:
         super().__init__(inverse)
-        self.unconstrained = inverse @ p
+        self.unconstrained = product(inverse, p)
         self.compliance = compliance
 
     def at(self, C: Set) -> Trial:
@@ -116,11 +115,3 @@ def gaps(Q: Matrix, p: Vector, C: Set, lam: Vector) -> Trial:
     """The trial of λ: y = Qλ − p, and max|y_C| as its rounding."""
     y = product(Q, lam) - p
     return Trial(lam, y, float(abs(y[C]).max(initial=0.0)))
-
-
-def product(G: Matrix, v: Vector) -> Vector:
-    """G v for a v with zeros."""
-    support = np.flatnonzero(v)
-    if support.size > COPY * len(v):
-        return G @ v
-    return G[:, support] @ v[support]

@@ -13,6 +13,7 @@ import numpy as np
 from problems.assembly import Matrix, Vector
 
 from .newton_system import Direct
+from .product import product
 from .start import Start
 
 
@@ -32,7 +33,7 @@ def stp2(Q: Matrix, p: Vector, rho: float, epsilon: float) -> Start:
 
 
 def _scaled(Q: Matrix, p: Vector, lam: Vector, y: Vector, rho: float) -> Start:
-    r = float(np.linalg.norm(y - (Q @ lam - p)))
+    r = float(np.linalg.norm(y - (product(Q, lam) - p)))
     gap = float(lam @ y)
     scale = max(1.0, r / (rho * gap))
     return Start(scale * lam, scale * y)

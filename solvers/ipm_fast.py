@@ -1,8 +1,8 @@
 """A primal–dual interior-point method on the dual form, made fast: each ingredient can be left out.
 
-Mehrotra's predictor–corrector (one matrix, two right-hand sides an iteration) from the start STP2; the
-Newton systems factored in single precision and refined in double; and once the iteration has told the
-closed contacts from the open ones, the exact answer on that set. Beside it stands `ipm`, the paper's.
+Mehrotra's predictor–corrector (one matrix, two right-hand sides an iteration) from the start STP2;
+the Newton systems factored in single precision and refined in double; and once the iteration has told
+most closed contacts from open ones, the exact answer from that set on. Beside it stands `ipm`, the paper's.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MAX_SETS = 1000
 STALLED = 10
 LIMIT = {"cause": f"{MAX_ITERATIONS} iterations"}
 TOLD = 1e-8  # of the μ at the start: before, a contact that looks closed may only not have moved yet
-UNDECIDED = 1 / 16  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
+UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class _Ready:
 class FastIpm(Solver):
     """Interior point with a finish on the active set.
 
-    When μ = λᵀy/m has fallen to 1e-8 of its start and at most m/16 contacts are undecided, or the
+    When μ = λᵀy/m has fallen to 1e-8 of its start and at most m/4 contacts are undecided, or the
     interior point is as good as it gets, C = {q_ii λ_i > y_i} is where `active_set.solve_from` begins,
     whose status is the answer's. As good as it gets: the natural residual max|min(q_ii λ_i, (Qλ − p)_i)|
     is at most the tolerance, in mm, or has not fallen for 10 iterations. That, too, is the end without

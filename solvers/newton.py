@@ -5,7 +5,8 @@
 For a guess C of the contact set the linear equations λ_N = 0, y_C = 0 are solved, and every index whose
 sign is wrong changes sides: Newton's method on min(λ, y) = 0 (Hintermüller, Ito and Kunisch, SIAM J.
 Optim. 13:865–888, 2002), made finite by block principal pivoting. The first guess comes from the
-answers on a sixteenth and a quarter of the contacts, whose problems have principal submatrices of Q.
+answers on a sixteenth and a quarter of the contacts, whose problems have principal submatrices of Q, or
+is all contacts that overlap, if most of the quarter are closed.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ from .active_set import solve_from
 from .base import Answer, Form, Load, Problem, Solver, failed
 from .block_pivoting import block_pivoting
 from .bordered_factor import Set
-from .contact_sets import ContactSets, product
+from .contact_sets import ContactSets
 from .inverse import inverse_with_factor
 from .nested import Cells, cells_of, representatives
+from .product import product
 
 WIDTHS = (4, 2)  # of the cells, in contacts
-COARSE_PASSES = 10  # a guess need not be right
+COARSE_PASSES = 4  # a guess need not be right
 
 
 @dataclass(frozen=True)
@@ -93,4 +95,6 @@ def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
         lam = np.zeros(len(p))
         lam[rows] = np.where(found.C, np.maximum(found.trial.lam, 0.0), 0.0)
         C = (lam > 0) | (product(Q, lam) < p)
+    if tried and 2 * found.C.sum() > len(found.C):  # sets of few open contacts take small factors of Q⁻¹
+        C = p > 0
     return C, tried

@@ -14,6 +14,7 @@ import numpy as np
 from problems.assembly import Matrix, Vector
 
 from .newton_system import NewtonSystem
+from .product import product
 
 
 class CgExhausted(Exception):
@@ -60,7 +61,7 @@ class Newton:
     unconverged: int = 0
 
     def at(self, lam: Vector, y: Vector) -> Point:
-        return Point(lam, y, y - (self.Q @ lam - self.p))
+        return Point(lam, y, y - (product(self.Q, lam) - self.p))
 
     def direction(self, point: Point, s3: Vector, kind: str) -> tuple[Vector, Vector]:
         """(Δλ, Δy) of Algorithm 2, step 1, where (14) reads (Q + D) Δλ = s1 + Λ⁻¹s3 with D = YΛ⁻¹."""
