@@ -302,12 +302,25 @@ def test_a_grid_for_paraview_covers_the_junction_of_each_part(tmp_path: Path) ->
 
 
 def test_a_vtu_file_reads_back(tmp_path: Path) -> None:
-    meshio = pytest.importorskip("meshio")
+    """By meshio, which wrote it: the grid, and each field at its node."""
+    import meshio
+
     record, found = run(tmp_path), arrays(tmp_path)
     assert write_vtu(tmp_path / "a.vtu", record, found) == "a.vtu"
     mesh = meshio.read(tmp_path / "a.vtu")
-    np.testing.assert_array_equal(mesh.point_data["displacement_mm"][:, 2], found["x"])
-    assert sum(len(block.data) for block in mesh.cells) == 80
+    np.testing.assert_array_equal(mesh.points, np.column_stack([found["nodes"], np.zeros(110)]))
+    assert [(block.type, len(block.data)) for block in mesh.cells] == [("quad", 80)]
+    names = ["displacement_mm", "part", "contact_force_N", "gap_before_mm", "gap_after_mm"]
+    assert list(mesh.point_data) == names
+    moved, part, force, before, after = (mesh.point_data[name] for name in names)
+    np.testing.assert_array_equal(moved, np.column_stack([np.zeros((110, 2)), found["x"]]))
+    np.testing.assert_array_equal(part, np.repeat([0.0, 1.0], 55))
+    # Part a meets b alone, part b meets a and the tool: the contacts of the two stand at the same nodes.
+    between, on_tool = np.split(found["lam"], 2)
+    np.testing.assert_array_equal(force, np.concatenate([between, between + on_tool]))
+    for field, name in ((before, "gap_before"), (after, "gap_after")):
+        gap, to_tool = np.split(found[name], 2)
+        np.testing.assert_array_equal(field, np.concatenate([gap, np.minimum(gap, to_tool)]))
 
 
 def test_without_meshio_the_page_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
