@@ -102,7 +102,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
         "m": data.assembly.m,
         "cond_K": data.facts.get("cond_K"),
         "qp": meets,
-        "closest_mm": float(-p.max(initial=-np.inf)),
+        "closest_mm": float(-p.max()) if p.size else None,
         "error_bound_mm": known.bound_mm,
         "route": known.route,
         **_layout(scene, data),
@@ -192,10 +192,11 @@ def _extent(nodes: Vector) -> list[float]:
 def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vector) -> Iterator[str]:
     if not meets:
         instead = f"; {solver} was not run" if solver else ""
-        yield (
-            "the quadratic program: it was not called for. The answer without contact violates no gap, "
-            f"the closest contact stays {-p.max(initial=-np.inf):.3g} mm open{instead}"
-        )
+        why = "The scene has no contact"
+        if p.size:
+            closest = f"the closest contact stays {-p.max():.3g} mm open"
+            why = f"The answer without contact violates no gap, {closest}"
+        yield f"the quadratic program: it was not called for. {why}{instead}"
     if not steps.built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
     elif not steps.condensed:

@@ -62,6 +62,8 @@ def validate(source: str, console: Console) -> None:
     console.print(
         f"The assembly {build}; an answer with its bound takes about {_time(estimate.answer_s)} more."
     )
+    if estimate.m == 0:
+        console.print("No contact: a linear solve, without a quadratic program.")
     ties = [effect for effect in scene.effects if isinstance(effect, TieEffect)]
     if ties:
         console.print("Springs join parts into larger blocks: their factors and Q are computed anew.")

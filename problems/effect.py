@@ -168,7 +168,12 @@ def pressed(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
 
 
 def unknown_pair(between: Pair | None, joint: Joint) -> Iterator[tuple[str, object, str]]:
-    if between is not None and between not in joint.pairs:
+    """What is wrong with the contact of an effect that acts on contacts."""
+    if not joint.pairs:
+        only = joint.part[0].name
+        allowed = f'needs a contact, and part {only} is alone: add a part, a rigid_tool or "tool" in contacts'
+        yield "between", between, allowed
+    elif between is not None and between not in joint.pairs:
         yield "between", list(between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
 
 

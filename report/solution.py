@@ -35,7 +35,8 @@ def write(directory: Path) -> Path:
         arrays = {name: saved[name] for name in saved.files}
     nodes, contacts = _tables(record, arrays)
     nodes.to_csv(directory / "nodes.csv", index=False)
-    contacts.to_csv(directory / "contacts.csv", index=False)
+    if record["m"]:
+        contacts.to_csv(directory / "contacts.csv", index=False)
     figures = _figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
@@ -65,7 +66,7 @@ def _tables(record: dict[str, Any], arrays: dict[str, Array]) -> tuple[pd.DataFr
     part = np.concatenate([np.repeat(p["name"], p["stop"] - p["start"]) for p in record["parts"]])
     pair = [np.repeat(" – ".join(p["pair"]), p["stop"] - p["start"]) for p in record["pairs"]]
     nodes = {"part": part} | _coordinates(arrays.get("nodes"), n) | {"displacement_mm": arrays["x"]}
-    contacts = {"contact": np.concatenate(pair)} | _coordinates(arrays.get("contact_nodes"), m)
+    contacts = {"contact": np.concatenate([[], *pair])} | _coordinates(arrays.get("contact_nodes"), m)
     contacts |= {
         "gap_before_mm": arrays["gap_before"],
         "gap_after_mm": arrays["gap_after"],
@@ -102,18 +103,18 @@ def _summary(nodes: pd.DataFrame, contacts: pd.DataFrame) -> tuple[Rows, Rows]:
 
 def _figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
     with style.applied():
-        figures = {"gap": _gap(record, arrays)}
+        figures = {"gap": _gap(record, arrays)} if record["m"] else {}
         if (arrays["lam"] > 0).any():
             figures["forces"] = _forces(record, arrays)
         return figures | {"displacement": _displacement(record, arrays)}
 
 
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
-    """Both gaps of each pair on one scale; the closed contacts outlined."""
+    """Both gaps of each pair on one scale, that of their square roots; the closed contacts outlined."""
     before, after = arrays["gap_before"], arrays["gap_after"]
     pairs = record["pairs"]
     drawing, panels = _panels(arrays["contact_nodes"], 2 * len(pairs), after_each_other=2)
-    norm = Normalize(min(0.0, float(after.min())), float(max(before.max(), after.max())) or 1.0)
+    norm = PowerNorm(0.5, 0.0, max(float(before.max()), float(after.max()), 0.0) or 1.0)
     for k, pair in enumerate(pairs):
         own = slice(pair["start"], pair["stop"])
         nodes = arrays["contact_nodes"][own]
@@ -200,6 +201,8 @@ def _mark(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
 
 def _labelled(drawing: Figure, panels: list[Axes]) -> Figure:
     panels[-1].set_xlabel("x, mm")
+    for axes in panels:
+        axes.label_outer()
     found = [axes.get_legend_handles_labels() for axes in panels]
     named = {
         label: handle for handles, labels in found for handle, label in zip(handles, labels, strict=True)

@@ -265,6 +265,17 @@ def test_damaged_files_are_named(content: bytes, name: str, tmp_path: Path) -> N
         formats.read(tmp_path / name)
 
 
+@pytest.mark.parametrize("name", ["K", "g"])
+def test_a_matrix_market_file_that_ends_early(name: str, tmp_path: Path) -> None:
+    """Sparse and array: mmread would take what is missing for zeros."""
+    files = written(tmp_path)
+    file = tmp_path / f"{name}.mtx"
+    file.write_text("\n".join(file.read_text().strip().splitlines()[:-1]))
+    with pytest.raises(InputError, match="truncated") as error:
+        import_(files, tmp_path / "out.npz", QUIET)
+    assert error.value.faults[0].where == str(file)
+
+
 def test_nastran_without_pyyeti_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 

@@ -132,7 +132,7 @@ BAD = [
     (("I = 2e3", "I = 2e3\nJ = inf"), "effect[2] (ribs).J", float("inf"), "finite"),
     (('[["a", "tool"]]', '[["a", "b"]]'), "contacts", ["a", "b"], "two different parts"),
     (('[["a", "tool"]]', '[["tool", "a"]]'), "contacts", ["tool", "a"], "two different parts"),
-    (('contacts = [["a", "tool"]]\n', ""), "contacts", [], "at least one pair"),
+    (('contacts = [["a", "tool"]]\n', ""), "effect[0] (initial_gap).between", None, "needs a contact"),
     (('[["a", "tool"]]', '[["a", "tool"], ["a", "tool"]]'), "contacts", None, "no pair twice"),
     (
         ('clamped = ["north"]', 'clamped = ["south", "north"]'),

@@ -12,11 +12,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..errors import InputError
 from . import Data, pyyeti
 
 
 def write(path: Path, data: Data) -> None:
     n, m = data["A"].shape
+    if m == 0:
+        allowed = "at least one: cards have no matrix without columns; take another format"
+        raise InputError.one(path, "contacts", m, allowed)
     points, contacts, one = _points(n), _points(m), pd.Index([1])
     frames = {
         "K": pd.DataFrame(data["K"].toarray(), index=points, columns=points),
