@@ -37,9 +37,14 @@ Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
 EXCLUDED = {
     "friction": "assumption 4: friction between the parts is neglected",
     "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
+    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
     "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
+    "large_rotation": "assumption 5: linear elasticity, so displacements and rotations are small",
     "plasticity": "assumption 5: linear elasticity",
+    "creep": "assumption 5: linear elasticity",
     "dynamics": "the answer is the minimum of a static energy, without inertia or time",
+    "vibration": "the answer is the minimum of a static energy, without inertia or time",
+    "impact": "the answer is the minimum of a static energy, without inertia or time",
 }
 
 
