@@ -28,6 +28,7 @@ from .ledger import Entry, ledger, not_called_for
 from .machine import resident_mib
 from .records import replace_text, to_line
 from .reference import Reference, reference
+from .validate import refuse_what_cannot_fit
 
 SOLVED, NOT_SOLVED = 0, 1
 ACTIVE_SET = "active set (block principal pivoting), refined"
@@ -68,6 +69,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     steps = Steps(console)
     with steps.step("reading the scene"):
         scene = read_scene(source)
+        refuse_what_cannot_fit(scene, source)
     chosen = _solver(solver) if solver else None
     with steps.step("matrices"):
         data = prepared(scene, steps.building)
