@@ -159,7 +159,7 @@ def _layout(scene: Scene, data: Prepared) -> dict[str, Any]:
         ]
         return {
             "parts": parts,
-            "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}],
+            "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else [],
             "marks": {},
         }
     joint = scene.joint
