@@ -52,7 +52,7 @@ def import_(files: list[str], out: Path, console: Console) -> None:
         name, _, path = file.rpartition("=")
         found = formats.read(Path(path))
         if name:
-            found = {name: next(iter(found.values()))}
+            found = {name: _meant(found, name, path)}
         if strange := [key for key in found if key not in formats.NAMES]:
             allowed = "K, A, f, g or nodes; say K=FILE where the file has another name"
             raise InputError([Fault(path, "matrix", key, allowed) for key in strange])
@@ -69,6 +69,13 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     finally:
         work.unlink(missing_ok=True)
     _checked(out, console)
+
+
+def _meant(found: formats.Data, name: str, path: str) -> object:
+    """The matrix that NAME=PATH asks for: the one of this name, or the only one that the file has."""
+    if name not in found and len(found) != 1:
+        raise InputError.one(path, "matrices", list(found), f"a matrix {name}, or one matrix alone")
+    return found.get(name, next(iter(found.values())))
 
 
 def _checked(out: Path, console: Console) -> None:

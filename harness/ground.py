@@ -53,6 +53,9 @@ def ground(source: str, progress: Progress = lambda text, fraction: None) -> Gro
     """Open or build a scene, by name or path, and its reference. Raises InputError."""
     scene = read_scene(source)
     data = prepared(scene, progress)
+    if data.assembly.m == 0:
+        allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
+        raise InputError.one(source, "contacts", 0, allowed)
     load = load_case(scene, data)
     progress("reference", 0.0)
     start = time.perf_counter()

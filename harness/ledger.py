@@ -16,6 +16,8 @@ from problems.joint import Joint
 from problems.prepare import load_case
 from problems.scene import Scene
 
+BALANCE = 1e-9  # a sum so small beside its terms is rounding
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -97,6 +99,13 @@ def _gap(g: Vector) -> str:
 
 
 def _forces(f: Vector, joint: Joint) -> str:
-    sums = {part.name: f[joint.unknowns(part.name)] for part in joint.part}
-    text = ", ".join(f"{name} {own.sum():+.4g} N" for name, own in sums.items() if own.any())
+    forces = {part.name: f[joint.unknowns(part.name)] for part in joint.part}
+    text = ", ".join(f"{name} {_sum(own)}" for name, own in forces.items() if own.any())
     return f"{text} on {np.count_nonzero(f)} nodes" if text else "0 N"
+
+
+def _sum(f: Vector) -> str:
+    """The sum of forces; of those in balance, how large they are."""
+    if abs(f.sum()) < BALANCE * abs(f).sum():
+        return f"±{abs(f).max():.4g} N in balance"
+    return f"{f.sum():+.4g} N"

@@ -28,6 +28,7 @@ from .ledger import Entry, ledger, not_called_for
 from .machine import resident_mib
 from .records import replace_text, to_line
 from .reference import Reference, reference
+from .validate import refuse_what_cannot_fit
 
 SOLVED, NOT_SOLVED = 0, 1
 ACTIVE_SET = "active set (block principal pivoting), refined"
@@ -68,6 +69,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     steps = Steps(console)
     with steps.step("reading the scene"):
         scene = read_scene(source)
+        refuse_what_cannot_fit(scene, source)
     chosen = _solver(solver) if solver else None
     with steps.step("matrices"):
         data = prepared(scene, steps.building)
@@ -102,7 +104,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
         "m": data.assembly.m,
         "cond_K": data.facts.get("cond_K"),
         "qp": meets,
-        "closest_mm": float(-p.max(initial=-np.inf)),
+        "closest_mm": float(-p.max()) if p.size else None,
         "error_bound_mm": known.bound_mm,
         "route": known.route,
         **_layout(scene, data),
@@ -157,7 +159,7 @@ def _layout(scene: Scene, data: Prepared) -> dict[str, Any]:
         ]
         return {
             "parts": parts,
-            "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}],
+            "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else [],
             "marks": {},
         }
     joint = scene.joint
@@ -192,10 +194,11 @@ def _extent(nodes: Vector) -> list[float]:
 def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vector) -> Iterator[str]:
     if not meets:
         instead = f"; {solver} was not run" if solver else ""
-        yield (
-            "the quadratic program: it was not called for. The answer without contact violates no gap, "
-            f"the closest contact stays {-p.max(initial=-np.inf):.3g} mm open{instead}"
-        )
+        why = "The scene has no contact"
+        if p.size:
+            closest = f"the closest contact stays {-p.max():.3g} mm open"
+            why = f"The answer without contact violates no gap, {closest}"
+        yield f"the quadratic program: it was not called for. {why}{instead}"
     if not steps.built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
     elif not steps.condensed:

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,7 +20,8 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, V
 
 from problems.errors import Fault, InputError
 from problems.ladder import PREFIX, rung_names
-from problems.scene import read_toml, scene_names, validation_faults
+from problems.scene import read_toml, scene_names
+from problems.validation import unknown, validation_faults
 from solvers.base import Form
 from solvers.registry import SOLVERS, solver_names
 
@@ -92,7 +91,7 @@ def read_suite(name_or_path: str) -> Suite:
     if path.suffix != ".toml":
         path = SUITES / f"{name_or_path}.toml"
         if not path.is_file():
-            raise InputError([unknown("SUITE", "name", name_or_path, "suite", suite_names())])
+            raise InputError.one("SUITE", "name", name_or_path, unknown("suite", name_or_path, suite_names()))
     return checked(read_toml(path), path)
 
 
@@ -114,7 +113,7 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
     try:
         suite = Suite.model_validate(data)
     except ValidationError as error:
-        faults += map(_with_known_keys, validation_faults(path, "", error))
+        faults += validation_faults(path, Suite, error)
     else:
         faults += _twice(suite, path)
     if faults:
@@ -138,24 +137,9 @@ def found_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: 
         known = rung_names() if pattern.startswith(PREFIX) else scene_names()
         names = [name for name in known if fnmatchcase(name, pattern)]
         if not names:
-            faults.append(unknown(where, key, pattern, "scene", known))
+            faults.append(Fault(where, key, pattern, unknown("scene", pattern, known)))
         found |= dict.fromkeys(names)
     return list(found) or list(map(str, patterns))
-
-
-def unknown(where: str, key: str, value: str, kind: str, known: list[str]) -> Fault:
-    """The fault of a name that is not known, with the nearest that are."""
-    near = get_close_matches(value, known, 3)
-    nearest = f"did you mean {' or '.join(near)}? " if near else ""
-    return Fault(where, key, value, f"no such {kind}; {nearest}allowed: {', '.join(known)}")
-
-
-def _with_known_keys(fault: Fault) -> Fault:
-    if fault.allowed != "unknown key":
-        return fault
-    model = SolverEntry if fault.key.startswith("solver.") else Suite
-    known = [name for name in model.model_fields if model is SolverEntry or name != "name"]
-    return replace(fault, allowed=unknown("", "", fault.key.rpartition(".")[2], "key", known).allowed)
 
 
 def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
@@ -165,7 +149,9 @@ def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
     if not set(names.values()) <= set(known):
         known += [name for name in solver_names() if name not in known]  # slow, it imports every library
     return [
-        unknown(str(path), f"solver.{k}.name", n, "solver", known) for k, n in names.items() if n not in known
+        Fault(str(path), f"solver.{k}.name", name, unknown("solver", name, known))
+        for k, name in names.items()
+        if name not in known
     ]
 
 

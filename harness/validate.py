@@ -14,6 +14,7 @@ from rich.table import Table
 from problems import cache
 from problems.build import cache_key
 from problems.effect import PartLoadEffect, TieEffect
+from problems.errors import InputError
 from problems.joint import Joint, Part
 from problems.scene import Scene, read_scene
 
@@ -49,6 +50,7 @@ def validate(source: str, console: Console) -> None:
         console.print(f"K is symmetric, its entries seem to have {digits} digits. Fine.")
         return
     joint = scene.joint
+    refuse_what_cannot_fit(scene, source)
     console.print(f"{scene.name}: {scene.title}. Fine.")
     console.print(_contents(scene, joint))
     estimate = estimated(scene, joint, speed())
@@ -62,12 +64,25 @@ def validate(source: str, console: Console) -> None:
     console.print(
         f"The assembly {build}; an answer with its bound takes about {_time(estimate.answer_s)} more."
     )
+    if estimate.m == 0:
+        console.print("No contact: a linear solve, without a quadratic program.")
     ties = [effect for effect in scene.effects if isinstance(effect, TieEffect)]
     if ties:
         console.print("Springs join parts into larger blocks: their factors and Q are computed anew.")
     beyond = [effect.kind for effect in scene.effects if isinstance(effect, PartLoadEffect)]
     if beyond:
         console.print(f"Loads beyond the junction are condensed once: {', '.join(beyond)}.")
+
+
+def refuse_what_cannot_fit(scene: Scene, source: str) -> None:
+    """Raise InputError where a scene's matrices need more memory than this machine has."""
+    if scene.joint is None:
+        return
+    need, physical = estimated(scene, scene.joint, 1.0).peak_mib, physical_memory_mib()
+    if need > physical:
+        nodes = list(scene.joint.junction.nodes)
+        allowed = f"fewer nodes: {need:.0f} MiB are needed, this machine has {physical}"
+        raise InputError.one(source, "junction.nodes", nodes, allowed)
 
 
 def estimated(scene: Scene, joint: Joint, flops_per_s: float) -> Estimate:

@@ -93,7 +93,7 @@ def _build(scene: Scene, progress: Progress) -> tuple[dict[str, Matrix], dict[st
     lap("condition")
     progress("Q = AᵀK⁻¹A", 0.0)
     Q = schur(made, factors)
-    if scene.joint is None:
+    if scene.joint is None and made.m:
         _check_independent(Q, scene)
     lap("Q")
 
@@ -210,6 +210,8 @@ def extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
 def schur(made: Assembly, factors: tuple[Matrix, ...]) -> Matrix:
     """Q = Σ A_iᵀ K_i⁻¹ A_i with K_i⁻¹ from its Cholesky factor."""
     Q = np.zeros((made.m, made.m))
+    if made.m == 0:
+        return Q
     for U, rows in zip(factors, made.slices, strict=True):
         inverse, info = lapack.dpotri(U)
         if info != 0:

@@ -21,7 +21,8 @@ def read_columns(path: Path, names: tuple[str, ...]) -> list[tuple[float, ...]]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             return _rows(path, csv.reader(file), names)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError.one(path, "file", str(error), "a readable comma-separated file") from error
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError.one(path, "file", why, "a readable comma-separated file") from error
 
 
 def _rows(path: Path, reader: Any, names: tuple[str, ...]) -> list[tuple[float, ...]]:
@@ -59,7 +60,7 @@ def in_place_of_file(data: Any, info: ValidationInfo, field: str, names: tuple[s
     if not isinstance(data, dict) or "file" not in data:
         return data
     if field in data:
-        raise ValueError(f"give either {field} or a file")
+        raise ValueError(f"give either {field} or file")
     rest = {key: value for key, value in data.items() if key != "file"}
     folder = (info.context or {}).get("folder", Path())
     return rest | {field: read_columns(folder / str(data["file"]), names)}

@@ -37,9 +37,14 @@ Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
 EXCLUDED = {
     "friction": "assumption 4: friction between the parts is neglected",
     "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
+    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
     "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
+    "large_rotation": "assumption 5: linear elasticity, so displacements and rotations are small",
     "plasticity": "assumption 5: linear elasticity",
+    "creep": "assumption 5: linear elasticity",
     "dynamics": "the answer is the minimum of a static energy, without inertia or time",
+    "vibration": "the answer is the minimum of a static energy, without inertia or time",
+    "impact": "the answer is the minimum of a static energy, without inertia or time",
 }
 
 
@@ -168,7 +173,12 @@ def pressed(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
 
 
 def unknown_pair(between: Pair | None, joint: Joint) -> Iterator[tuple[str, object, str]]:
-    if between is not None and between not in joint.pairs:
+    """What is wrong with the contact of an effect that acts on contacts."""
+    if not joint.pairs:
+        only = joint.part[0].name
+        allowed = f'needs a contact, and part {only} is alone: add a part, a rigid_tool or "tool" in contacts'
+        yield "between", between, allowed
+    elif between is not None and between not in joint.pairs:
         yield "between", list(between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
 
 

@@ -89,15 +89,18 @@ def _read_npz(path: Path) -> dict[str, Any]:
 
 def _read_mtx(path: Path, key: str) -> Any:
     try:
-        _check_length(path)
-        found = scipy.io.mmread(path)
+        found = read_mtx(path)
         return found.toarray() if sp.issparse(found) and key in "fg" else found
     except (OSError, ValueError) as error:
         raise InputError.one(path, key, str(error), "a readable Matrix Market file") from error
 
 
-def _check_length(path: Path) -> None:
-    """Raise ValueError if entries are missing, which mmread takes for zeros or dies of."""
+def read_mtx(path: Path) -> Any:
+    """A Matrix Market file, array or sparse.
+
+    Raises ValueError if entries are missing. mmread takes these for zeros or dies of them, as it does of an
+    array without entries.
+    """
     rows, columns, entries, form, _, symmetry = scipy.io.mminfo(path)
     if form == "array":
         entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
@@ -105,3 +108,4 @@ def _check_length(path: Path) -> None:
         found = sum(1 for line in file if line.strip() and not line.startswith(b"%")) - 1  # the sizes
     if found < entries:
         raise ValueError(f"truncated: {found} of {entries} entries")
+    return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))

@@ -36,7 +36,7 @@ class Positions(Table):
     @model_validator(mode="after")
     def _one_of_both(self) -> Positions:
         if bool(self.points) == bool(self.pattern):
-            raise ValueError("give either points or a pattern")
+            raise ValueError("give one of points, file and pattern")
         return self
 
     def marks(self, joint: Joint) -> Matrix:

@@ -12,25 +12,26 @@ or, for a user's own matrices, `[matrices]` with K, A, f, g (Matrix Market) or p
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from .cache import digest
-from .effect import EXCLUDED, Effect, Pair, StiffnessEffect, effect_class, effect_kinds
+from .effect import EXCLUDED, Effect, Pair, StiffnessEffect, effect_class, effect_kinds, unknown_part
 from .errors import Fault, InputError
 from .joint import Joint, Table
 from .ladder import PREFIX, Made, Rung, make_rung, rung_names
+from .validation import unknown, validation_faults
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE / "scenes"
 ASSEMBLIES = HERE / "assemblies"
+KEYS = ("title", "assembly", "joint", "effect", "matrices")
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
 
 Tables = list[tuple[Path, int, dict[str, Any]]]  # the tables of effects: file, place in it, content
@@ -134,7 +135,8 @@ def _rung_scene(name: str) -> Scene:
 
 def _no_such(name: str, known: list[str]) -> InputError:
     near = get_close_matches(name, known, 3, 0.4) or known[:5]
-    return InputError.one("scene", "name", name, f"no such scene; near it: {', '.join(near)}")
+    allowed = f"no such scene; near it: {', '.join(near)}; the path of a scene ends in .toml or .npz"
+    return InputError.one("scene", "name", name, allowed)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -147,58 +149,61 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError.one(path, "TOML", str(error), "valid TOML") from error
 
 
-def validation_faults(
-    where: object, prefix: str, error: ValidationError, units: Mapping[str, str] = MappingProxyType({})
-) -> Iterator[Fault]:
-    """pydantic's findings in our words; units of the keys that have one."""
-    items = error.errors()
-    for item in items:
-        depth = len(item["loc"])
-        if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
-            continue  # it follows from a fault inside it
-        if isinstance(cause := item.get("ctx", {}).get("error"), InputError):
-            yield from cause.faults  # of a file that the table names
-            continue
-        key = ".".join(filter(None, [prefix, *map(str, item["loc"])]))
-        value = None if item["type"] == "missing" else item["input"]
-        allowed = "unknown key" if item["type"] == "extra_forbidden" else item["msg"]
-        unit = next((units[str(part)] for part in reversed(item["loc"]) if part in units), None)
-        yield Fault(str(where), key or "file", value, f"{allowed}; in {unit}" if unit else allowed)
-
-
 def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     title = str(data.pop("title", name))
     if "matrices" in data:
         return _matrices_scene(name, title, path, data)
     faults: list[Fault] = []
-    joint_data: dict[str, Any] = data.pop("joint", {})
-    joint_path, effects = path, []
-    if "assembly" in data:
-        if joint_data:
-            faults.append(Fault(str(path), "joint", joint_data, "give either joint or assembly"))
-        joint_path = _assembly_path(path, data.pop("assembly"))
-        joint_data = read_toml(joint_path)
-        effects += _effect_tables(joint_path, joint_data, faults)
+    joint_path, joint_data = _joint_table(path, data, faults)
+    effects = _effect_tables(joint_path, joint_data, faults) if joint_path != path else []
     effects += _effect_tables(path, data, faults)
-    allowed = "unknown key; a scene has title, assembly or joint, effect, matrices"
-    faults += [Fault(str(path), key, value, allowed) for key, value in data.items()]
+    faults += [Fault(str(path), key, value, unknown("key", key, KEYS)) for key, value in data.items()]
 
     read = [_effect(where, k, table, faults) for where, k, table in effects]
     found = tuple(effect for effect in read if effect is not None)
-    joint = None
-    try:
-        joint = _with_contacts(Joint.model_validate(joint_data), found)
-        faults += [Fault(str(joint_path), *fault) for fault in joint.faults()]
-    except ValidationError as error:
-        faults += validation_faults(joint_path, "", error, UNITS)
+    joint = _joint(joint_path, joint_data, found, faults)
     if joint is not None:
         faults += _misfits(joint, effects, read)
-    if joint is not None and not faults:
-        faults += _conflicts(joint, effects, found)
-        faults += _floating(joint_path, joint, found)
+        faults += _conflicts(joint, effects, read)
+        if len(found) == len(read):
+            faults += _floating(joint_path, joint, found)
     if faults or joint is None:
         raise InputError(faults)
     return Scene(name, title, joint, found)
+
+
+def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:
+    """The table of the joint, and the file that it stands in; empty where there is none."""
+    table = data.pop("joint", None)
+    if "assembly" in data:
+        if table is not None:
+            faults.append(Fault(str(path), "joint", table, "give either joint or assembly"))
+        try:
+            found = _assembly_path(path, data.pop("assembly"))
+            return found, read_toml(found)
+        except InputError as error:
+            faults += error.faults
+            return path, {}
+    if not isinstance(table, dict) or not table:
+        allowed = "a table [joint], or assembly = the name or the path of one"
+        faults.append(Fault(str(path), "joint", table, allowed))
+        return path, {}
+    return path, table
+
+
+def _joint(
+    path: Path, table: dict[str, Any], effects: tuple[Effect, ...], faults: list[Fault]
+) -> Joint | None:
+    """The joint with the contacts that effects bring; None if its table is wrong."""
+    if not table:
+        return None
+    try:
+        joint = _with_contacts(Joint.model_validate(table), effects)
+    except ValidationError as error:
+        faults += validation_faults(path, Joint, error, units=UNITS)
+        return None
+    faults += [Fault(str(path), *fault) for fault in joint.faults()]
+    return joint
 
 
 def _with_contacts(joint: Joint, effects: tuple[Effect, ...]) -> Joint:
@@ -218,30 +223,38 @@ def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> Ta
 def _effect(where: Path, index: int, table: dict[str, Any], faults: list[Fault]) -> Effect | None:
     kind = table.get("kind")
     if kind not in effect_kinds():
-        known = f"one of {', '.join(effect_kinds())}"
-        allowed = f"the model excludes it ({EXCLUDED[kind]}); {known}" if kind in EXCLUDED else known
+        allowed = unknown("effect", kind, effect_kinds())
+        for excluded in get_close_matches(str(kind).lower(), EXCLUDED, 1, 0.75):
+            allowed = f"the model excludes {excluded} ({EXCLUDED[excluded]}); {allowed}"
         faults.append(Fault(str(where), f"effect[{index}].kind", kind, allowed))
         return None
     effect = effect_class(kind)
     try:
         return effect.model_validate(table, context={"folder": where.parent})
     except ValidationError as error:
-        faults += validation_faults(where, f"effect[{index}] ({kind})", error, UNITS | effect.units)
+        key = f"effect[{index}] ({kind})"
+        faults += validation_faults(where, effect, error, key, UNITS | effect.units)
         return None
 
 
 def _misfits(joint: Joint, tables: Tables, effects: Sequence[Effect | None]) -> Iterator[Fault]:
     """What of each effect does not fit the joint."""
-    for (where, k, _), effect in zip(tables, effects, strict=True):
+    for (where, k, table), effect in zip(tables, effects, strict=True):
+        found: Iterator[tuple[str, object, str]] = iter(())
         if effect is not None:
-            for key, value, allowed in effect.faults(joint):
-                yield Fault(str(where), f"effect[{k}] ({effect.kind}).{key}", value, allowed)
+            found = effect.faults(joint)
+        elif isinstance(part := table.get("part"), str):
+            found = unknown_part(part, joint)
+        for key, value, allowed in found:
+            yield Fault(str(where), f"effect[{k}] ({table['kind']}).{key}", value, allowed)
 
 
-def _conflicts(joint: Joint, tables: Tables, effects: tuple[Effect, ...]) -> Iterator[Fault]:
+def _conflicts(joint: Joint, tables: Tables, effects: Sequence[Effect | None]) -> Iterator[Fault]:
     """What of each effect contradicts the others."""
     for position, ((where, k, _), effect) in enumerate(zip(tables, effects, strict=True)):
-        others = (*effects[:position], *effects[position + 1 :])
+        if effect is None:
+            continue
+        others = [other for other in (*effects[:position], *effects[position + 1 :]) if other is not None]
         for key, value, allowed in effect.conflicts(others, joint):
             yield Fault(str(where), f"effect[{k}] ({effect.kind}).{key}", value, allowed)
 
@@ -249,7 +262,7 @@ def _conflicts(joint: Joint, tables: Tables, effects: tuple[Effect, ...]) -> Ite
 def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...]) -> Iterator[Fault]:
     held: dict[str, list[tuple[float, float]]] = {part.name: [] for part in joint.part}
     for effect in effects:
-        if isinstance(effect, StiffnessEffect):
+        if isinstance(effect, StiffnessEffect) and effect.part in held:
             held[effect.part] += effect.held_points
     for part in joint.part:
         points = held[part.name]

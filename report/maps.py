@@ -31,8 +31,8 @@ def draw(axes: Axes, nodes: Array, values: Array, norm: Normalize, colours: str)
     x, y, place = grid
     field = np.empty(len(x) * len(y))
     field[place] = values
-    shape = (len(y), len(x))
-    return axes.pcolormesh(x, y, field.reshape(shape), norm=norm, cmap=colours, shading="nearest")
+    cells = field.reshape(len(y), len(x))
+    return axes.pcolormesh(_edges(x), _edges(y), cells, norm=norm, cmap=colours)
 
 
 def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
@@ -49,7 +49,6 @@ def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
     return upright + level
 
 
-def _edges(centres: Array) -> Array:
-    """The borders of cells around their centres."""
-    middle = (centres[1:] + centres[:-1]) / 2
-    return np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
+def _edges(nodes: Array) -> Array:
+    """The borders of the cells that belong to nodes: half-way between them, and the ends of the grid."""
+    return np.concatenate([nodes[:1], (nodes[1:] + nodes[:-1]) / 2, nodes[-1:]])

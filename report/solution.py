@@ -5,13 +5,13 @@ Reads solution.json and solution.npz of a directory, nothing else.
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, PowerNorm
@@ -27,15 +27,18 @@ MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 STRIP, TALLEST = 7.4, 5.5  # inches: the width of a map over the whole page, the largest height of one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps below one another, all side by side
 
+Columns = dict[str, list[Any]]
+Rows = list[dict[str, Any]]
+
 
 def write(directory: Path) -> Path:
     """Write answer.md and its files into DIRECTORY and return its path."""
     record = json.loads((directory / "solution.json").read_text("utf-8"))
     with np.load(directory / "solution.npz") as saved:
         arrays = {name: saved[name] for name in saved.files}
-    nodes, contacts = _tables(record, arrays)
-    nodes.to_csv(directory / "nodes.csv", index=False)
-    contacts.to_csv(directory / "contacts.csv", index=False)
+    _write_csv(directory / "nodes.csv", _nodes(record, arrays))
+    if record["m"]:
+        _write_csv(directory / "contacts.csv", _contacts(record, arrays))
     figures = _figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
@@ -52,74 +55,90 @@ def write(directory: Path) -> Path:
     environment.filters["significant"] = significant
     path = directory / "answer.md"
     template = environment.get_template("solution.md.j2")
-    parts, pairs = _summary(nodes, contacts)
+    parts, pairs = _summary(record, arrays)
     path.write_text(
         template.render(record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu), "utf-8"
     )
     return path
 
 
-def _tables(record: dict[str, Any], arrays: dict[str, Array]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """A row a node of each part, and a row a contact of each pair."""
-    n, m = record["n"], record["m"]
-    part = np.concatenate([np.repeat(p["name"], p["stop"] - p["start"]) for p in record["parts"]])
-    pair = [np.repeat(" – ".join(p["pair"]), p["stop"] - p["start"]) for p in record["pairs"]]
-    nodes = {"part": part} | _coordinates(arrays.get("nodes"), n) | {"displacement_mm": arrays["x"]}
-    contacts = {"contact": np.concatenate(pair)} | _coordinates(arrays.get("contact_nodes"), m)
-    contacts |= {
-        "gap_before_mm": arrays["gap_before"],
-        "gap_after_mm": arrays["gap_after"],
-        "force_N": arrays["lam"],
+def _nodes(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
+    """A row a node of each part."""
+    names = [part["name"] for part in record["parts"] for _ in range(part["start"], part["stop"])]
+    columns = {"part": names} | _coordinates(arrays.get("nodes"), record["n"])
+    return columns | {"displacement_mm": arrays["x"].tolist()}
+
+
+def _contacts(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
+    """A row a contact of each pair."""
+    names = [_name(pair) for pair in record["pairs"] for _ in range(pair["start"], pair["stop"])]
+    columns = {"contact": names} | _coordinates(arrays.get("contact_nodes"), record["m"])
+    return columns | {
+        "gap_before_mm": arrays["gap_before"].tolist(),
+        "gap_after_mm": arrays["gap_after"].tolist(),
+        "force_N": arrays["lam"].tolist(),
     }
-    return pd.DataFrame(nodes), pd.DataFrame(contacts)
 
 
-def _coordinates(nodes: Array | None, size: int) -> dict[str, Any]:
-    return {"index": np.arange(size)} if nodes is None else {"x_mm": nodes[:, 0], "y_mm": nodes[:, 1]}
+def _coordinates(nodes: Array | None, size: int) -> Columns:
+    if nodes is None:
+        return {"index": list(range(size))}
+    return {"x_mm": nodes[:, 0].tolist(), "y_mm": nodes[:, 1].tolist()}
 
 
-Rows = list[dict[str, Any]]
+def _write_csv(path: Path, columns: Columns) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
 
 
-def _summary(nodes: pd.DataFrame, contacts: pd.DataFrame) -> tuple[Rows, Rows]:
-    parts = [
-        {"name": name, "lowest": own.min(), "highest": own.max()}
-        for name, own in nodes.groupby("part", sort=False)["displacement_mm"]
-    ]
-    pairs = [
-        {
-            "name": name,
-            "before": (own["gap_before_mm"].min(), own["gap_before_mm"].max()),
-            "after": (own["gap_after_mm"].min(), own["gap_after_mm"].max()),
-            "closed": int((own["force_N"] > 0).sum()),
-            "of": len(own),
-            "force": own["force_N"].sum(),
-        }
-        for name, own in contacts.groupby("contact", sort=False)
-    ]
+def _name(pair: dict[str, Any]) -> str:
+    return " – ".join(pair["pair"])
+
+
+def _summary(record: dict[str, Any], arrays: dict[str, Array]) -> tuple[Rows, Rows]:
+    """What the page says of each part, and of each pair."""
+    parts, pairs = [], []
+    for part in record["parts"]:
+        x = arrays["x"][part["start"] : part["stop"]]
+        parts.append({"name": part["name"], "lowest": x.min(), "highest": x.max()})
+    for pair in record["pairs"]:
+        own = slice(pair["start"], pair["stop"])
+        before, after, force = (arrays[name][own] for name in ("gap_before", "gap_after", "lam"))
+        pairs.append(
+            {
+                "name": _name(pair),
+                "before": (before.min(), before.max()),
+                "after": (after.min(), after.max()),
+                "closed": int((force > 0).sum()),
+                "of": len(force),
+                "force": np.nansum(force),
+            }
+        )
     return parts, pairs
 
 
 def _figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
     with style.applied():
-        figures = {"gap": _gap(record, arrays)}
+        figures = {"gap": _gap(record, arrays)} if record["m"] else {}
         if (arrays["lam"] > 0).any():
             figures["forces"] = _forces(record, arrays)
         return figures | {"displacement": _displacement(record, arrays)}
 
 
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
-    """Both gaps of each pair on one scale; the closed contacts outlined."""
+    """Both gaps of each pair on one scale, that of their square roots; the closed contacts outlined."""
     before, after = arrays["gap_before"], arrays["gap_after"]
     pairs = record["pairs"]
     drawing, panels = _panels(arrays["contact_nodes"], 2 * len(pairs), after_each_other=2)
-    norm = Normalize(min(0.0, float(after.min())), float(max(before.max(), after.max())) or 1.0)
+    norm = PowerNorm(0.5, 0.0, max(float(before.max()), float(after.max()), 0.0) or 1.0)
     for k, pair in enumerate(pairs):
         own = slice(pair["start"], pair["stop"])
         nodes = arrays["contact_nodes"][own]
         for axes, values, when in ((panels[2 * k], before, "before"), (panels[2 * k + 1], after, "after")):
             drawn = draw(axes, nodes, values[own], norm, "viridis")
-            axes.set_title(f"gap {when}: {' – '.join(pair['pair'])}")
+            axes.set_title(f"gap {when}: {_name(pair)}")
             _mark(axes, record["marks"])
         _outline(panels[2 * k + 1], nodes, arrays["lam"][own] > 0, "white")
     drawing.colorbar(drawn, ax=panels, label="gap, mm", pad=0.015, fraction=0.05)
@@ -135,7 +154,7 @@ def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         own = slice(pair["start"], pair["stop"])
         nodes, closed = arrays["contact_nodes"][own], lam[own] > 0
         drawn = draw(axes, nodes, np.where(closed, lam[own], np.nan), norm, "magma_r")
-        axes.set_title(f"contact forces: {' – '.join(pair['pair'])}")
+        axes.set_title(f"contact forces: {_name(pair)}")
         _outline(axes, nodes, closed, "#444444")
         _mark(axes, record["marks"])
     drawing.colorbar(drawn, ax=panels, label="force, N", pad=0.015, fraction=0.05)
@@ -200,6 +219,8 @@ def _mark(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
 
 def _labelled(drawing: Figure, panels: list[Axes]) -> Figure:
     panels[-1].set_xlabel("x, mm")
+    for axes in panels:
+        axes.label_outer()
     found = [axes.get_legend_handles_labels() for axes in panels]
     named = {
         label: handle for handles, labels in found for handle, label in zip(handles, labels, strict=True)

@@ -80,7 +80,7 @@ def test_pattern_spreads_evenly_up_to_the_edge() -> None:
 
 @pytest.mark.parametrize("extra", [{}, {"points": [[1.0, 1.0]], "pattern": {"columns": 1, "rows": 1}}])
 def test_fasteners_by_points_or_by_a_pattern(extra: dict[str, object]) -> None:
-    with pytest.raises(ValidationError, match="either points or a pattern"):
+    with pytest.raises(ValidationError, match="one of points, file and pattern"):
         Fasteners.model_validate({"kind": "fasteners", "preload": 1.0} | extra)
 
 

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
+from scipy.io import FortranFile
 from small import make_load, make_prepared, solve_by_nnls
 from typer.testing import CliRunner
 
@@ -38,8 +39,6 @@ def files_of(form: str, path: Path) -> list[str]:
 
 def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """K, A, f, g of the scene, and the same after export and import."""
-    if form in ("op4", "dmig"):
-        pytest.importorskip("pyyeti")
     export(SCENE, form, folder / PATHS[form], QUIET)
     import_(files_of(form, folder / PATHS[form]), folder / "back.npz", QUIET)
     scene = read_scene(SCENE)
@@ -67,6 +66,73 @@ def test_dmig_keeps_ten_digits(tmp_path: Path) -> None:
     np.testing.assert_allclose(found["g"], wanted["g"], rtol=1e-9)
 
 
+def test_dmig_cards_by_their_columns(tmp_path: Path) -> None:
+    """Large-field cards: after 8 columns a point, its component and the number, 16 columns
+    each, ten digits; of the symmetric K one triangle."""
+    data = matrices(*small())
+    formats.write("dmig", tmp_path / "p.pch", data)
+    found: dict[str, dict[tuple[int, int], float]] = {}
+    for line in (tmp_path / "p.pch").read_text().splitlines():
+        if line.startswith("DMIG*"):
+            name, column = line[8:24].strip(), int(line[24:40])
+        elif line.startswith("*"):
+            value = float(line[40:56].replace("D", "E"))
+            found.setdefault(name, {})[int(line[8:24]) - 1, column - 1] = value
+    wanted = {"K": sp.tril(data["K"]), "A": data["A"], "F": data["f"][:, None], "G": data["g"][:, None]}
+    for name, matrix in wanted.items():
+        dense = matrix.toarray() if sp.issparse(matrix) else matrix
+        read = np.zeros(dense.shape)
+        for at, value in found[name].items():
+            read[at] = value
+        np.testing.assert_array_equal(read, rounded(dense, 10))
+
+
+def test_op4_by_its_records(tmp_path: Path) -> None:
+    """Fortran records: columns, rows, form (6: symmetric), type (2: double) and name; then each column."""
+    data = matrices(*small())
+    formats.write("op4", tmp_path / "p.op4", data)
+    wanted = {"K": data["K"].toarray(), "A": data["A"].toarray(), "F": data["f"], "G": data["g"]}
+    with FortranFile(tmp_path / "p.op4") as file:
+        for name, matrix in wanted.items():
+            dense = matrix.reshape(len(matrix), -1)
+            header = file.read_record("<i4")
+            assert header[:2].tolist() == [dense.shape[1], len(dense)]
+            assert header[2:4].tolist() == [6 if name == "K" else 2, 2]
+            assert header[4:].tobytes().decode().strip() == name
+            read = np.zeros(dense.shape)
+            while (record := file.read_record("<i4"))[0] <= dense.shape[1]:
+                column, row, words = record[:3]
+                read[row - 1 : row - 1 + words // 2, column - 1] = record[3:].view("<f8")
+            np.testing.assert_array_equal(read, dense)
+
+
+def test_a_stiffness_that_nastran_calls_otherwise(tmp_path: Path) -> None:
+    """KAAX of two grid points with the component 3, written by hand."""
+    cards = [
+        "DMIG    KAAX           0       6       2       0       0               3",
+        "DMIG*   KAAX                         101               3",
+        "*                    101               3 2.500000000D+00",
+        "*                    207               3-1.250000000D-01",
+        "DMIG*   KAAX                         207               3",
+        "*                    207               3 4.000000000D+00",
+    ]
+    stiffness, others = tmp_path / "job.pch", [f"{name}={tmp_path / f'{name}.mtx'}" for name in "Afg"]
+    stiffness.write_text("\n".join(cards) + "\n")
+    K = np.array([[2.5, -0.125], [-0.125, 4.0]])
+    rest = {"A": sp.csc_array([[1.0], [0.0]]), "f": np.ones(2), "g": np.ones(1)}
+    formats.write("mtx", tmp_path, {"K": sp.csr_array(K)} | rest)
+    with pytest.raises(InputError, match="say K=FILE"):
+        import_([str(stiffness), *others], tmp_path / "out.npz", QUIET)
+    import_([f"K={stiffness}", *others], tmp_path / "out.npz", QUIET)
+    np.testing.assert_array_equal(np.load(tmp_path / "out.npz")["K"], K)
+
+
+def test_nastrans_reader_leaves_numbers_their_digits(tmp_path: Path) -> None:
+    """pyyeti sets how numpy prints when it is imported, and tables would lose their last digits."""
+    formats.write("op4", tmp_path / "p.op4", matrices(*small()))
+    assert str(np.float64(1 / 3)) == repr(1 / 3)
+
+
 def test_the_imported_problem_has_the_scenes_answer(tmp_path: Path) -> None:
     scene = read_scene("gallery/three-part-stack")
     export(scene.name, "npz", tmp_path / "stack.npz", QUIET)
@@ -80,7 +146,8 @@ def test_the_imported_problem_has_the_scenes_answer(tmp_path: Path) -> None:
 
 def test_qpsolvers_reads_its_file(tmp_path: Path) -> None:
     """And solves it: quadprog's x is the scene's."""
-    qpsolvers = pytest.importorskip("qpsolvers")
+    import qpsolvers
+
     export("gallery/sheet-over-former", "qpsolvers", tmp_path / "q.npz", QUIET)
     x = qpsolvers.solve_problem(qpsolvers.Problem.load(str(tmp_path / "q.npz")), solver="quadprog").x
     scene = read_scene("gallery/sheet-over-former")
@@ -136,6 +203,19 @@ def test_a_file_of_another_name(tmp_path: Path) -> None:
     assert dict(np.load(tmp_path / "out.npz"))["K"].shape == (12, 12)
 
 
+def test_a_name_picks_its_matrix_from_a_file_of_several(tmp_path: Path) -> None:
+    one, two = matrices(*small(3)), matrices(*small(4))
+    formats.write("npz", tmp_path / "one.npz", one)
+    formats.write("op4", tmp_path / "two.op4", two)
+    import_([str(tmp_path / "one.npz"), f"f={tmp_path / 'two.op4'}"], tmp_path / "out.npz", QUIET)
+    found = np.load(tmp_path / "out.npz")
+    np.testing.assert_array_equal(found["f"], two["f"])
+    np.testing.assert_array_equal(found["K"], one["K"].toarray())
+    np.savez(tmp_path / "none.npz", stiffness=np.eye(2), mass=np.eye(2))
+    with pytest.raises(InputError, match="a matrix K, or one matrix alone"):
+        import_([f"K={tmp_path / 'none.npz'}"], tmp_path / "out.npz", QUIET)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -183,6 +263,17 @@ def test_damaged_files_are_named(content: bytes, name: str, tmp_path: Path) -> N
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=name):
         formats.read(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["K", "g"])
+def test_a_matrix_market_file_that_ends_early(name: str, tmp_path: Path) -> None:
+    """Sparse and array: mmread would take what is missing for zeros."""
+    files = written(tmp_path)
+    file = tmp_path / f"{name}.mtx"
+    file.write_text("\n".join(file.read_text().strip().splitlines()[:-1]))
+    with pytest.raises(InputError, match="truncated") as error:
+        import_(files, tmp_path / "out.npz", QUIET)
+    assert error.value.faults[0].where == str(file)
 
 
 def test_nastran_without_pyyeti_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -49,13 +50,10 @@ TABLES = {
 }
 
 RUN = """
-import sys, numpy as np
-scene_file, out, *hidden = sys.argv[1:]
-class Hidden:
-    def find_spec(self, name, path=None, target=None):
-        if name in hidden:
-            raise ModuleNotFoundError(name)
-sys.meta_path.insert(0, Hidden())
+import os, sys, numpy as np
+import problems
+assert problems.__path__ == [os.path.join(os.getcwd(), "problems")]
+scene_file, out = sys.argv[1:]
 from problems.prepare import load_case, prepared
 from problems.scene import read_scene
 scene = read_scene(scene_file)
@@ -67,11 +65,13 @@ print(*[m for m in sys.modules if m.startswith("problems.")])
 """
 
 
-def imported(scene: Path, out: Path, cache: Path, hidden: list[str]) -> set[str]:
+def imported(scene: Path, out: Path, package: Path = ROOT) -> set[str]:
+    """The modules of `problems` in the folder `package` that building a scene into `out` imports."""
+    cache = str(out.with_suffix(""))
     done = subprocess.run(
-        [sys.executable, "-c", RUN, str(scene), str(out), *hidden],
-        cwd=ROOT,
-        env={"RIVETBENCH_CACHE": str(cache), "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"},
+        [sys.executable, "-c", RUN, str(scene), str(out)],
+        cwd=package,
+        env={"RIVETBENCH_CACHE": cache, "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,
         check=True,
@@ -93,14 +93,17 @@ def test_every_kind_has_a_smallest_scene_here() -> None:
     "kinds", [sorted(OLD), ["self_weight"], ["installed_fasteners"], ["rigid_tool", "shims"]]
 )
 def test_bits_are_the_same_without_the_other_effects_files(kinds: list[str], tmp_path: Path) -> None:
-    """Once with every module there, once with all that the scene does not name out of reach."""
+    """Once with every file there, once from a copy without the files that the scene has no need of."""
     scene = scene_of(tmp_path, *kinds)
     needs = {"self_weight": {"condensed_load", "line_loads"}, "installed_fasteners": {"ties"}}
     needed = set().union(*(needs.get(kind, set()) for kind in kinds))
-    hidden = [f"problems.effects.{kind}" for kind in effect_kinds() if kind not in kinds]
-    hidden += [f"problems.{name}" for name in {"condensed_load", "line_loads", "ties"} - needed]
-    everything = imported(scene, tmp_path / "all.npz", tmp_path / "cache1", [])
-    bare = imported(scene, tmp_path / "bare.npz", tmp_path / "cache2", hidden)
+    shutil.copytree(ROOT / "problems", tmp_path / "problems", ignore=shutil.ignore_patterns("__pycache__"))
+    for kind in set(effect_kinds()) - set(kinds):
+        (tmp_path / "problems" / "effects" / f"{kind}.py").unlink()
+    for name in {"condensed_load", "line_loads", "ties"} - needed:
+        (tmp_path / "problems" / f"{name}.py").unlink()
+    everything = imported(scene, tmp_path / "all.npz")
+    bare = imported(scene, tmp_path / "bare.npz", tmp_path)
     assert bare == everything
     assert {m.removeprefix("problems.effects.") for m in bare if m.startswith("problems.effects.")} == set(
         kinds
@@ -111,7 +114,7 @@ def test_bits_are_the_same_without_the_other_effects_files(kinds: list[str], tmp
 
 @pytest.mark.parametrize("kind", sorted(set(TABLES) - {"support_shift"}))
 def test_a_named_effect_imports_itself_alone(kind: str, tmp_path: Path) -> None:
-    found = imported(scene_of(tmp_path, kind), tmp_path / "out.npz", tmp_path / "cache", [])
+    found = imported(scene_of(tmp_path, kind), tmp_path / "out.npz")
     assert {m for m in found if m.startswith("problems.effects.")} == {f"problems.effects.{kind}"}
 
 

@@ -204,6 +204,17 @@ def test_the_ledger_names_every_effect_and_what_it_added(tmp_path: Path) -> None
     assert added["fasteners", "load"]["amount"] == "a +160 N on 2 nodes"  # through to the tool
     assert "3e+04 N, b -3e+04 N" in added["installed_fasteners", "load"]["amount"]
     assert all(entry["seconds"] > 0 for entry in record["ledger"] if entry["adds"] != "constraints")
+    vectors = [entry for entry in record["ledger"] if entry["adds"] in ("gap", "load")]
+    assert all(entry["mib"] * 2**20 > 8 * 110 for entry in vectors)  # f and g have 110 entries
+    assert added["ribs a", "stiffness"]["mib"] > 0
+    constraints = added["rigid_tool b", "constraints"]
+    assert constraints["amount"] == "55 contacts of b and tool"
+    assert constraints["seconds"] is constraints["mib"] is None
+    page = (tmp_path / "out" / "answer.md").read_text()
+    for entry in record["ledger"]:
+        assert f"| {entry['effect']} | {entry['adds']} | {entry['amount']} |" in page
+        assert entry["amount"] in record["shown"]
+    assert all(line in page for line in record["skipped"])
     (unnamed,) = (line for line in record["skipped"] if "not imported" in line)
     assert "shims" in unnamed
     assert "ribs" not in unnamed
@@ -302,12 +313,25 @@ def test_a_grid_for_paraview_covers_the_junction_of_each_part(tmp_path: Path) ->
 
 
 def test_a_vtu_file_reads_back(tmp_path: Path) -> None:
-    meshio = pytest.importorskip("meshio")
+    """By meshio, which wrote it: the grid, and each field at its node."""
+    import meshio
+
     record, found = run(tmp_path), arrays(tmp_path)
     assert write_vtu(tmp_path / "a.vtu", record, found) == "a.vtu"
     mesh = meshio.read(tmp_path / "a.vtu")
-    np.testing.assert_array_equal(mesh.point_data["displacement_mm"][:, 2], found["x"])
-    assert sum(len(block.data) for block in mesh.cells) == 80
+    np.testing.assert_array_equal(mesh.points, np.column_stack([found["nodes"], np.zeros(110)]))
+    assert [(block.type, len(block.data)) for block in mesh.cells] == [("quad", 80)]
+    names = ["displacement_mm", "part", "contact_force_N", "gap_before_mm", "gap_after_mm"]
+    assert list(mesh.point_data) == names
+    moved, part, force, before, after = (mesh.point_data[name] for name in names)
+    np.testing.assert_array_equal(moved, np.column_stack([np.zeros((110, 2)), found["x"]]))
+    np.testing.assert_array_equal(part, np.repeat([0.0, 1.0], 55))
+    # Part a meets b alone, part b meets a and the tool: the contacts of the two stand at the same nodes.
+    between, on_tool = np.split(found["lam"], 2)
+    np.testing.assert_array_equal(force, np.concatenate([between, between + on_tool]))
+    for field, name in ((before, "gap_before"), (after, "gap_after")):
+        gap, to_tool = np.split(found[name], 2)
+        np.testing.assert_array_equal(field, np.concatenate([gap, np.minimum(gap, to_tool)]))
 
 
 def test_without_meshio_the_page_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -336,6 +360,16 @@ def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
     good.write_text(APART)
     with pytest.raises(InputError, match="--out"):
         solve(str(good), None, 1e-9, tmp_path / "file", Console(file=StringIO()))
+
+
+def test_a_joint_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "large.toml").write_text(APART.replace("nodes = [11, 5]", "nodes = [2001, 2001]"))
+    for command in (["validate"], ["solve", "--out", str(tmp_path / "out")]):
+        done = CliRunner().invoke(app, [*command, str(tmp_path / "large.toml")])
+        assert done.exit_code == 2
+        (line,) = done.output.strip().splitlines()
+        assert "junction.nodes = [2001, 2001]: fewer nodes" in line
+        assert "MiB" in line
 
 
 def test_validate_says_what_will_be_built(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ class InstalledFasteners(Positions, TieEffect):
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from unknown_pair(self.between, joint)
         yield from self.misplaced(joint)
-        if not self._tied(joint):
+        if joint.pairs and not self._tied(joint):
             yield "between", self.between, "a contact of two parts; a fastener does not tie to the tool"
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:

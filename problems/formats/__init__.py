@@ -77,7 +77,8 @@ def _module(form: str) -> ModuleType:
 def pyyeti(path: Path) -> Any:
     """pyyeti.nastran, which reads and writes Nastran's files. Raises InputError where it is not installed."""
     try:
-        from pyyeti import nastran
+        with np.printoptions():  # which its import changes for good: files of text would have 12 digits
+            from pyyeti import nastran
     except ModuleNotFoundError:
         allowed = "Nastran's formats need pyyeti: pip install 'rivetbench[nastran]'"
         raise InputError([Fault(str(path), "format", path.suffix, allowed)]) from None

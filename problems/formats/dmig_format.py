@@ -12,11 +12,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..errors import InputError
 from . import Data, pyyeti
 
 
 def write(path: Path, data: Data) -> None:
     n, m = data["A"].shape
+    if m == 0:
+        allowed = "at least one: cards have no matrix without columns; take another format"
+        raise InputError.one(path, "contacts", m, allowed)
     points, contacts, one = _points(n), _points(m), pd.Index([1])
     frames = {
         "K": pd.DataFrame(data["K"].toarray(), index=points, columns=points),
@@ -29,15 +33,14 @@ def write(path: Path, data: Data) -> None:
 
 def read(path: Path) -> Data:
     found = pyyeti(path).rddmig(str(path))
-    data: Data = {}
-    if "k" in found:
-        points = found["k"].index
-        data["K"] = found["k"].to_numpy()
-        if "a" in found:
-            contacts = np.arange(1, int(found["a"].columns.max()) + 1)
-            data["A"] = found["a"].reindex(index=points, columns=contacts, fill_value=0.0).to_numpy()
-            data["g"] = _column(found.get("g"), _points(len(contacts)))
-        data["f"] = _column(found.get("f"), points)
+    if "k" not in found:  # of other names, with the rows that are there
+        return {name: frame.to_numpy() for name, frame in found.items()}
+    points = found["k"].index
+    data = {"K": found["k"].to_numpy(), "f": _column(found.get("f"), points)}
+    if "a" in found:
+        contacts = np.arange(1, int(found["a"].columns.max()) + 1)
+        data["A"] = found["a"].reindex(index=points, columns=contacts, fill_value=0.0).to_numpy()
+        data["g"] = _column(found.get("g"), _points(len(contacts)))
     return data
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import scipy.io
 import scipy.sparse as sp
 
+from ..matrices import read_mtx
 from . import Data, vector
 
 
@@ -27,7 +28,7 @@ def write_one(path: Path, matrix: object, symmetry: str) -> None:
 
 
 def read(path: Path) -> Data:
-    found = scipy.io.mmread(path)
+    found = read_mtx(path)
     if path.stem in "fg":
         found = vector(found.toarray() if sp.issparse(found) else found)
     return {path.stem: found}

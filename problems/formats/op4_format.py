@@ -15,5 +15,5 @@ def write(path: Path, data: Data) -> None:
 
 def read(path: Path) -> Data:
     found = pyyeti(path).op4.OP4().dctload(str(path), justmatrix=True)
-    data = {"K": found.get("k"), "A": found.get("a"), "f": found.get("f"), "g": found.get("g")}
-    return {name: vector(m) if name in "fg" else m for name, m in data.items() if m is not None}
+    data = {name.upper() if name in "ka" else name: matrix for name, matrix in found.items()}
+    return {name: vector(matrix) if name in "fg" else matrix for name, matrix in data.items()}

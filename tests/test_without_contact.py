@@ -1,0 +1,115 @@
+"""A part alone: a linear solve, which the record says, and no solver of quadratic programs is called."""
+
+from __future__ import annotations
+
+import json
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+from test_formats import FOLDERS, PATHS, files_of
+from typer.testing import CliRunner
+
+from harness.cli import app
+from harness.exchange import export, import_
+from harness.solve import solve
+from problems import formats
+from problems.errors import InputError
+from problems.prepare import load_case, prepared
+from problems.scene import read_scene
+
+QUIET = Console(file=StringIO())
+#: A strip of 400 × 40 mm clamped at y = 400 and pressed at y = 0; ν = 0 makes it a beam.
+SCENE = """
+[joint]
+junction = { length = 40.0, width = 100.0, nodes = [3, 6] }
+[[joint.part]]
+name = "strip"
+thickness = 4.0
+poisson = 0.0
+north = { length = 300.0, elements = 6 }
+clamped = ["north"]
+[[effect]]
+kind = "pressure"
+part = "strip"
+value = 1e-3
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "strip.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def answered(path: Path, out: Path, solver: str | None = None) -> dict[str, Any]:
+    assert solve(str(path), solver, 1e-9, out, QUIET) == 0
+    with np.load(out / "solution.npz") as arrays:
+        return json.loads((out / "solution.json").read_text()) | dict(arrays)
+
+
+def test_a_part_alone_is_a_linear_solve(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solvers.with_piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
+    monkeypatch.setattr("problems.build.lapack.dpotri", lambda *_: pytest.fail("K was inverted for Q"))
+    found = answered(path, path.parent / "out", solver="piqp")
+    assert (found["n"], found["m"], found["qp"]) == (18, 0, False)
+    assert found["method"].startswith("linear solve")
+    assert found["error_bound_mm"] < 1e-15
+    said = "the quadratic program: it was not called for. The scene has no contact; piqp was not run"
+    assert said in found["skipped"]
+    # A cantilever of length L under q on its last c mm: the work of the load is Σ fᵀx = ∫ M²/EI.
+    q, c, L, EI = 1e-3 * 40.0, 100.0, 400.0, 70e3 * 40.0 * 4.0**3 / 12
+    work = (q**2 * c**5 / 20 + (q * c) ** 2 * ((L - c / 2) ** 3 - (c / 2) ** 3) / 3) / EI
+    f = load_case(read_scene(str(path)), prepared(read_scene(str(path)))).f
+    assert f @ found["x"] == pytest.approx(work, rel=2e-3)  # f stands on the nodes
+
+
+def test_its_page_has_no_contacts(path: Path) -> None:
+    out = path.parent / "out"
+    answered(path, out)
+    page = (out / "answer.md").read_text()
+    assert "No quadratic program was called for: the scene has no contact." in page
+    assert "displacement.png" in page
+    assert not any(word in page for word in ("gap.png", "gap before", "closed contacts", "contacts.csv"))
+    assert {file.name for file in out.iterdir()} == {
+        *("answer.md", "displacement.png", "nodes.csv", "solution.json", "solution.npz", "solution.vtu")
+    }
+
+
+def test_validate_says_so(path: Path) -> None:
+    done = CliRunner().invoke(app, ["validate", str(path)])
+    assert done.exit_code == 0
+    assert "No contact: a linear solve" in done.output
+
+
+def test_there_is_nothing_to_measure(path: Path) -> None:
+    out = path.parent / "run"
+    done = CliRunner().invoke(app, ["run", "--scene", str(path), "--solver", "gi", "--out", str(out)])
+    assert done.exit_code == 2
+    assert "there is no quadratic program to measure" in done.output
+
+
+@pytest.mark.parametrize("form", [form for form in formats.WRITERS if form != "dmig"])
+def test_there_and_back(form: str, path: Path) -> None:
+    """And the matrices, solved by themselves, give the same displacements."""
+    file, back = path.parent / PATHS[form], path.parent / "back.npz"
+    export(str(path), form, file, QUIET)
+    assert file.is_dir() == (form in FOLDERS)
+    import_(files_of(form, file), back, QUIET)
+    own, scene = read_scene(str(back)), read_scene(str(path))
+    wanted, found = prepared(scene), prepared(own)
+    np.testing.assert_array_equal(found.assembly.blocks[0], wanted.assembly.blocks[0])
+    np.testing.assert_array_equal(load_case(own, found).f, load_case(scene, wanted).f)
+    assert found.assembly.A.shape == (18, 0)
+    assert found.Q.shape == (0, 0)
+    x = answered(path, path.parent / "one")["x"]
+    np.testing.assert_array_equal(answered(back, path.parent / "two")["x"], x)
+
+
+def test_dmig_has_no_way_to_say_so(path: Path) -> None:
+    with pytest.raises(InputError, match="no matrix without columns"):
+        export(str(path), "dmig", path.parent / "k.pch", QUIET)
