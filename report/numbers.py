@@ -43,6 +43,12 @@ def whole(value: object) -> str:
     return MISSING if number is None else f"{number:.0f}"
 
 
+def signed(value: object) -> str:
+    """+0.18, -0.04: two decimals and always a sign."""
+    number = as_number(value)
+    return MISSING if number is None else f"{number:+.2f}"
+
+
 def as_number(value: object) -> float | None:
     """The value as a float, None where it is missing, not finite or not a number."""
     if isinstance(value, bool) or value is None:
@@ -57,6 +63,11 @@ def as_number(value: object) -> float | None:
 def listed(words: list[str]) -> str:
     """'a', 'a and b', 'a, b and c'."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+
+
+def span(least: str, most: str) -> str:
+    """'3 to 8', or '3' where both are the same."""
+    return least if least == most else f"{least} to {most}"
 
 
 def counted(number: int, word: str) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -68,25 +69,17 @@ class Results:
         """The cells of one size that were attempted (a form that a solver does not take is not)."""
         return self.cells[(self.cells["n"] == n) & (self.cells["status"] != "unsupported")]
 
-    @property
-    def tightest(self) -> pd.DataFrame:
-        """The cells that were run, at the tightest tolerance of each series: one line of a figure each."""
-        tried = self.cells[~self.cells["status"].isin(["unsupported", "not_run"])]
-        least = tried.groupby("series")["tolerance"].transform("min")
-        return tried[(tried["tolerance"] == least) | least.isna()]
-
-    def middle_scene(self, n: int) -> str | None:
-        """Of the scenes of a size, the one with the middle number of active contacts."""
-        cells = self.of_size(n)
-        scenes = cells.drop_duplicates("scene").sort_values(["active", "scene"])["scene"].tolist()
-        return scenes[len(scenes) // 2] if scenes else None
-
     def scene_arrays(self, scene: str) -> dict[str, NDArray[np.float64]] | None:
+        """The arrays of a scene's file; empty where it is damaged, None without a file or contact nodes."""
         path = self.directory / "scenes" / (scene.replace("/", "_") + ".npz")
         if not path.exists():
             return None
-        with np.load(path) as arrays:
-            return {name: arrays[name] for name in arrays.files}
+        try:
+            with np.load(path) as file:
+                arrays = {name: file[name] for name in file.files}
+        except (OSError, ValueError, BadZipFile):
+            return {}
+        return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 
     def by_machine(self) -> list[Results]:
         """Results apart for each machine, so that no table or mean can mix two of them."""

@@ -1,17 +1,20 @@
 """One look for all figures, readable in greyscale and by colour-blind readers.
 
-A solver keeps its colour and marker in every figure of every report; solid lines and filled markers
-are the dual form, dashed lines and hollow markers the primal. Colours are those of Okabe and Ito
-(2008), without their yellow.
+A solver keeps its colour and marker in every figure of every report; filled markers on solid lines are
+the dual form, hollow ones on dashed lines the primal; variants differ in dashes, size and tint. Colours
+are those of Okabe and Ito (2008), without their yellow.
 """
 
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
@@ -39,8 +42,15 @@ KNOWN = {
 }
 #: For solvers not named above: each pair differs from theirs. Open triangles are kept for unfinished runs.
 SPARE = [(color, marker) for marker in "dvH8" for color in (BLACK, GREY, ORANGE, BLUE, VERMILLION, SKY)]
-#: Marker size and tint (0: the full colour, 1: white) of a solver's first, second, … variant.
-VARIANTS = ((6.5, 0.0), (5.0, 0.45), (8.0, 0.2), (4.0, 0.6), (9.0, 0.35))
+#: Marker size, tint (0: the full colour, 1: white) and dashes of a solver's first, second, … variant: the
+#: dual form's and the primal's.
+VARIANTS: tuple[tuple[float, float, Any, Any], ...] = (
+    (6.5, 0.0, "-", (0, (4, 2))),
+    (5.0, 0.45, (0, (1, 1.2)), (0, (2, 1, 1, 1))),
+    (8.0, 0.2, (0, (7, 1.5, 1, 1.5)), (0, (6, 2, 1, 2, 1, 2))),
+    (4.0, 0.6, (0, (3, 1, 1, 1, 1, 1)), (0, (1, 3))),
+    (9.0, 0.35, (0, (10, 2)), (0, (8, 4))),
+)
 
 RC: Any = {
     "font.size": 9.0,
@@ -86,7 +96,7 @@ def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
     for (solver, form), lines in cells.groupby(["solver", "form"]):
         full, marker = looks[solver]
         for i, series in enumerate(sorted(lines["series"].unique())):
-            size, tint = VARIANTS[i % len(VARIANTS)]
+            size, tint, solid, dashed = VARIANTS[i % len(VARIANTS)]
             red, green, blue = (c + tint * (1 - c) for c in to_rgb(full))
             color = to_hex((red, green, blue))
             styles[series] = {
@@ -96,7 +106,7 @@ def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
                 "markeredgecolor": color,
                 "markerfacecolor": color if form == "dual" else "white",
                 "markeredgewidth": 1.3,
-                "linestyle": "-" if form == "dual" else (0, (4, 2)),
+                "linestyle": solid if form == "dual" else dashed,
                 "linewidth": 1.6,
             }
     return styles
@@ -110,8 +120,16 @@ def marker_only(style: dict[str, Any]) -> dict[str, Any]:
     return {**style, "linestyle": ""}
 
 
-def legend_entries(order: list[str], styles: dict[str, dict[str, Any]]) -> list[Line2D]:
-    return [Line2D([], [], label=series, **styles[series]) for series in order]
+def legend_entries(styles: dict[str, dict[str, Any]]) -> list[Line2D]:
+    return [Line2D([], [], label=series, **look) for series, look in styles.items()]
+
+
+def percent_above(axes: Axes, whole: float) -> None:
+    """A second axis above the first, in % of `whole`."""
+    there_and_back = (partial(np.multiply, 100 / whole), partial(np.multiply, whole / 100))
+    axis = axes.secondary_xaxis("top", functions=there_and_back)
+    axis.xaxis.set_major_formatter(lambda value, _: f"{value:g} %")
+    axis.tick_params(length=3, labelsize=8)
 
 
 def plain_log(axis: Axis) -> None:

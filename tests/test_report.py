@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from report import style
 from report.build import write
 from report.numbers import power, significant
 from report.rows import read
+from report.scoreboard import scoreboard
 from report.sections.accuracy import pareto
+from report.shown import drawn, left_out, middle_scenes
 from report.standings import compare, standings
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -200,6 +203,45 @@ def test_several_tolerances_and_threads_stand_in_the_label(tmp_path: Path) -> No
             "c (dual) direct",
         ),
     }
+
+
+def variants(counts: dict[str, int]) -> list[dict[str, Any]]:
+    """Rows of one solver, each variant on that many scenes."""
+    return [row(f"4386/{k:04d}", "a", variant=name) for name, most in counts.items() for k in range(most)]
+
+
+def test_of_many_variants_those_run_on_few_scenes_are_not_drawn(tmp_path: Path) -> None:
+    rows = [*variants({"": 4, "x": 3, "y": 2, "z": 1}), row("4386/0000", "b")]
+    results = read(write_rows(tmp_path / "many", rows))
+    assert set(drawn(results)["series"]) == {"a (dual)", "a (dual) x", "a (dual) y", "b (dual)"}
+    assert "Not drawn: 1 variant of a run on fewer than half of its scenes" in left_out(results)
+    text = write(tmp_path / "many").read_text("utf-8")
+    assert re.search(r"\| a \(dual\) z +\| ✓ within", text)
+    few = read(write_rows(tmp_path / "few", variants({"": 4, "x": 3, "z": 1})))
+    assert len(drawn(few)) == 8
+    assert left_out(few) == ""
+
+
+def test_a_size_of_one_scene_is_left_out_beside_sizes_of_several(tmp_path: Path) -> None:
+    of_size = {4386: [1, 2, 3], 6112: [1, 2], 11308: [7]}
+    rows = [row(f"{n}/{k:04d}", "a") for n, ks in of_size.items() for k in ks]
+    assert middle_scenes(read(write_rows(tmp_path / "many", rows))) == ["4386/0002", "6112/0002"]
+    two = [r for r in rows if r["scene"] != "4386/0003"]
+    assert middle_scenes(read(write_rows(tmp_path / "two", two))) == ["4386/0002", "6112/0002", "11308/0007"]
+
+
+def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> None:
+    rows = [row(f"{n}/{k:04d}", "a") for n, most in ((4386, 12), (6112, 7), (11308, 7)) for k in range(most)]
+    rows += [row("4386/0000", "b")]
+    results = read(write_rows(tmp_path, rows))
+    upper, lower = scoreboard(results.cells, standings(results)).axes
+    assert [[tick.get_text() for tick in axes.get_yticklabels()] for axes in (upper, lower)] == [
+        ["a (dual)", "b (dual)"],
+        ["a (dual)"],
+    ]
+    assert [len(axes.patches) for axes in (upper, lower)] == [13, 14]
+    boxes = [[t.get_window_extent() for t in axes.get_xticklabels()] for axes in (upper, lower)]
+    assert not any(a.overlaps(b) for of_axes in boxes for a, b in pairwise(of_axes))
 
 
 def test_pareto_front() -> None:

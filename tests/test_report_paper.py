@@ -204,7 +204,7 @@ def test_a_crossing_beside_a_stopped_run_is_an_interval(tmp_path: Path) -> None:
     # stopped before the other's time: nothing follows
     early = changed(rows, lambda r: gi("dual")(r) and r["active"] < 300, **late(1.5))
     pair = compared(cells_of_paper(results(tmp_path / "early", early)), 4386, "GI dual", "IPM")
-    assert str(pair) == "none: GI dual is faster from 40 to 80 % (1 scenes could not be compared)"
+    assert str(pair) == "none: GI dual is faster from 40 to 80 % (1 scene could not be compared)"
 
 
 def test_worst_cases(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from .. import style
 from ..blocks import Figure, Section
-from ..labels import in_order
 from ..rows import Results
+from ..shown import drawn, left_out, middle_scenes, styles_of
 
 PANEL = 2.9  # inches
 EXACT = 1e-16  # mm: where an error of zero is drawn
@@ -21,14 +21,15 @@ APART = 0.06  # of a panel's height: the least distance between two names in it
 
 
 def section(results: Results) -> Section | None:
-    scenes = [scene for n in results.sizes if (scene := results.middle_scene(n))]
-    cells = results.cells[results.cells["scene"].isin(scenes)]
+    scenes = middle_scenes(results)
+    cells = drawn(results)
+    cells = cells[cells["scene"].isin(scenes)]
     points = cells.dropna(subset=["load_case_s", "displacement_error_mm"])
     if points.empty:
         return None
     points = points.assign(error=points["displacement_error_mm"].clip(lower=EXACT))
     scenes = [scene for scene in scenes if scene in set(points["scene"])]
-    styles = style.line_styles(results.cells)
+    styles = styles_of(results, points)
     drawing = style.figure(PANEL * len(scenes) + 0.3)
     panels = drawing.subplots(len(scenes), 1, sharex=True, squeeze=False)[:, 0]
     limit = points["limit_mm"].max()
@@ -39,15 +40,14 @@ def section(results: Results) -> Section | None:
     for axes, scene in zip(panels, scenes, strict=True):
         _panel(axes, points[points["scene"] == scene], limit, styles)
     axes.set_xlabel("displacement error, mm (max norm)")
-    handles = style.legend_entries(in_order(points, "series"), styles)
-    drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
+    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     caption = (
         "*Seconds a load case against the displacement error that was achieved*, both of the same run, on "
         "the middle scene of each size. Down and left is better; right of the dotted line at "
         f"{results.limit} is not accurate enough. The grey staircase is the Pareto front: its corners "
         "are beaten by nothing that is both faster and more accurate. Shaded: errors below the "
         "bound on the reference's own. Points of one solver at several tolerances are joined. Runs without "
-        "an answer have no place here."
+        "an answer have no place here." + left_out(results)
     )
     return Section("Time against achieved accuracy", [Figure("time-accuracy", caption, drawing)])
 

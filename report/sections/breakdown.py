@@ -13,6 +13,7 @@ from .. import style
 from ..blocks import Figure, Section
 from ..numbers import significant
 from ..rows import TIMES, Results
+from ..shown import left_out, middle_scenes, tightest
 
 ROW = 0.2  # inches
 STEPS = {
@@ -25,9 +26,10 @@ STEPS = {
 
 
 def section(results: Results) -> Section | None:
-    cells = results.tightest
-    scenes = [scene for n in results.sizes if (scene := results.middle_scene(n))]
-    shown = [lines for scene in scenes if len(lines := _answered(cells[cells["scene"] == scene]))]
+    cells = tightest(results)
+    shown = [
+        lines for scene in middle_scenes(results) if len(lines := _answered(cells[cells["scene"] == scene]))
+    ]
     if not shown:
         return None
     heights = [0.3 + ROW * len(lines) for lines in shown]
@@ -41,7 +43,7 @@ def section(results: Results) -> Section | None:
     caption = (
         "*Where the time goes*, on the middle scene of each size, the fastest at the top; at the right, all "
         "steps together in seconds. Runs without an answer are left out. What all solvers share, the "
-        "Cholesky factor of K and Q, was built before and is not in it."
+        "Cholesky factor of K and Q, was built before and is not in it." + left_out(results)
     )
     return Section("Where the time goes", [Figure("time-steps", caption, drawing)])
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pandas as pd
 
 from ..blocks import Block, Section, Table, number, word
-from ..numbers import MISSING, as_number, power, whole
+from ..numbers import MISSING, as_number, power, signed, whole
+from ..printed import TABLE_4
 from ..rows import Results
 
-#: cond(K) by n, Table 4 of the paper.
-PAPER = {4386: 2.63e6, 6112: 1.11e7, 11308: 1.77e7}
+PRINTED = {n: cond for _, n, _, cond in TABLE_4}
 
 
 def section(results: Results) -> Section | None:
@@ -33,7 +33,7 @@ def section(results: Results) -> Section | None:
 def _assemblies(table: pd.DataFrame) -> Table:
     by_assembly = table.groupby(["n", "m", "cond_K"], as_index=False, dropna=False)
     sizes = by_assembly.agg(scenes=("scene", "count"), build_s=("build_s", "max"))
-    sizes["cond_K_paper"] = sizes["n"].map(lambda n: PAPER.get(int(n)))
+    sizes["cond_K_paper"] = sizes["n"].map(lambda n: PRINTED.get(int(n)))
     sizes["cond_K_difference_percent"] = 100 * (sizes["cond_K"] / sizes["cond_K_paper"] - 1)
     columns = [
         number("unknowns n", "n", whole),
@@ -41,7 +41,7 @@ def _assemblies(table: pd.DataFrame) -> Table:
         number("scenes", "scenes", whole),
         number("cond(K) measured", "cond_K"),
         number("cond(K), paper", "cond_K_paper"),
-        number("difference, %", "cond_K_difference_percent", _signed),
+        number("difference, %", "cond_K_difference_percent", signed),
         number("build, s", "build_s"),
     ]
     caption = "*The assemblies.* cond(K) as computed here, beside Table 4 of the paper."
@@ -63,11 +63,6 @@ def _scenes(table: pd.DataFrame) -> Table:
         "reference's own error; an answer is judged only where it is well below the limit."
     )
     return Table("scenes", caption, table[names], columns)
-
-
-def _signed(value: object) -> str:
-    number = as_number(value)
-    return MISSING if number is None else f"{number:+.2f}"
 
 
 def _percent(share: object) -> str:

@@ -10,6 +10,7 @@ from ..blocks import Block, Column, Figure, Section, Table, Text, number, word
 from ..numbers import counted, listed, power, whole
 from ..rows import Results
 from ..scoreboard import scoreboard
+from ..shown import left_out, sidelined
 from ..standings import TIE, compare, standings
 
 
@@ -18,6 +19,7 @@ def section(results: Results) -> Section | None:
     if table.empty:
         return None
     limit = results.limit
+    rare = sidelined(results)["label"]
     comparisons = [compare(results, n) for n in results.sizes]
     columns = [
         word("solver (form)", "label"),
@@ -50,9 +52,9 @@ def section(results: Results) -> Section | None:
             f"*Every solver on every scene, the best at the top.* Blue: within {limit}, seconds a load case; "
             "the darker, the nearer to the fastest of the scene (palest: 100 times as long). Hatched: "
             "outside the limit, with its error in mm. Grey: no answer, and why (not run: out of time "
-            "already on every scene of the next smaller size). Empty: not in the suite. At the right, the "
-            "number of scenes within the limit.",
-            scoreboard(results.cells, table),
+            "already on every scene of the next smaller size). Empty: not run. At the right, the "
+            "number of scenes within the limit." + left_out(results),
+            scoreboard(results.cells, table[~table["label"].isin(rare)]),
         ),
         Text("### Answers within the limit, then time"),
         Table("summary", means, table, columns),

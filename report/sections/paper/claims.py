@@ -32,6 +32,7 @@ CLAIMS: list[Claim] = [
 ]
 SHOWN_KEYS = 2
 WORDS = (CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_DECIDED, NOT_MEASURED)
+COUNTED_AS = {DEPENDS: "confirmed in part"}
 
 
 def section(results: Results) -> Section | None:
@@ -39,7 +40,7 @@ def section(results: Results) -> Section | None:
         return None
     found = verdicts(results)
     counts = Counter(word_of(verdict) for _, verdict in found)
-    summary = ", ".join(f"{counts[w]} {w}".removesuffix(" on") for w in WORDS if counts[w])
+    summary = ", ".join(f"{counts[w]} {COUNTED_AS.get(w, w)}" for w in WORDS if counts[w])
     blocks: list[Block] = [Text(f"{counted(len(found), 'claim')}: {summary}."), _table(found)]
     items = [_item(number, *pair) for number, pair in enumerate(found, start=1)]
     return Section("The paper's claims", [*blocks, Text("\n".join(items))])

@@ -2,75 +2,76 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import pandas as pd
 
-from ...numbers import power, significant
+from ...numbers import counted, power, significant
 from ...standings import geometric_mean
 from .claims_linear import is_faster, pairs
 from .crossings import BETTER, below, sizes, worst
 from .selection import method, records, timed
-from .verdict import Claim, Measured, Verdict, decided
+from .verdict import Case, Claim, Measured, Verdict, by_case, decided
 
 RIVALS = ("GI primal", "GI dual")
 AGREE_MM = 1e-7
 
 
 def _agree(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    largest, keys = 0.0, []
+    cases: list[Case] = []
+    largest = 0.0
     mine = method(measured.cells, "IPM").set_index("scene")
     for name in RIVALS:
         for row in records(method(measured.cells, name)):
             scene = row["scene"]
+            case = f"{name}, scene {scene}"
             errors = [row["displacement_error_mm"]]
             errors += [mine.loc[scene, "displacement_error_mm"]] if scene in mine.index else [None]
             if any(error is None or pd.isna(error) for error in errors):
-                outcomes[f"{name}, scene {scene}"] = None
+                cases.append(Case(case, None))
                 continue
             most, least = sum(errors), abs(errors[0] - errors[1])  # how far apart the answers can be
             holds = True if most <= AGREE_MM else False if least > AGREE_MM else None
-            outcomes[f"{name}, scene {scene}"] = holds
             largest = max(largest, most)
-            keys += [row["key"], str(mine.loc[scene, "key"])]
-    evidence = f"at most {power(largest)} mm apart on {len(keys) // 2} pairs of answers"
-    return decided(outcomes, "the scene", evidence if keys else "", keys)
+            cases.append(Case(case, holds, keys=[row["key"], str(mine.loc[scene, "key"])]))
+    both = sum(bool(case.keys) for case in cases)
+    evidence = f"at most {power(largest)} mm apart on {counted(both, 'pair')} of answers"
+    return decided(cases, "the scene", evidence if both else "")
 
 
-def _worst_below(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
+@by_case("the form and the size")
+def _worst_below(measured: Measured) -> Iterator[Case]:
     for n in sizes(measured.cells):
         mine = worst(measured.cells, n, "IPM")
+        if mine is None:
+            continue
+        yield Case("", None, f"n = {n}: IPM {mine}", [mine.key])
         for name in (*RIVALS, BETTER):
             other = worst(measured.cells, n, name)
-            if mine is None or other is None:
-                continue
-            if name != BETTER:
-                outcomes[f"{name}, n = {n}"] = below(mine, other)
-            words.append(f"n = {n}: IPM {mine}, {name} {other}")
-            keys += [mine.key, other.key]
-    return decided(outcomes, "the form and the size", "; ".join(words), keys)
+            if other is not None:
+                case = "" if name == BETTER else f"{name}, n = {n}"
+                yield Case(case, below(mine, other), f"{name} {other}", [other.key])
 
 
-def _good_when_known(measured: Measured) -> Verdict:
+@by_case("the size")
+def _good_when_known(measured: Measured) -> Iterator[Case]:
     """The better form of Goldfarb–Idnani, chosen for each scene, against the interior-point method."""
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
     for n in sizes(measured.cells):
         found = _against(measured, n, BETTER)
         if not found:
             continue
         mine, other, faster = _means(found)
-        outcomes[f"n = {n}"] = None if faster is None else not faster
         better = sum(is_faster(pair) is False for pair in found)
-        words.append(
+        words = (
             f"n = {n}: {significant(other)} s against the IPM's {significant(mine)} s (geometric means), "
             f"faster on {better} of {len(found)} scenes"
         )
-        keys += [p[k] for p in found for k in ("key_a", "key_b")]
-    return decided(outcomes, "the size", "; ".join(words), keys)
+        yield Case(f"n = {n}", None if faster is None else not faster, words, _keys(found))
+
+
+def _keys(found: list[dict[str, Any]]) -> list[str]:
+    return [pair[k] for pair in found for k in ("key_a", "key_b")]
 
 
 def _against(measured: Measured, n: int, name: str) -> list[dict[str, Any]]:
@@ -87,10 +88,9 @@ def _means(found: list[dict[str, Any]]) -> tuple[float, float, bool | None]:
     return mine, other, is_faster({"at_least_a": mine, "at_least_b": other} | cut)
 
 
-def _conclusion(measured: Measured) -> Verdict:
+@by_case("the form of Goldfarb–Idnani")
+def _conclusion(measured: Measured) -> Iterator[Case]:
     """At the largest size: geometric mean and worst case, against each form and the better of both."""
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
     for n in sizes(measured.cells)[-1:]:
         for name in (*RIVALS, BETTER):
             found = _against(measured, n, name)
@@ -99,13 +99,11 @@ def _conclusion(measured: Measured) -> Verdict:
                 continue
             mine, other, faster = _means(found)
             both = (faster, longest)
-            outcomes[name] = False if False in both else None if None in both else True
-            words.append(
+            words = (
                 f"n = {n}: IPM {significant(mine)} s, {name} {significant(other)} s (geometric means of "
                 f"{len(found)} scenes)"
             )
-            keys += [p[k] for p in found for k in ("key_a", "key_b")]
-    return decided(outcomes, "the form of Goldfarb–Idnani", "; ".join(words), keys)
+            yield Case(name, False if False in both else None if None in both else True, words, _keys(found))
 
 
 CLAIMS = [

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from ...numbers import significant, whole
 from .fit import Exponent
 from .scaling import fitted, keys
 from .selection import method
-from .verdict import Claim, Measured, Verdict, decided
+from .verdict import Case, Claim, Measured, by_case
 
 CLOSE = 0.3  # exponents this near to each other are one order
 FACTORS = {
@@ -14,6 +16,7 @@ FACTORS = {
     "iterations": "outer iterations",
     "s_per_cg": "seconds a CG iteration",
 }
+ORDERINGS = ("IPM", "IPM, open gaps last")
 RIVALS = ("GI dual", "GI primal")
 
 
@@ -22,104 +25,88 @@ def within(fit: Exponent | None, order: float) -> bool | None:
     return None if fit is None else fit.slope - 2 * fit.error <= order
 
 
-def _below_root(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words = []
-    for name in ("IPM", "IPM, open gaps last"):
+@by_case("the ordering")
+def _below_root(measured: Measured) -> Iterator[Case]:
+    for name in ORDERINGS:
         fit = fitted(measured.lines, name, "iterations")
         if fit is None:
             continue
         low, high = fit.slope - 2 * fit.error, fit.slope + 2 * fit.error
-        outcomes[name] = True if high < 0.5 else False if low > 0.5 else None
-        words.append(f"{name}: n^{fit}")
-    return decided(outcomes, "the ordering", "; ".join(words), keys(measured.lines, *outcomes))
+        holds = True if high < 0.5 else False if low > 0.5 else None
+        yield Case(name, holds, f"{name}: n^{fit}", keys(measured.lines, name))
 
 
-def _ipm_order(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words = []
-    for name in ("IPM", "IPM, open gaps last"):
+@by_case("the ordering")
+def _ipm_order(measured: Measured) -> Iterator[Case]:
+    for name in ORDERINGS:
         fit = fitted(measured.lines, name, "working_per_cg")
         if fit is None:
             continue
-        outcomes[name] = within(fit, 2.5)
         parts = [(key, fitted(measured.lines, name, key)) for key in ("working_s", "iterations", "s_per_cg")]
         factors = ", ".join(f"{FACTORS[key]} n^{part}" for key, part in parts)
-        words.append(f"{name}: working time over CG iterations a system n^{fit}; {factors}")
-    return decided(outcomes, "the ordering", "; ".join(words), keys(measured.lines, *outcomes))
+        words = f"{name}: working time over CG iterations a system n^{fit}; {factors}"
+        yield Case(name, within(fit, 2.5), words, keys(measured.lines, name))
 
 
-def _gi_order(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words = []
+@by_case("the form")
+def _gi_order(measured: Measured) -> Iterator[Case]:
     for name in RIVALS:
         fit, working = (fitted(measured.lines, name, key) for key in ("s_per_pivot", "working_s"))
         if fit is not None:
-            outcomes[name] = within(fit, 2.0)
-            words.append(f"{name}: a pivot n^{fit}, working time n^{working or '–'}")
-    return decided(outcomes, "the form", "; ".join(words), keys(measured.lines, *outcomes))
+            words = f"{name}: a pivot n^{fit}, working time n^{working or '–'}"
+            yield Case(name, within(fit, 2.0), words, keys(measured.lines, name))
 
 
-def _same_preparation(measured: Measured) -> Verdict:
+@by_case("the form")
+def _same_preparation(measured: Measured) -> Iterator[Case]:
     mine = fitted(measured.lines, "IPM", "preparation_s")
-    outcomes: dict[str, bool | None] = {}
-    words = [f"IPM: n^{mine}"]
+    yield Case("", None, f"IPM: n^{mine}", keys(measured.lines, "IPM"))
     for name in RIVALS:
         fit = fitted(measured.lines, name, "preparation_s")
         if fit and mine:
             spread = 2 * (fit.error**2 + mine.error**2) ** 0.5
-            outcomes[name] = abs(fit.slope - mine.slope) <= max(CLOSE, spread)
-            words.append(f"{name}: n^{fit}")
-    return decided(outcomes, "the form", "; ".join(words), keys(measured.lines, "IPM", *outcomes))
+            holds = abs(fit.slope - mine.slope) <= max(CLOSE, spread)
+            yield Case(name, holds, f"{name}: n^{fit}", keys(measured.lines, name))
 
 
-def _inversion_besides(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words: list[str] = []
-    used: list[str] = []
+@by_case("the form")
+def _inversion_besides(measured: Measured) -> Iterator[Case]:
     lines = measured.lines
     for name in RIVALS if len(lines) else ():
         both = lines[lines["method"] == "IPM"].merge(lines[lines["method"] == name], on="scene")
         both = both.dropna(subset=["prepare_s_x", "prepare_s_y"]).sort_values("n_x")
         if both.empty:
             continue
-        outcomes[name] = bool((both["prepare_s_y"] > both["prepare_s_x"]).all())
+        holds = bool((both["prepare_s_y"] > both["prepare_s_x"]).all())
         last = both.iloc[-1]
         mine, its = (significant(last[key]) for key in ("prepare_s_x", "prepare_s_y"))
-        words.append(f"{name}: {its} s against the IPM's {mine} s at n = {last['n_x']:.0f}")
-        used += [*both["key_x"], *both["key_y"]]
-    return decided(outcomes, "the form", "; ".join(words), used)
+        words = f"{name}: {its} s against the IPM's {mine} s at n = {last['n_x']:.0f}"
+        yield Case(name, holds, words, [*both["key_x"], *both["key_y"]])
 
 
-def _less_memory(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words, used = [], []
+@by_case("the form and the size")
+def _less_memory(measured: Measured) -> Iterator[Case]:
     mine = method(measured.cells, "IPM").dropna(subset=["working_mib"])
     for n in sorted(mine["n"].unique()):
-        largest = mine.loc[mine["n"] == n, "working_mib"].max()
-        figures = [f"IPM {whole(largest)}"]
+        of_size = mine[mine["n"] == n]
+        largest = of_size["working_mib"].max()
+        yield Case("", None, f"n = {n:.0f}: IPM {whole(largest)} MiB", of_size["key"].tolist())
         for name in RIVALS:
             rows = method(measured.cells, name).dropna(subset=["working_mib"])
             rows = rows[rows["n"] == n]
             if rows.empty:
                 continue
-            outcomes[f"{name}, n = {n:.0f}"] = bool(largest < rows["working_mib"].max())
-            figures.append(f"{name} {whole(rows['working_mib'].max())}")
-            used += rows["key"].tolist()
-        used += mine.loc[mine["n"] == n, "key"].tolist()
-        words.append(f"n = {n:.0f}: {', '.join(figures)} MiB")
-    return decided(outcomes, "the form and the size", "; ".join(words), used)
+            its = rows["working_mib"].max()
+            words = f"{name} {whole(its)} MiB"
+            yield Case(f"{name}, n = {n:.0f}", bool(largest < its), words, rows["key"].tolist())
 
 
-def _square_memory(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words = []
+@by_case("the method")
+def _square_memory(measured: Measured) -> Iterator[Case]:
     for name in ("IPM", *RIVALS):
         fit = fitted(measured.lines, name, "working_mib")
         if fit is not None:
-            outcomes[name] = within(fit, 2.0)
-            words.append(f"{name}: n^{fit}")
-    return decided(outcomes, "the method", "; ".join(words), keys(measured.lines, *outcomes))
+            yield Case(name, within(fit, 2.0), f"{name}: n^{fit}", keys(measured.lines, name))
 
 
 AT_MOST = "The fitted exponent, less two standard errors, is at most the claimed one"

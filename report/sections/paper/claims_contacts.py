@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
 import pandas as pd
 
 from ...numbers import significant
 from .crossings import at_share, sizes
 from .selection import method, timed
-from .verdict import Claim, Measured, Verdict, decided
+from .verdict import Case, Claim, Measured, by_case
 
 RIVALS = ("GI primal", "GI dual")
 CLEAR = 0.8  # rank correlation that counts as a trend
@@ -20,35 +23,33 @@ def _of_size(measured: Measured, name: str, n: int) -> pd.DataFrame:
     return rows[(rows["n"] == n) & rows["at_least"].notna()]
 
 
-def _trend(measured: Measured, name: str, sign: int) -> Verdict:
+def _trend(measured: Measured, name: str, sign: int) -> Iterator[Case]:
     """Rank correlation of the seconds with the active contacts, a size; cut runs count at their limit."""
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
     for n in sizes(measured.cells):
         rows = _of_size(measured, name, n)
         if len(rows) < FEWEST:
             continue
         rho = float(rows["active"].rank().corr(rows["at_least"].rank()))
-        outcomes[f"n = {n}"] = sign * rho >= CLEAR
         cut = f", {rows['cut'].sum()} stopped by the clock" if rows["cut"].any() else ""
-        words.append(f"n = {n}: {rho:+.2f} ({len(rows)} scenes{cut})")
-        keys += rows["key"].tolist()
-    return decided(outcomes, "the size", "; ".join(words), keys)
+        words = f"n = {n}: {rho:+.2f} ({len(rows)} scenes{cut})"
+        yield Case(f"n = {n}", sign * rho >= CLEAR, words, rows["key"].tolist())
 
 
-def _primal_grows(measured: Measured) -> Verdict:
+@by_case("the size")
+def _primal_grows(measured: Measured) -> Iterable[Case]:
     return _trend(measured, "GI primal", 1)
 
 
-def _dual_falls(measured: Measured) -> Verdict:
+@by_case("the size")
+def _dual_falls(measured: Measured) -> Iterable[Case]:
     return _trend(measured, "GI dual", -1)
 
 
-def _hardly_depends(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
+@by_case("the size")
+def _hardly_depends(measured: Measured) -> Iterator[Case]:
     for n in sizes(measured.cells):
-        spreads = {}
+        spreads: dict[str, float] = {}
+        keys: list[str] = []
         for name in ("IPM", *RIVALS):
             rows = _of_size(measured, name, n)
             if len(rows) >= FEWEST:
@@ -57,37 +58,35 @@ def _hardly_depends(measured: Measured) -> Verdict:
         if "IPM" not in spreads or len(spreads) < 2:
             continue
         others = [spread for name, spread in spreads.items() if name != "IPM"]
-        outcomes[f"n = {n}"] = bool(spreads["IPM"] <= SLIGHT and spreads["IPM"] < min(others))
-        words.append(f"n = {n}: " + ", ".join(f"{name} {s:.1f}" for name, s in spreads.items()))
-    return decided(outcomes, "the size", "; ".join(words), keys)
+        holds = spreads["IPM"] <= SLIGHT and spreads["IPM"] < min(others)
+        words = f"n = {n}: " + ", ".join(f"{name} {s:.1f}" for name, s in spreads.items())
+        yield Case(f"n = {n}", bool(holds), words, keys)
 
 
-def _half(measured: Measured, name: str) -> tuple[dict[str, bool | None], tuple[str, list[str]]]:
-    """By size, whether the interior-point method is faster at half contact; the evidence and its rows."""
-    outcomes: dict[str, bool | None] = {}
-    words: list[str] = []
-    keys: list[str] = []
+def _half(measured: Measured, name: str) -> Iterator[Case]:
+    """By size, whether the interior-point method is faster at half contact."""
     for n in sizes(measured.cells):
         mine, other = (at_share(measured.cells, n, of, 0.5) for of in ("IPM", name))
         if mine is None or other is None:
             continue
         faster = mine[0] < other[0]
-        outcomes[f"n = {n}"] = None if (mine[1] if faster else other[1]) else faster
+        holds = None if (mine[1] if faster else other[1]) else faster
         bound = "> " if other[1] else ""
-        words.append(f"n = {n}: IPM {significant(mine[0])} s, {name} {bound}{significant(other[0])} s")
-        keys += mine[2] + other[2]
-    return outcomes, ("; ".join(words), keys)
+        words = f"n = {n}: IPM {significant(mine[0])} s, {name} {bound}{significant(other[0])} s"
+        yield Case(f"n = {n}", holds, words, mine[2] + other[2])
 
 
-def _half_primal(measured: Measured) -> Verdict:
-    by_size, found = _half(measured, "GI primal")
-    return decided(by_size, "the size", *found)
+@by_case("the size")
+def _half_primal(measured: Measured) -> Iterable[Case]:
+    return _half(measured, "GI primal")
 
 
-def _half_dual(measured: Measured) -> Verdict:
+@by_case("the size")
+def _half_dual(measured: Measured) -> Iterable[Case]:
     """'For some problems': one size confirms it."""
-    by_size, found = _half(measured, "GI dual")
-    return decided({"some size": True} if True in by_size.values() else by_size, "the size", *found)
+    cases = list(_half(measured, "GI dual"))
+    some = any(case.holds for case in cases)
+    return [replace(case, holds=True) for case in cases] if some else cases
 
 
 CLAIMS = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import pandas as pd
@@ -11,42 +12,36 @@ from ...standings import TIE
 from .cg import SYSTEMS, counts
 from .selection import ipm, records, timed
 from .targets import LATE, ORDERINGS, RATIO, largest_late, ratios
-from .verdict import Claim, Measured, Verdict, decided
+from .verdict import Case, Claim, Measured, by_case
 
 HUNDREDS = 100
 
 
-def _few_instead_of_thousands(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
+@by_case("the ordering or the scene")
+def _few_instead_of_thousands(measured: Measured) -> Iterator[Case]:
     for ordering in ORDERINGS:
         for ratio in ratios(measured.cells, ordering):
             holds = None if ratio.met is None else ratio.met and ratio.none.largest >= HUNDREDS
-            outcomes[f"{ordering}, scene {ratio.scene}"] = holds
-            words.append(f"{ordering}, {ratio}, {ratio.none.largest} and {ratio.V.largest} at most a system")
-            keys += ratio.keys
-    return decided(outcomes, "the ordering or the scene", "; ".join(words), keys)
+            words = f"{ordering}, {ratio}, {ratio.none.largest} and {ratio.V.largest} at most a system"
+            yield Case(f"{ordering}, scene {ratio.scene}", holds, words, ratio.keys)
 
 
-def _few_to_the_end(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
+@by_case("the ordering or the size")
+def _few_to_the_end(measured: Measured) -> Iterator[Case]:
     for ordering, of_sizes in largest_late(measured.cells).items():
         for n, (count, scene, key) in sorted(of_sizes.items()):
-            outcomes[f"{ordering}, n = {n}"] = count <= LATE
-            words.append(f"{ordering}, n = {n}: {count} (scene {scene})")
-            keys.append(key)
-    return decided(outcomes, "the ordering or the size", "; ".join(words), keys)
+            name = f"{ordering}, n = {n}"
+            yield Case(name, count <= LATE, f"{name}: {count} (scene {scene})", [key])
 
 
-def _needs_a_preconditioner(measured: Measured) -> Verdict:
-    return _faster(measured, ["V = U + √D"], "V = I", "the scene")
+@by_case("the scene")
+def _needs_a_preconditioner(measured: Measured) -> Iterable[Case]:
+    return _faster(measured, ["V = U + √D"], "V = I")
 
 
-def _diagonal_matters(measured: Measured) -> Verdict:
+@by_case("the scene")
+def _diagonal_matters(measured: Measured) -> Iterator[Case]:
     """U alone against V: CG iterations of a solve."""
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
     V, U = (ipm(measured.cells, **SYSTEMS[name]) for name in ("V = U + √D", "U alone"))
     for scene in [s for s in U["scene"] if s in set(V["scene"])]:
         rows = [r[r["scene"] == scene].iloc[0].to_dict() for r in (V, U)]
@@ -54,31 +49,28 @@ def _diagonal_matters(measured: Measured) -> Verdict:
         if not with_d or not without:
             continue
         more = without.total > with_d.total
-        outcomes[f"scene {scene}"] = None if (without.cut and not more) or (with_d.cut and more) else more
-        bound = "≥ " if without.cut else ""
-        words.append(f"scene {scene}: U {bound}{without.total}, V {with_d.total}")
-        keys += [row["key"] for row in rows]
-    return decided(outcomes, "the scene", "; ".join(words), keys)
+        holds = None if (without.cut and not more) or (with_d.cut and more) else more
+        words = f"scene {scene}: U {'≥ ' if without.cut else ''}{without.total}, V {with_d.total}"
+        yield Case(f"scene {scene}", holds, words, [row["key"] for row in rows])
 
 
-def _better_than_splitting(measured: Measured) -> Verdict:
-    return _faster(measured, list(ORDERINGS), "splitting", "the ordering or the scene")
+@by_case("the ordering or the scene")
+def _better_than_splitting(measured: Measured) -> Iterable[Case]:
+    return _faster(measured, ORDERINGS, "splitting")
 
 
-def _iterative_beats_direct(measured: Measured) -> Verdict:
-    return _faster(measured, list(ORDERINGS), "direct Cholesky", "the ordering or the scene")
+@by_case("the ordering or the scene")
+def _iterative_beats_direct(measured: Measured) -> Iterable[Case]:
+    return _faster(measured, ORDERINGS, "direct Cholesky")
 
 
-def _faster(measured: Measured, mine: list[str], rival: str, on: str) -> Verdict:
+def _faster(measured: Measured, mine: Iterable[str], rival: str) -> Iterator[Case]:
     """Seconds a load case, by scene; less than TIE apart decides nothing."""
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
     for name in mine:
         for pair in pairs(ipm(measured.cells, **SYSTEMS[name]), ipm(measured.cells, **SYSTEMS[rival])):
-            outcomes[f"{name}, scene {pair['scene']}"] = is_faster(pair)
-            words.append(f"{name}, scene {pair['scene']}: {times_text(pair)} s with {rival}")
-            keys += [pair["key_a"], pair["key_b"]]
-    return decided(outcomes, on, "; ".join(words), keys)
+            case = f"{name}, scene {pair['scene']}"
+            words = f"{case}: {times_text(pair)} s with {rival}"
+            yield Case(case, is_faster(pair), words, [pair["key_a"], pair["key_b"]])
 
 
 def pairs(a: pd.DataFrame, b: pd.DataFrame) -> list[dict[str, Any]]:

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
-from ...numbers import as_number, power, significant, tidy_power, whole
+from ...numbers import as_number, power, significant, span, tidy_power, whole
 from ...standings import TIE
 from .claims_linear import pairs
 from .selection import figures_of, ipm, records
 from .table2 import RIVALS, STARTS, loads, no_more
-from .verdict import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_MEASURED, Claim, Measured, Verdict, decided
+from .verdict import (
+    CONFIRMED,
+    DEPENDS,
+    NOT_CONFIRMED,
+    NOT_MEASURED,
+    Case,
+    Claim,
+    Measured,
+    Verdict,
+    by_case,
+    decided,
+)
 
 LOADS = 8  # of Table 2's ten, on which Algorithm 5 is to need no more iterations
 FEW = 0.01  # of m: corrections that count as few
@@ -28,49 +39,42 @@ def _about_start(measured: Measured, start: str) -> list[tuple[str, dict[str, fl
 
 def _row_sums_positive(measured: Measured) -> Verdict:
     rows = _about_start(measured, "algorithm_5")
-    outcomes: dict[str, bool | None] = {scene: about["corrections"] == 0 for scene, about, *_ in rows}
-    evidence = f"no correction on {sum(map(bool, outcomes.values()))} of {len(outcomes)} scenes"
-    return decided(outcomes, "the scene", evidence, [key for *_, key, _ in rows])
+    cases = [Case(scene, about["corrections"] == 0, keys=[key]) for scene, about, key, _ in rows]
+    evidence = f"no correction on {sum(bool(case.holds) for case in cases)} of {len(cases)} scenes"
+    return decided(cases, "the scene", evidence)
 
 
 def _few_corrections(measured: Measured) -> Verdict:
     rows = _about_start(measured, "algorithm_5")
-    outcomes: dict[str, bool | None] = {s: about["corrections"] <= FEW * m for s, about, _, m in rows}
+    cases = [Case(s, about["corrections"] <= FEW * m, keys=[key]) for s, about, key, m in rows]
     most = max((about["corrections"] for _, about, *_ in rows), default=None)
-    evidence = f"at most {whole(most)} corrections on {len(rows)} scenes"
-    return decided(outcomes, "the scene", evidence, [key for *_, key, _ in rows])
+    return decided(cases, "the scene", f"at most {whole(most)} corrections on {len(rows)} scenes")
 
 
-def _feasible(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
+@by_case("the start")
+def _feasible(measured: Measured) -> Iterator[Case]:
     for start in ("algorithm_5", *RIVALS):
         rows = _about_start(measured, start)
         if not rows:
             continue
         worst = max(about["infeasibility_mm"] for _, about, *_ in rows)
         least = min(about["infeasibility_mm"] for _, about, *_ in rows)
-        mine = start == "algorithm_5"
-        outcomes[STARTS[start]] = worst <= FEASIBLE_MM if mine else least > FEASIBLE_MM
-        words.append(f"{STARTS[start]}: {power(least)} to {power(worst)} mm ({len(rows)} scenes)")
-        keys += [key for *_, key, _ in rows]
-    return decided(outcomes, "the start", "; ".join(words), keys)
+        holds = worst <= FEASIBLE_MM if start == "algorithm_5" else least > FEASIBLE_MM
+        words = f"{STARTS[start]}: {span(power(least), power(worst))} mm ({len(rows)} scenes)"
+        yield Case(STARTS[start], holds, words, [key for *_, key, _ in rows])
 
 
-def _same_point(measured: Measured) -> Verdict:
+@by_case("the scene")
+def _same_point(measured: Measured) -> Iterator[Case]:
     of_5 = {scene: (about, key) for scene, about, key, _ in _about_start(measured, "algorithm_5")}
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
     for scene, about, key, _ in _about_start(measured, "algorithm_4"):
         if scene not in of_5:
             continue
         other, other_key = of_5[scene]
         apart = abs(about["mu"] - other["mu"]) / abs(other["mu"])
         equal = all(about[name] == other[name] for name in ("corrections", "multiplications"))
-        outcomes[scene] = equal and apart <= SAME
-        words.append(f"scene {scene}: μ₀ {apart:.1e} apart (relative)")
-        keys += [key, other_key]
-    return decided(outcomes, "the scene", "; ".join(words), keys)
+        words = f"scene {scene}: μ₀ {power(apart, 2)} apart (relative)"
+        yield Case(scene, equal and apart <= SAME, words, [key, other_key])
 
 
 def _fewer_iterations(measured: Measured) -> Verdict:
@@ -100,9 +104,8 @@ def _strictly_fewer(line: Mapping[str, object]) -> bool:
     return mine is not None and all(other is not None and mine < other for other in others)
 
 
-def _saves_time(measured: Measured) -> Verdict:
-    outcomes: dict[str, bool | None] = {}
-    words, keys = [], []
+@by_case("the other start")
+def _saves_time(measured: Measured) -> Iterator[Case]:
     for rival in RIVALS:
         found = pairs(ipm(measured.cells), ipm(measured.cells, start=rival))
         exact = [pair for pair in found if not (pair["cut_a"] or pair["cut_b"])]
@@ -110,13 +113,12 @@ def _saves_time(measured: Measured) -> Verdict:
             continue
         mine, other = (sum(pair[name] for pair in exact) for name in ("at_least_a", "at_least_b"))
         close = max(mine, other) <= TIE * min(mine, other)
-        outcomes[f"against {STARTS[rival]}"] = None if close else mine < other
-        words.append(
+        words = (
             f"{significant(mine)} s in all against {significant(other)} s of {STARTS[rival]} "
             f"({len(exact)} scenes)"
         )
-        keys += [pair[name] for pair in exact for name in ("key_a", "key_b")]
-    return decided(outcomes, "the other start", "; ".join(words), keys)
+        keys = [pair[name] for pair in exact for name in ("key_a", "key_b")]
+        yield Case(f"against {STARTS[rival]}", None if close else mine < other, words, keys)
 
 
 CLAIMS = [

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import pandas as pd
 
+from ...numbers import counted, significant
 from .selection import METHODS, method, records, timed
 
 
@@ -50,7 +51,7 @@ class Pair:
         words = [f"at {low:.0f} % {self.faster_at_low} is faster", *map(str, self.crossings)]
         if not self.crossings:
             words = [f"none: {self.faster_at_low} is faster from {low:.0f} to {high:.0f} %"]
-        left_out = f" ({self.left_out} scenes could not be compared)" if self.left_out else ""
+        left_out = f" ({counted(self.left_out, 'scene')} could not be compared)" if self.left_out else ""
         return "; ".join(words) + left_out
 
 
@@ -103,7 +104,7 @@ class Worst:
 
     def __str__(self) -> str:
         lost = f", {self.missing} without an answer" if self.missing else ""
-        return f"{'> ' if self.cut else ''}{self.seconds:.3g} s (scene {self.scene}{lost})"
+        return f"{'> ' if self.cut else ''}{significant(self.seconds)} s (scene {self.scene}{lost})"
 
 
 BETTER = "the better of GI dual and primal"

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from zipfile import BadZipFile
-
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
-from numpy.typing import NDArray
 
 from ... import style
 from ...blocks import Block, Figure, Section, Text
+from ...maps import Array, draw
 from ...printed import TABLE_4
 from ...rows import Results
-from .. import gap_map
 from .selection import SCALING, is_paper
 
-Array = NDArray[np.float64]
 PROBLEMS = (1, 3)  # those of Figure 3
 SHARE = 0.12  # of the strip's length: the fragment that is shown
 FASTENERS = 3  # of Figure 4
@@ -36,21 +31,11 @@ def _scenes(results: Results, n: int) -> list[str]:
     return sorted(set(of_size))
 
 
-def _arrays(results: Results, scene: str) -> dict[str, Array] | None:
-    """The scene's arrays; None where its file is missing, damaged or without contact nodes."""
-    try:
-        arrays = results.scene_arrays(scene)
-    except (OSError, ValueError, BadZipFile):
-        return None
-    known = arrays is not None and arrays.get("contact_nodes") is not None
-    return arrays if known and arrays is not None and arrays["contact_nodes"].ndim == 2 else None
-
-
 def _grids(results: Results) -> Block | None:
     sizes = {problem: n for problem, n, *_ in TABLE_4}
     found = {}
     for problem in PROBLEMS:
-        arrays = (_arrays(results, scene) for scene in _scenes(results, sizes[problem]))
+        arrays = (results.scene_arrays(scene) for scene in _scenes(results, sizes[problem]))
         nodes = next((a["contact_nodes"] for a in arrays if a), None)
         if nodes is not None:
             found[problem] = nodes
@@ -76,8 +61,8 @@ def _grids(results: Results) -> Block | None:
 def _gap(results: Results) -> Block | None:
     """Problem 3 with three fasteners: the gap that is left."""
     for scene in _scenes(results, TABLE_4[-1][1]):
-        arrays = _arrays(results, scene)
-        if arrays is not None and len(arrays.get("fasteners", ())) == FASTENERS:
+        arrays = results.scene_arrays(scene)
+        if arrays and len(arrays.get("fasteners", ())) == FASTENERS:
             return _drawn(scene, arrays)
     if not _scenes(results, TABLE_4[-1][1]):
         return None
@@ -90,11 +75,10 @@ def _drawn(scene: str, arrays: dict[str, Array]) -> Figure:
     drawing = style.figure(7.6 * max(height / width, 0.07) + 1.1)
     axes = drawing.add_subplot()
     norm = Normalize(min(0.0, float(after.min())), float(max(after.max(), before.max(), 1e-12)))
-    drawn = gap_map._map(axes, nodes, after, gap_map._grid(nodes), norm, mpl.colormaps["viridis"])
+    drawn = draw(axes, nodes, after, norm, "viridis")
     look = {"markersize": 5, "markerfacecolor": "none", "markeredgecolor": style.VERMILLION}
     axes.plot(*arrays["fasteners"].T, "o", **look)  # type: ignore[arg-type]
-    axes.set(aspect="equal", xlabel="x, mm", ylabel="y, mm")
-    axes.grid(visible=False)
+    axes.set_xlabel("x, mm")
     drawing.colorbar(drawn, ax=axes, label="gap, mm", aspect=8, pad=0.015, fraction=0.05)
     least, most = before.min(), before.max()
     initial = f"constant {most:g} mm" if np.isclose(least, most) else f"{least:.2g} to {most:.2g} mm"

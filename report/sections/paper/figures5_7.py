@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from ... import style
 from ...blocks import Block, Column, Figure, Section, Table, number, word
 from ...labels import in_order
 from ...numbers import whole
 from ...rows import Results
+from .. import times
 from .crossings import BETTER, below, compared, sizes, worst
 from .looks import LOOKS
-from .selection import METHODS, cells_of_paper, is_paper, method, of_problems, records, seconds_text, timed
+from .selection import METHODS, cells_of_paper, is_paper, method, of_problems, records, seconds_text
 
 FIGURE = {4386: "5", 6112: "6", 11308: "7"}
 PAIRS = (
@@ -30,6 +27,7 @@ PAIRS = (
 )
 RIVALS = ("GI primal", "GI dual", BETTER)
 THICK = {"linewidth": 2.4, "markersize": 7.5, "markeredgewidth": 1.4}
+THIN = {"linewidth": 0.9, "markersize": 4.0, "zorder": 1.8}
 ANSWERS = {True: "yes", False: "no", None: "not decided"}
 
 
@@ -45,69 +43,37 @@ def section(results: Results) -> Section | None:
     return Section("Figures 5 to 7: time against active contacts", blocks)
 
 
-def libraries(cells: pd.DataFrame) -> pd.DataFrame:
-    """The cells of the other solvers."""
-    return cells[~cells["solver"].isin(["ipm", "gi"])]
+def _lines(cells: pd.DataFrame) -> pd.DataFrame:
+    """The cells of the paper's methods, each named in `series`, and those of the other solvers."""
+    named = [method(cells, name).assign(series=name) for name in METHODS]
+    return pd.concat([*named, cells[~cells["solver"].isin(["ipm", "gi"])]])
 
 
 def _figure(cells: pd.DataFrame, n: int) -> Figure:
-    cells = timed(cells[cells["n"] == n])
-    others = libraries(cells)
-    styles = style.line_styles(others) if len(others) else {}
+    lines = _lines(cells[cells["n"] == n])
+    others = style.line_styles(lines[~lines["series"].isin(METHODS)])
+    looks = {name: look | THICK for name, look in LOOKS.items()}
+    looks |= {series: look | THIN for series, look in others.items()}
+    styles = {series: looks[series] for series in _order(lines)}
     drawing = style.figure(4.2)
     axes = drawing.add_subplot()
-    handles = []
-    lines = [(name, method(cells, name), LOOKS[name] | THICK) for name in METHODS]
-    thin = {"linewidth": 0.9, "markersize": 4.0, "zorder": 1.8}
-    lines += [(s, others[others["series"] == s], styles[s] | thin) for s in in_order(others, "series")]
-    for name, rows, look in lines:
-        if rows.empty:
-            continue
-        known = rows[rows["load_case_s"].notna()].sort_values("active")
-        axes.plot(known["active"], known["load_case_s"], **look)
-        _marks(axes, rows, look["color"])
-        handles.append(Line2D([], [], label=name, **look))
-    axes.set(yscale="log", xlabel="active contacts", ylabel="working time, s")
-    axes.margins(x=0.05, y=0.08)
-    style.plain_log(axes.yaxis)
-    m = float(cells["m"].iloc[0])
-    to_percent = (partial(np.multiply, 100 / m), partial(np.multiply, m / 100))
-    percent = axes.secondary_xaxis("top", functions=to_percent)
-    percent.xaxis.set_major_formatter(lambda value, _: f"{value:g} %")
-    drawing.legend(handles=[*handles, *_legend(cells)], loc="outside right upper", handlelength=3.2)
+    times.panel(axes, lines, styles)
+    axes.set(xlabel="active contacts", ylabel="working time, s")
+    handles = [*style.legend_entries(styles), *times.entries(lines)]
+    drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
     caption = (
         f"*Working time against the active contacts, n = {n}*"
         + (f" (Figure {FIGURE[n]} of the paper)" if n in FIGURE else "")
         + ": seconds a load case, without data preparation; below in number, above in % of m. Thick: "
-        "the paper's methods; thin: the other solvers. Crossed out: answered, but not within the limit. "
-        "Open triangles stand at the time limit of runs that did not finish; crosses at the upper edge, runs "
-        "without an answer for another reason."
+        "the paper's methods; thin: the other solvers. " + times.MARKS.format(limit="the limit")
     )
     return Figure(f"paper-figure-{n}", caption, drawing)
 
 
-def _marks(axes: Axes, rows: pd.DataFrame, color: str) -> None:
-    outside = rows[rows["load_case_s"].notna() & (rows["verdict"] != "within")]
-    axes.plot(outside["active"], outside["load_case_s"], "x", color="black", markersize=6.5, zorder=3)
-    late = rows[rows["cut"] & rows["load_case_s"].isna()]
-    hollow: dict[str, Any] = {"color": color, "markerfacecolor": "none", "linestyle": "", "zorder": 4}
-    axes.plot(late["active"], late["at_least"], marker="^", markersize=7, **hollow)
-    lost = rows[rows["load_case_s"].isna() & ~rows["cut"]]
-    edge = axes.get_xaxis_transform()
-    axes.plot(lost["active"], [0.98] * len(lost), marker="x", markersize=6, transform=edge, **hollow)
-
-
-def _legend(cells: pd.DataFrame) -> list[Line2D]:
-    """Entries for those of the marks that occur."""
-    drawn = pd.concat([libraries(cells), *(method(cells, name) for name in METHODS)])
-    answered = drawn["load_case_s"].notna()
-    marks = [
-        (answered & (drawn["verdict"] != "within"), "not within the limit", "x", "black"),
-        (~answered & drawn["cut"], "not finished in time", "^", style.GREY),
-        (~answered & ~drawn["cut"], "no answer", "x", style.GREY),
-    ]
-    look: dict[str, Any] = {"linestyle": "", "markerfacecolor": "none"}
-    return [Line2D([], [], label=t, marker=k, color=c, **look) for present, t, k, c in marks if present.any()]
+def _order(lines: pd.DataFrame) -> list[str]:
+    """The series that occur: the paper's methods first."""
+    found = in_order(lines, "series")
+    return [name for name in METHODS if name in found] + [name for name in found if name not in METHODS]
 
 
 def _crossings(cells: pd.DataFrame, shown: list[int]) -> Table:
@@ -161,16 +127,12 @@ def _text(name: str) -> Callable[[Mapping[str, Any]], str]:
 
 def _times(cells: pd.DataFrame, n: int) -> Table:
     """A line a scene, a column a method: the figure in numbers."""
-    cells = cells[cells["n"] == n]
+    found = _lines(cells[cells["n"] == n])
     lines: dict[str, dict[str, Any]] = {}
-    others = libraries(cells)
-    named = [(name, method(cells, name)) for name in METHODS]
-    named += [(s, others[others["series"] == s]) for s in in_order(others, "series")]
-    for name, rows in named:
-        for row in records(rows):
-            start = {"scene": row["scene"], "active": row["active"], "m": row["m"]}
-            lines.setdefault(row["scene"], start)[name] = seconds_text(row)
-    names = [name for name, rows in named if len(rows)]
+    for row in records(found):
+        start = {"scene": row["scene"], "active": row["active"], "m": row["m"]}
+        lines.setdefault(row["scene"], start)[row["series"]] = seconds_text(row)
+    names = _order(found)
     table = pd.DataFrame(list(lines.values())).sort_values("active")
     table[names] = table[names].fillna("")
     columns = [word("scene", "scene"), Column("active", _active)]

@@ -143,7 +143,7 @@ def _systems(cells: pd.DataFrame) -> Table | None:
         number("outer iterations", "iterations", whole),
         word("CG iterations", "cg_text"),
         word("largest late", "late_text"),
-        word("V = I needs, times", "ratio_text"),
+        word("V = I needs, times as many", "ratio_text"),
         number("factorisations", "factorisations", whole),
         word("s a load case", "seconds"),
     ]

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from ...blocks import Column, Section, Table, Text, number, word
-from ...numbers import MISSING, as_number, counted, power, significant, tidy_power, whole
+from ...numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
 from ...printed import TABLE_2
 from ...rows import ANSWERED, Results
 from .selection import cells_of_paper, figures_of, first, ipm, is_paper, records, seconds_text
@@ -53,9 +53,7 @@ def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
 
 def no_more(line: Mapping[str, Any], suffix: str = "") -> bool | None:
     """Whether Algorithm 5 needed no more iterations than STP1 and STP2; None where a number is missing."""
-    mine, *others = [
-        as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)
-    ]
+    mine, *others = [as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)]
     if mine is None or not all(other is not None for other in others):
         return None
     return all(mine <= other for other in others if other is not None)
@@ -136,7 +134,6 @@ def _starts(cells: pd.DataFrame) -> Table:
 
 def _range(name: str, style: Callable[[object], str]) -> Callable[[Mapping[str, Any]], str]:
     def text(row: Mapping[str, Any]) -> str:
-        least, most = style(row[f"{name}_least"]), style(row[f"{name}_most"])
-        return least if least == most else f"{least} to {most}"
+        return span(style(row[f"{name}_least"]), style(row[f"{name}_most"]))
 
     return text

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from ...blocks import Section, Table, number
-from ...numbers import MISSING, as_number, whole
+from ...numbers import as_number, signed, whole
 from ...printed import TABLE_4
 from ...rows import Results
 from .selection import SCALING, is_paper, records
@@ -34,17 +34,10 @@ def section(results: Results) -> Section | None:
         number("printed ", "m_printed", whole),
         number("cond(K)", "cond_K"),
         number("printed  ", "cond_K_printed"),
-        number("difference, %", "difference_percent", _signed),
+        number("difference, %", "difference_percent", signed),
     ]
     caption = (
         "*The test problems, ours beside Table 4 of the paper.* Ours are plate models of our own with the "
         "paper's numbers of nodes and constraints; cond(K) is printed with three digits."
     )
     return Section("Table 4: test problems", [Table("paper-table4", caption, pd.DataFrame(lines), columns)])
-
-
-def _signed(value: object) -> str:
-    found = as_number(value)
-    return MISSING if found is None else f"{found:+.2f}"
-
-

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import pandas as pd
@@ -39,27 +39,45 @@ class Claim:
     judge: Callable[[Measured], Verdict]
 
 
-def decided(
-    outcomes: Mapping[str, bool | None], on: str, evidence: str = "", keys: list[str] | None = None
-) -> Verdict:
-    """One verdict from whether the claim holds in each case; None: the rows do not decide that case.
-
-    `on`: what tells the cases apart, for "depends on …".
+@dataclass(frozen=True)
+class Case:
+    """Whether a claim holds in one case (None: the rows do not decide it), the evidence and its rows.
+    A case without a name is evidence alone.
     """
-    known = {case: holds for case, holds in outcomes.items() if holds is not None}
-    open_cases = [case for case in outcomes if case not in known]
-    if not outcomes:
+
+    name: str
+    holds: bool | None
+    evidence: str = ""
+    keys: Sequence[str] = ()
+
+
+def by_case(on: str) -> Callable[[Callable[[Measured], Iterable[Case]]], Callable[[Measured], Verdict]]:
+    """Makes a claim's `judge` of a function that yields its cases. `on`: what tells them apart."""
+
+    def judging(cases_of: Callable[[Measured], Iterable[Case]]) -> Callable[[Measured], Verdict]:
+        return lambda measured: decided(cases_of(measured), on)
+
+    return judging
+
+
+def decided(cases: Iterable[Case], on: str, evidence: str | None = None) -> Verdict:
+    """One verdict from all cases; `evidence` in the place of theirs."""
+    found = list(cases)
+    words = "; ".join(case.evidence for case in found if case.evidence) if evidence is None else evidence
+    keys = sorted({key for case in found for key in case.keys})
+    named = [case for case in found if case.name]
+    known = [case for case in named if case.holds is not None]
+    if not named:
         return Verdict(NOT_MEASURED)
     if not known:
         word = NOT_DECIDED
-    elif all(known.values()):
+    elif all(case.holds for case in known):
         word = CONFIRMED
-    elif not any(known.values()):
+    elif not any(case.holds for case in known):
         word = NOT_CONFIRMED
     else:
-        holds = "; ".join(case for case, yes in known.items() if yes)
-        fails = "; ".join(case for case, yes in known.items() if not yes)
+        holds, fails = ("; ".join(c.name for c in known if c.holds is yes) for yes in (True, False))
         word = f"{DEPENDS} {on}: holds for {holds}; does not for {fails}"
-    if known and open_cases:
-        word += f" (not decided for {'; '.join(open_cases)})"
-    return Verdict(word, evidence, sorted(set(keys or [])))
+    if known and len(known) < len(named):
+        word += f" (not decided for {'; '.join(case.name for case in named if case.holds is None)})"
+    return Verdict(word, words, keys)

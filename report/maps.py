@@ -1,0 +1,55 @@
+"""Maps of the junction: a field of the contact nodes, and the borders of a part of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Grid = tuple[Array, Array, NDArray[np.intp]]
+
+
+def grid_of(nodes: Array) -> Grid | None:
+    """x, y and the place of each node where the nodes are a full tensor grid, else None."""
+    x, column = np.unique(np.round(nodes[:, 0], 6), return_inverse=True)
+    y, row = np.unique(np.round(nodes[:, 1], 6), return_inverse=True)
+    place = row * len(x) + column
+    full = len(place) == len(x) * len(y) == len(np.unique(place)) and len(x) > 1 and len(y) > 1
+    return (x, y, place) if full else None
+
+
+def draw(axes: Axes, nodes: Array, values: Array, norm: Normalize, colours: str) -> ScalarMappable:
+    """A field of the nodes in true proportions: cells where they are a grid, dots where they are not."""
+    axes.set(aspect="equal", ylabel="y, mm")
+    axes.grid(visible=False)
+    grid = grid_of(nodes)
+    if grid is None:
+        return axes.scatter(nodes[:, 0], nodes[:, 1], c=values, s=4, norm=norm, cmap=colours)
+    x, y, place = grid
+    field = np.empty(len(x) * len(y))
+    field[place] = values
+    shape = (len(y), len(x))
+    return axes.pcolormesh(x, y, field.reshape(shape), norm=norm, cmap=colours, shading="nearest")
+
+
+def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
+    """The edges between the cells of closed contacts and the rest, as line segments."""
+    x, y, place = grid
+    field = np.zeros(len(x) * len(y), dtype=bool)
+    field[place] = inside
+    padded = np.pad(field.reshape(len(y), len(x)), 1)
+    xe, ye = _edges(x), _edges(y)
+    rows, columns = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])
+    upright = [np.array([[xe[c], ye[r]], [xe[c], ye[r + 1]]]) for r, c in zip(rows, columns, strict=True)]
+    rows, columns = np.nonzero(padded[1:, 1:-1] != padded[:-1, 1:-1])
+    level = [np.array([[xe[c], ye[r]], [xe[c + 1], ye[r]]]) for r, c in zip(rows, columns, strict=True)]
+    return upright + level
+
+
+def _edges(centres: Array) -> Array:
+    """The borders of cells around their centres."""
+    middle = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
