@@ -108,8 +108,8 @@ class _Steps:
 
     def next_answer(self, case: Case, before: Case) -> Answer:
         """As a series does, from the answer of the case before."""
-        A = self.problem.assembly.A
-        near = Near(before.lam, before.x, before.load.g - A.T @ before.x)
+        gap = before.load.g - self.problem.assembly.A.T @ before.x
+        near = Near(before.load, before.lam, gap, before.x if self.form == "primal" else None)
         self.ready = self._call("update", self.state, self.ready, case.load, TOLERANCE, near)
         return self._call("solve", self.ready, case.load, TOLERANCE)
 

@@ -35,7 +35,7 @@ class MeasuredGaps(LoadCases):
         """Of the first row alone, so that a table may grow while it is being solved."""
         return digest(self.gaps[0].tobytes(), self.gaps.shape[1])
 
-    def load(self, k: int) -> LoadCase:
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
         return LoadCase(self.forces.f, np.array(self.gaps[k]))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from .assembly import LoadCase
+from .assembly import LoadCase, Prepared
 
 
 class LoadCases(ABC):
@@ -18,7 +18,7 @@ class LoadCases(ABC):
         """Hash of everything that determines case k, whatever the count."""
 
     @abstractmethod
-    def load(self, k: int) -> LoadCase:
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
 
     def parameters(self, k: int) -> dict[str, float]:

@@ -42,7 +42,7 @@ class RandomGaps(LoadCases):
         state = np.random.SeedSequence((self.seed, k)).generate_state(1, np.uint64)[0]
         return {"gap_seed": int(state) >> (64 - SEED_BITS)}
 
-    def load(self, k: int) -> LoadCase:
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
         assert self.field.random is not None
         drawn = self.field.random.model_copy(update={"seed": self.parameters(k)["gap_seed"]})
         gap = self.field.model_copy(update={"random": drawn}).gap(self.joint)

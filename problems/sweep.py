@@ -35,7 +35,6 @@ class Sweep(LoadCases):
     """All combinations of the steps' values, the last one running fastest."""
 
     scene: Scene
-    prepared: Prepared
     steps: tuple[Step, ...]
     count: int
 
@@ -47,14 +46,14 @@ class Sweep(LoadCases):
         places = np.unravel_index(k, [len(step.values) for step in self.steps])
         return {step.name: step.values[i] for step, i in zip(self.steps, places, strict=True)}
 
-    def load(self, k: int) -> LoadCase:
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
         effects = list(self.scene.effects)
         for step, value in zip(self.steps, self.parameters(k).values(), strict=True):
             effects[step.effect] = _changed(effects[step.effect], step, value)
-        return load_case(replace(self.scene, effects=tuple(effects)), self.prepared)
+        return load_case(replace(self.scene, effects=tuple(effects)), prepared)
 
 
-def sweep(scene: Scene, prepared: Prepared, texts: Sequence[str]) -> Sweep:
+def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
     """The cases of some --sweep options. Raises InputError with everything that is wrong."""
     faults: list[Fault] = []
     steps = tuple(step for text in texts if (step := _step(scene, text, faults)))
@@ -73,7 +72,7 @@ def sweep(scene: Scene, prepared: Prepared, texts: Sequence[str]) -> Sweep:
     ]
     if faults:
         raise InputError(faults)
-    return Sweep(scene, prepared, steps, int(np.prod([len(step.values) for step in steps])))
+    return Sweep(scene, steps, int(np.prod([len(step.values) for step in steps])))
 
 
 def effect_name(scene: Scene, index: int) -> str:

@@ -85,12 +85,13 @@ class Answer:
 class Near:
     """The answer of the solved load case that is nearest to the one to come.
 
-    lam : (m,) N. x : (n,) mm. gap : (m,) mm, y = g − Aᵀx, which is Qλ − p in the dual form.
+    load : that case. lam : (m,) N. gap : (m,) mm, y = g − Aᵀx = Qλ − p. x : (n,) mm; None in the dual form.
     """
 
+    load: Load
     lam: Vector
-    x: Vector
     gap: Vector
+    x: Vector | None = None
 
 
 class Solver(ABC):

@@ -83,8 +83,8 @@ def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
     """The set that the near answer suggests, else the forces of the finest subset; the sets tried there."""
     Q, tried = ready.problem.Q, 0
     if ready.near is not None:
-        lam = ready.near.lam
-        C = np.diag(Q) * lam > product(Q, lam) - p
+        lam, y = ready.near.lam, ready.near.gap + ready.near.load.p - p  # Qλ − p
+        C = np.diag(Q) * lam > y
         if (C ^ (lam > 0)).sum() <= NEAR * len(p):
             return C, tried
     C = p > 0

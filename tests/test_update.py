@@ -20,9 +20,10 @@ CASES = [(name, options, form) for name, options in VARIANTS for form in make_so
 TOLERANCE = 1e-9
 
 
-def near_of(prepared: Prepared, case: LoadCase) -> Near:
+def near_of(prepared: Prepared, case: LoadCase, form: Form) -> Near:
     x, lam = solve_by_nnls(prepared, case)
-    return Near(lam, x, case.g - prepared.assembly.A.T @ x)
+    load = Load(case.f, case.g, prepared.dual_load(case))
+    return Near(load, lam, case.g - prepared.assembly.A.T @ x, x if form == "primal" else None)
 
 
 def started(name: str, options: dict[str, Any], prepared: Prepared, form: Form) -> tuple[Solver, Any]:
@@ -38,7 +39,7 @@ def test_a_series_agrees_with_nnls(name: str, options: dict[str, Any], form: For
     first, load = make_load(3, prepared)
     ready = solver.setup(state, load, TOLERANCE)
     solver.solve(ready, load, TOLERANCE)
-    nears = [near_of(prepared, first)]
+    nears = [near_of(prepared, first, form)]
     rng = np.random.default_rng(0)
     for k in range(5):
         g = first.g + rng.uniform(0, 0.1, len(first.g)) if k != 1 else first.g
@@ -53,7 +54,7 @@ def test_a_series_agrees_with_nnls(name: str, options: dict[str, Any], form: For
         assert found is not None
         np.testing.assert_allclose(found, x, rtol=0, atol=1e-8)
         np.testing.assert_allclose(got.lam, lam, rtol=0, atol=1e-3)
-        nears.append(Near(lam, x, case.g - prepared.assembly.A.T @ x))
+        nears.append(near_of(prepared, case, form))
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -69,7 +70,7 @@ def test_a_warm_start_is_taken(name: str, form: Form) -> None:
         before = Load(near.f, near.g, prepared.dual_load(near))
         ready = solver.setup(state, before, TOLERANCE)
         solver.solve(ready, before, TOLERANCE)
-        ready = solver.update(state, ready, load, TOLERANCE, near_of(prepared, near))
+        ready = solver.update(state, ready, load, TOLERANCE, near_of(prepared, near, form))
         answer = solver.solve(ready, load, TOLERANCE)
         assert answer.iterations is not None
         taken[id(near)] = answer.inner_iterations or answer.iterations
@@ -82,13 +83,13 @@ def test_newton_begins_with_a_near_answer_and_only_with_a_near_one() -> None:
     solver, state = started("newton", {}, prepared, "dual")
     cold = solver.solve(state, load, TOLERANCE)
     warm = solver.solve(
-        solver.update(state, state, load, TOLERANCE, near_of(prepared, case)), load, TOLERANCE
+        solver.update(state, state, load, TOLERANCE, near_of(prepared, case, "dual")), load, TOLERANCE
     )
     assert (warm.iterations, warm.inner_iterations) == (1, 0)
     assert cold.inner_iterations
     far = make_load(9, prepared)[0]
     again = solver.solve(
-        solver.update(state, state, load, TOLERANCE, near_of(prepared, far)), load, TOLERANCE
+        solver.update(state, state, load, TOLERANCE, near_of(prepared, far, "dual")), load, TOLERANCE
     )
     assert again.inner_iterations == cold.inner_iterations
     np.testing.assert_array_equal(again.lam, cold.lam)
