@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +16,7 @@ from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.reference import refined_active_set
 from harness.series.bound import Bound, gaps, independence
+from harness.series.compliance import largest_compliance
 from harness.series.residual import bits, residual, split
 from harness.series.vouch import Vouched, vouch
 from harness.trials import known_case, prepared_from, stiffness
@@ -84,9 +87,18 @@ def test_independence_of_contacts() -> None:
     assert independence(Assembly((np.eye(4),), twice)) == 0.0
 
 
+@pytest.mark.parametrize("make", [lambda: make_prepared(2, 40, 7), lambda: make_strips(80)])
+def test_the_largest_compliance_is_above_and_close(make: Callable[[], Prepared]) -> None:
+    prepared = make()
+    kappa = min(np.linalg.eigvalsh(K)[0] for K in prepared.assembly.blocks)
+    wanted = max(np.diag(np.linalg.inv(K)).max() for K in prepared.assembly.blocks)
+    assert wanted <= largest_compliance(prepared, kappa) <= 1.05 * wanted < 1 / kappa
+    assert np.isinf(largest_compliance(prepared, 0.0))
+
+
 def answer(prepared: Prepared, case: LoadCase, lam: np.ndarray, x: np.ndarray | None = None) -> Vouched:
     load = Load(case.f, case.g, prepared.dual_load(case))
-    return vouch(prepared, Bound.of(prepared), [load], [lam], [x])[0]
+    return vouch(Bound.of(prepared), [load], [lam], [x])[0]
 
 
 @given(
@@ -150,9 +162,9 @@ def test_a_block_is_its_cases_one_by_one() -> None:
     cases = [make_load(seed, prepared) for seed in range(5)]
     lams = [solve_by_nnls(prepared, case)[1] for case, _ in cases]
     bound = Bound.of(prepared)
-    together = vouch(prepared, bound, [load for _, load in cases], lams, [None] * 5)
+    together = vouch(bound, [load for _, load in cases], lams, [None] * 5)
     for (case, load), lam, found in zip(cases, lams, together, strict=True):
-        alone = vouch(prepared, bound, [load], [lam], [None])[0]
+        alone = vouch(bound, [load], [lam], [None])[0]
         np.testing.assert_allclose(found.x, alone.x, rtol=0, atol=1e-13)
         np.testing.assert_allclose(found.bound_mm, alone.bound_mm, rtol=0.5)
         known = refined_active_set(prepared, case)
@@ -177,6 +189,7 @@ def test_weakly_active_contacts_do_not_widen_the_bound() -> None:
 def test_nothing_is_vouched_for_where_K_is_not_proven_definite() -> None:
     blocks = (stiffness(np.random.default_rng(0), 3),)
     prepared = prepared_from(blocks, sp.csc_array(np.eye(3)))
-    none = Bound(0.0, 1.0, 1.0).bound(*(np.zeros((3, 2)) for _ in range(5)))
+    found = Bound.of(prepared)
+    none = replace(found, kappa=0.0).bound(*(np.zeros((3, 2)) for _ in range(5)))
     assert np.isinf(none).all()
-    assert Bound.of(prepared).kappa > 0
+    assert found.kappa > 0

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.assembly import Prepared, Vector
+from problems.assembly import Vector
 from solvers.base import Load
 
 from .bound import Bound, gaps
@@ -35,7 +35,6 @@ class Vouched:
 
 
 def vouch(
-    prepared: Prepared,
     bound: Bound,
     loads: Sequence[Load],
     lams: Sequence[Vector],
@@ -46,7 +45,7 @@ def vouch(
     In the dual form the answer is x = K⁻¹(f − Aλ). The bound is that of a point near by, whose λ is zero
     where q_ii λ_i ≤ (Qλ − p)_i, plus the distance to it.
     """
-    assembly = prepared.assembly
+    prepared, assembly = bound.prepared, bound.prepared.assembly
     A = assembly.A
     f, g, p = (np.column_stack([getattr(load, name) for load in loads]) for name in "fgp")
     lam = np.column_stack(lams)
