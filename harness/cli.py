@@ -1,27 +1,26 @@
-"""The command line: run, report, gate, list, check. What takes time to import is imported in the commands."""
+"""The command line: run, report, gate, list, check; series is in series_command.py.
+
+What takes time to import is imported in the commands.
+"""
 
 from __future__ import annotations
 
 import signal
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from . import series_command
+from .console import ACCURACY_LOST, option, reported
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
 
-WIDTH_OF_A_LOG = 160
-ACCURACY_LOST, WRONG_USAGE, INTERRUPTED = 1, 2, 130
+app.add_typer(series_command.app)
 
 
 class FormName(StrEnum):
@@ -33,10 +32,6 @@ class Listed(StrEnum):
     solvers = "solvers"
     scenes = "scenes"
     suites = "suites"
-
-
-def option(metavar: str, help: str, **limits: Any) -> Any:
-    return typer.Option(metavar=metavar, help=help, **limits)
 
 
 Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")]
@@ -53,6 +48,7 @@ def harness() -> None:
       python -m harness run --size 4386           the small problems only
       python -m harness list solvers              what can be measured
       python -m harness run --plugin mine.py      with a solver of your own
+      python -m harness series SCENE --out DIR    thousands of load cases on one assembly
       python -m harness COMMAND --help            more on each command
 
     \b
@@ -220,30 +216,6 @@ def check(
             for finding in findings:
                 console.print(f"  {finding}", highlight=False, markup=False)
         raise typer.Exit(ACCURACY_LOST if faulty else 0)
-
-
-@contextmanager
-def reported() -> Iterator[Console]:
-    """A console; what a person can put right becomes a red line each and an exit code, not a traceback."""
-    from rich.console import Console
-
-    from problems.errors import InputError
-
-    errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
-    try:
-        yield Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_OF_A_LOG)
-    except InputError as error:
-        for fault in error.faults:
-            errors.print(str(fault), style="red")
-        raise typer.Exit(WRONG_USAGE) from None
-    except OSError as error:
-        errors.print(f"{error}; the rows that were written are safe, run again to go on", style="red")
-        raise typer.Exit(WRONG_USAGE) from None
-    except KeyboardInterrupt:
-        errors.print(
-            "Interrupted. The rows so far are kept: the same command goes on from here.", style="yellow"
-        )
-        raise typer.Exit(INTERRUPTED) from None
 
 
 def main() -> None:

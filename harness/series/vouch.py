@@ -23,11 +23,14 @@ REFINEMENTS = 1  # of x, with the residual of `residual`: what is left is its ro
 class Vouched:
     """One answer, looked at: x (n,) mm, gap = g − Aᵀx (m,) mm, and max|x − x*| ≤ bound_mm for certain.
 
+    active : the closed contacts, those with q_ii λ_i > (Qλ − p)_i.
+
     primal_residual, dual_residual, duality_gap as the judge has them: mm, N, N·mm.
     """
 
     x: Vector
     gap: Vector
+    active: int
     bound_mm: float
     primal_residual: float
     dual_residual: float
@@ -74,6 +77,7 @@ def vouch(
         Vouched(
             x=answer[:, k],
             gap=gap[:, k],
+            active=int((clean[:, k] > 0).sum()),
             bound_mm=float(bounds[k]),
             primal_residual=float(max(-gap[:, k].min(initial=0.0), 0.0)),
             dual_residual=float(max(abs(r[:, k]).max(initial=0.0), -lam[:, k].min(initial=0.0))),

@@ -1,0 +1,45 @@
+"""What all commands share: options, and errors that a person can put right as red lines and an exit code."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+WIDTH_OF_A_LOG = 160
+ACCURACY_LOST, WRONG_USAGE, INTERRUPTED = 1, 2, 130
+
+
+def option(metavar: str, help: str, **limits: Any) -> Any:
+    return typer.Option(metavar=metavar, help=help, **limits)
+
+
+@contextmanager
+def reported(
+    safe: str = "; the rows that were written are safe, run again to go on",
+    interrupted: str = "Interrupted. The rows so far are kept: the same command goes on from here.",
+) -> Iterator[Console]:
+    """A console; what a person can put right becomes a red line each and an exit code, not a traceback."""
+    from rich.console import Console
+
+    from problems.errors import InputError
+
+    errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    try:
+        yield Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_OF_A_LOG)
+    except InputError as error:
+        for fault in error.faults:
+            errors.print(str(fault), style="red")
+        raise typer.Exit(WRONG_USAGE) from None
+    except OSError as error:
+        errors.print(f"{error}{safe}", style="red")
+        raise typer.Exit(WRONG_USAGE) from None
+    except KeyboardInterrupt:
+        errors.print(interrupted, style="yellow")
+        raise typer.Exit(INTERRUPTED) from None
