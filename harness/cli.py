@@ -34,7 +34,7 @@ class Listed(StrEnum):
     suites = "suites"
 
 
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")]
+Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")]
 Plugin = Annotated[Path | None, option("FILE", "Python file with a solver of your own.")]
 
 
@@ -137,7 +137,13 @@ def report(directory: Directory) -> None:
         from problems.errors import InputError
 
         from . import records
+        from .series.store import SERIES
 
+        if (directory / SERIES).is_file():
+            from report.series_report import write as write_series
+
+            console.print(f"Report: {write_series(directory)}")
+            return
         path = directory / records.MEASUREMENTS
         if not path.is_file():
             raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` makes one")

@@ -123,4 +123,7 @@ def series(
             "solver_code": code_of(type(made).__module__),
         }
         code = run(job, facts, out, console)
+        from report.series_report import write  # slow to import: not before the first row
+
+        console.print(f"Report: {write(out)}")
         raise typer.Exit(code)
