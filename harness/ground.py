@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from problems.assembly import LoadCase, Prepared
 from problems.build import Progress, load_case, prepared
 from problems.effect import ForceEffect
+from problems.random_gaps import random_gaps
 from problems.scene import Scene, read_scene
 
 from . import records
@@ -27,6 +29,13 @@ class Ground:
     load: LoadCase
     reference: Reference
     reference_s: float
+
+    def of_case(self, series: dict[str, Any] | None, case: int | None) -> Ground:
+        """That of a load case of a series on the scene, with a reference of its own."""
+        if series is None or case is None:
+            return self
+        load = random_gaps(self.scene, self.prepared, **series).load(case, self.prepared)
+        return replace(self, load=load, reference=reference(self.scene.key, self.prepared, load))
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""

@@ -52,7 +52,7 @@ class RandomGaps(LoadCases):
 def random_gaps(
     scene: Scene,
     prepared: Prepared,
-    count: int,
+    cases: int,
     seed: int,
     mean: float | None = None,
     sd: float | None = None,
@@ -91,4 +91,4 @@ def random_gaps(
     except ValidationError as error:
         raise InputError(list(validation_faults("series", "initial_gap", error))) from error
     others = replace(scene, effects=tuple(effect for effect in scene.effects if effect not in found))
-    return RandomGaps(scene.joint, load_case(others, prepared), field, seed, count)
+    return RandomGaps(scene.joint, load_case(others, prepared), field, seed, cases)

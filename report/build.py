@@ -16,11 +16,12 @@ from . import style
 from .blocks import Block, Figure, Section, Table
 from .checks import warnings
 from .rows import Results, read
-from .sections import accuracy, breakdown, details, gap_map, machine, problems, summary, times
+from .sections import accuracy, breakdown, details, gap_map, machine, problems, series, summary, times
 from .sections.paper import claims, figures3_4, figures5_7, table1, table2, table3, table4
 
 SECTIONS: list[Callable[[Results], Section | None]] = [
     summary.section,
+    series.section,
     claims.section,
     table1.section,
     table2.section,
