@@ -53,6 +53,9 @@ def series(
     ] = 100,
     threads: Annotated[int, option("N", "Threads of the linear algebra.", min=1)] = 2,
     plugin: Annotated[Path | None, option("FILE", "Python file with a solver of your own.")] = None,
+    scheduler: Annotated[
+        str | None, option("WHERE", "Dask: local:N for N workers here, or a scheduler's address.")
+    ] = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
 
@@ -68,6 +71,7 @@ def series(
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.2,0.4 \\
                                          --sweep fasteners.preload=500:1500:11 --out results/both
+      python -m harness series 4386/1074 --cases 1000 --threads 1 --scheduler local:2 --out results/gaps
 
     \b
     Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
@@ -122,7 +126,7 @@ def series(
             "solver_version": solver_version(solver, plugin),
             "solver_code": code_of(type(made).__module__),
         }
-        code = run(job, facts, out, console)
+        code = run(job, facts, out, console, scheduler)
         from report.series_report import write  # slow to import: not before the first row
 
         console.print(f"Report: {write(out)}")

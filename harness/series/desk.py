@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import threadpoolctl
@@ -47,6 +48,7 @@ class Job:
     threads: int
     options: dict[str, Any] = field(default_factory=dict)
     plugin: Path | None = None
+    key: str = field(default_factory=lambda: uuid4().hex)
 
 
 @dataclass(frozen=True)
@@ -195,3 +197,14 @@ class Desk:
         names = ("displacement_error_mm", "reference_bound_mm", "contact_mismatch")
         found: Row = {name: getattr(judged, name) for name in names}
         return found if judged.verdict == "cannot_be_judged" else found | {"verdict": judged.verdict}
+
+
+_open: dict[str, Desk] = {}
+
+
+def solve_on_worker(job: Job, numbers: Sequence[int]) -> list[Result]:
+    """The cases, on the desk that this process keeps for the job: the assembly is opened once a worker."""
+    if job.key not in _open:
+        _open.clear()
+        _open[job.key] = Desk(job)
+    return [result for some in _open[job.key].solve(numbers) for result in some]

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +15,14 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from problems.build import prepared
 from problems.effect import ForceEffect
 
 from .. import records
 from ..machine import installed_version, machine
+from ..scheduler import done_as_completed, workers
 from . import store
-from .desk import Desk, Job, Result
+from .desk import BLOCK, Desk, Job, Result, solve_on_worker
 
 DONE, ACCURACY_LOST, NOTHING_JUDGED = 0, 1, 3
 VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
@@ -40,7 +46,9 @@ class Tally:
             self.worst_error_mm = max(self.worst_error_mm or 0.0, error)
 
 
-def run(job: Job, facts: dict[str, Any], directory: Path, console: Console) -> int:
+def run(
+    job: Job, facts: dict[str, Any], directory: Path, console: Console, scheduler: str | None = None
+) -> int:
     """Solve what is left of a series. `facts` of the solver (version, code) are part of what it is.
 
     Returns 0, 1 where an answer was found outside the limit or missing, 3 where none could be judged.
@@ -52,7 +60,8 @@ def run(job: Job, facts: dict[str, Any], directory: Path, console: Console) -> i
         left = np.flatnonzero(~done).tolist()
         console.print(f"{job.scene.name}: {len(done)} cases, {len(done) - len(left)} already in {directory}")
         if left:
-            solve_left(job, left, directory, console)
+            with at_work(job, left, scheduler, console) as results:
+                solve_left(job, len(left), results, directory, console)
         tally = Tally(dict.fromkeys(VERDICTS, 0))
         for row in store.rows(directory):
             if row["case"] < job.cases.count:
@@ -60,15 +69,44 @@ def run(job: Job, facts: dict[str, Any], directory: Path, console: Console) -> i
     return summary(tally, console)
 
 
-def solve_left(job: Job, left: list[int], directory: Path, console: Console) -> None:
-    with console.status("opening the assembly, preparing the solver"):
-        desk = Desk(job)
-    m = desk.data.assembly.m
-    remember_contacts(desk, directory)
+@contextmanager
+def at_work(
+    job: Job, left: list[int], scheduler: str | None, console: Console
+) -> Iterator[Iterator[list[Result]]]:
+    """The results as they come, of this process or of the workers of a scheduler."""
+    if scheduler is None:
+        with console.status("opening the assembly, preparing the solver"):
+            desk = Desk(job)
+        yield desk.solve(left)
+        return
+    with workers(scheduler) as (executor, count):
+        console.print(f"{count} workers at {scheduler}")
+        yield on_workers(job, left, executor, count, console)
+
+
+def on_workers(
+    job: Job, left: list[int], executor: Executor, count: int, console: Console
+) -> Iterator[list[Result]]:
+    """Blocks of cases, small enough that the workers end together. What fails is left for another run."""
+    size = min(max(len(left) // (4 * count), 1), BLOCK)
+    blocks = [left[start : start + size] for start in range(0, len(left), size)]
+    for block, outcome in done_as_completed(executor, count, partial(solve_on_worker, job), blocks):
+        if isinstance(outcome, BaseException):
+            why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
+            console.print(f"cases {block[0]} … {block[-1]} not solved, run again: {why}", style="red")
+        else:
+            yield outcome
+
+
+def solve_left(
+    job: Job, count: int, results: Iterator[list[Result]], directory: Path, console: Console
+) -> None:
+    """Write what comes; this process alone does."""
+    m = remember_contacts(job, directory)
     begun, made = time.monotonic(), 0
     with display(console) as progress:
-        task = progress.add_task(job.scene.name, total=len(left), rate="")
-        for some in desk.solve(left):
+        task = progress.add_task(job.scene.name, total=count, rate="")
+        for some in results:
             store.append(directory, some, m)
             made += len(some)
             rate = f"{made / (time.monotonic() - begun):.3g} cases/s"
@@ -127,17 +165,18 @@ def about(job: Job) -> dict[str, Any]:
     }
 
 
-def remember_contacts(desk: Desk, directory: Path) -> None:
-    """DIRECTORY/contacts.npz: where the contacts and the fasteners are, for the pictures."""
-    arrays = {"m": np.array(desk.data.assembly.m)}
-    nodes = desk.data.assembly.contact_nodes
-    if nodes is not None:
-        arrays["contact_nodes"] = nodes
-    joint = desk.job.scene.joint
-    if joint:
-        effects = [effect for effect in desk.job.scene.effects if isinstance(effect, ForceEffect)]
-        arrays["fasteners"] = np.concatenate([np.zeros((0, 2)), *(e.marks(joint) for e in effects)])
+def remember_contacts(job: Job, directory: Path) -> int:
+    """DIRECTORY/contacts.npz: where the contacts and the fasteners are, for the pictures. Returns m."""
+    assembly = prepared(job.scene).assembly
+    arrays = {"m": np.array(assembly.m)}
+    if assembly.contact_nodes is not None:
+        arrays["contact_nodes"] = assembly.contact_nodes
+    if job.scene.joint:
+        effects = [effect for effect in job.scene.effects if isinstance(effect, ForceEffect)]
+        marks = [effect.marks(job.scene.joint) for effect in effects]
+        arrays["fasteners"] = np.concatenate([np.zeros((0, 2)), *marks])
     np.savez(directory / "contacts.npz", **arrays)  # type: ignore[arg-type]
+    return assembly.m
 
 
 def summary(tally: Tally, console: Console) -> int:
