@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
+from harness.exact_residual import gamma
 from harness.reference import refined_active_set
 from harness.series.bound import Bound, gaps, independence
 from harness.series.compliance import largest_compliance
@@ -53,6 +54,17 @@ def test_the_residual_against_rational_numbers(seed: int) -> None:
         off = [abs(Fraction(a) - b) for a, b in zip(r[:, k], wanted, strict=True)]
         assert all(o <= Fraction(e) for o, e in zip(off, error[:, k], strict=True))
     assert error.max() < 1e-10
+
+
+def test_products_that_cancel_are_still_in_doubt() -> None:
+    """Kx = 0 with every product zero: what a sum of K₂x₁ may lose is there all the same, in each row."""
+    n = 64
+    K = np.asfortranarray((-1.0) ** np.add.outer(np.arange(n), np.arange(n)))
+    assembly = Assembly((K,), sp.csc_array(np.eye(n, 1)))
+    zero = np.zeros((n, 1))
+    r, error = residual(assembly, zero, split(assembly, np.ones((n, 1))), np.zeros((1, 1)))
+    assert not r.any()
+    assert (error >= gamma(n) * 2.0 ** -bits(n) * n).all()
 
 
 @pytest.mark.parametrize("n", [1, 2, 100, 2193, 5654, 10**6])
@@ -132,7 +144,7 @@ def test_a_bound_for_negative_forces_and_for_a_contact_that_should_be_closed() -
     x, lam = solve_by_nnls(prepared, case)
     bad = lam.copy()
     bad[np.argmax(bad)] = 0.0
-    for spoilt in (lam - 1.0, bad):
+    for spoilt in (lam - 1.0, bad, np.zeros_like(lam)):
         found = answer(prepared, case, spoilt)
         error = abs(found.x - x).max()
         assert 1e-6 < error <= found.bound_mm < 1e3 * error
