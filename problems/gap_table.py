@@ -32,8 +32,12 @@ class MeasuredGaps(LoadCases):
 
     @property
     def key(self) -> str:
-        """Of the first row alone, so that a table may grow while it is being solved."""
-        return digest(self.gaps[0].tobytes(), self.gaps.shape[1])
+        """Of the width alone: a table may grow while it is being solved, and each case has its own hash."""
+        return digest("table", self.gaps.shape[1])
+
+    def parameters(self, k: int) -> dict[str, float | str]:
+        """The hash of its gaps, by which a row that has changed since is found."""
+        return {"gaps": digest(np.ascontiguousarray(self.gaps[k]).tobytes())}
 
     def load(self, k: int, prepared: Prepared) -> LoadCase:
         return LoadCase(self.forces.f, np.array(self.gaps[k]))

@@ -21,6 +21,6 @@ class LoadCases(ABC):
     def load(self, k: int, prepared: Prepared) -> LoadCase:
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
 
-    def parameters(self, k: int) -> dict[str, float]:
+    def parameters(self, k: int) -> dict[str, float | str]:
         """What sets case k apart, for its row."""
         return {}

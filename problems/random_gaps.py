@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -37,7 +38,7 @@ class RandomGaps(LoadCases):
     def key(self) -> str:
         return digest(self.field.model_dump(mode="json"), self.seed)
 
-    def parameters(self, k: int) -> dict[str, float]:
+    def parameters(self, k: int) -> dict[str, Any]:
         """The seed which, written into the scene's `random`, gives this case."""
         state = np.random.SeedSequence((self.seed, k)).generate_state(1, np.uint64)[0]
         return {"gap_seed": int(state) >> (64 - SEED_BITS)}

@@ -42,7 +42,7 @@ class Sweep(LoadCases):
     def key(self) -> str:
         return digest([[step.name, step.values] for step in self.steps])
 
-    def parameters(self, k: int) -> dict[str, float]:
+    def parameters(self, k: int) -> dict[str, Any]:
         places = np.unravel_index(k, [len(step.values) for step in self.steps])
         return {step.name: step.values[i] for step, i in zip(self.steps, places, strict=True)}
 

@@ -160,6 +160,17 @@ def test_a_table_with_a_bad_case_keeps_what_is_solved() -> None:
     assert "12 cases, 8 already" in series("--gaps", "gaps.npy", "--out", "table").output
 
 
+def test_a_table_that_has_changed_since_is_refused_by_case() -> None:
+    gaps = np.random.default_rng(1).uniform(0, 0.5, (6, 45))
+    np.save("changed.npy", gaps)
+    series("--gaps", "changed.npy", "--out", "changed")
+    gaps[4, 44] += 1e-12
+    np.save("changed.npy", gaps)
+    ended = series("--gaps", "changed.npy", "--out", "changed", code=2)
+    assert "case 4, gaps = " in ended.output
+    assert ended.output.count("name another directory") == 1
+
+
 def test_a_sweep_starts_from_its_neighbour(tmp_path: Path) -> None:
     series("--sweep", "initial_gap.mean=0.1:1.0:40", "--out", "swept")
     rows = rows_of("swept")

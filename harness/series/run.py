@@ -56,7 +56,7 @@ def run(
     """
     with records.held(directory, ()):
         store.claim(directory, identity(job) | facts, about(job))
-        done = store.solved(directory, job.cases.count)
+        done = store.solved(directory, job.cases)
         left = np.flatnonzero(~done).tolist()
         console.print(f"{job.scene.name}: {len(done)} cases, {len(done) - len(left)} already in {directory}")
         if left:

@@ -18,12 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.errors import Fault, InputError
+from problems.load_cases import LoadCases
 
 from .. import records
 from .desk import Result
 
 CASES, GAPS, SERIES = "cases.jsonl", "gaps.f4", "series.json"
 CHUNK = 2**20  # bytes
+FAULTS = 10  # named at once
 BYTES = np.dtype(np.float32).itemsize
 
 
@@ -43,15 +45,25 @@ def claim(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> N
     records.replace_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
 
-def solved(directory: Path, count: int) -> NDArray[np.bool_]:
-    """(count,) which cases have a row. A torn last line is cut off."""
-    done = np.zeros(count, dtype=bool)
+def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
+    """(count,) which cases have a row. A torn last line is cut off.
+
+    Raises InputError where a row is of a case with other parameters, as in a table that has changed.
+    """
+    done, faults = np.zeros(cases.count, dtype=bool), []
     path = directory / CASES
     if path.exists():
         _mend(path)
         for row in rows(directory):
-            if row["case"] < count:
-                done[row["case"]] = True
+            if row["case"] >= cases.count:
+                continue
+            done[row["case"]] = True
+            for key, value in cases.parameters(row["case"]).items():
+                if row[key] != value:
+                    allowed = f"is now {value!r}: name another directory with --out"
+                    faults.append(Fault(str(path), f"case {row['case']}, {key}", row[key], allowed))
+    if faults:
+        raise InputError(faults[:FAULTS])
     return done
 
 
