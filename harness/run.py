@@ -6,8 +6,6 @@ import json
 import time
 from collections import Counter
 from contextlib import suppress
-from dataclasses import asdict
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,24 +17,15 @@ from problems.scene import read_scene
 
 from . import records
 from .describe import Description, describe
-from .ground import Ground, ground, record, record_refusal
-from .judge import Judgement
-from .machine import installed_version, machine, physical_memory_mib
-from .measure import measure
+from .ground import ground, record, record_refusal
+from .machine import machine, physical_memory_mib
 from .plan import Measurement, expand
 from .records import Row
+from .rows import rows_of
 from .show import Display
 from .suite import Suite, to_toml
 
 DONE, NOTHING_JUDGED = 0, 3
-
-#: A row's fields that the worker tells of; null where it does not.
-TOLD = (
-    *("status", "message", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
-    *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details"),
-    *("cholesky_s", "product_s", "stderr", "answer"),
-)
-CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
 
 Solvers = dict[tuple[str, str], Description]
 
@@ -89,7 +78,8 @@ def measure_all(
     sizes = {m.scene: size[0] for m in left if (size := read_scene(m.source).expected_size)}
     rows, base = list(rows), None
     with Display(console, left, done, sizes) as display:
-        for measurement in left:
+        for batch in batches(left):
+            measurement = batch[0]
             if base is None or base.scene.name != measurement.scene:
                 start = time.monotonic()
                 base = ground(measurement.source, partial(display.building, measurement.scene))
@@ -99,11 +89,20 @@ def measure_all(
             start = time.monotonic()
             solver = solvers[measurement.solver, measurement.variant]
             hopeless = out_of_time_before(measurement, base.prepared.assembly.n, rows)
-            row = one_row(measurement, base, directory, solver, here, hopeless)
-            records.append(directory / records.MEASUREMENTS, row)
-            rows.append(row)
-            display.finished(measurement, row, time.monotonic() - start)
+            made = rows_of(batch, base, directory, solver, here, hopeless)
+            records.append(directory / records.MEASUREMENTS, *made)
+            rows += made
+            for each, row in zip(batch, made, strict=True):
+                display.finished(each, row, (time.monotonic() - start) / len(batch))
     return rows
+
+
+def batches(left: list[Measurement]) -> list[list[Measurement]]:
+    """The measurements that one process makes: one each, or the load cases of a series."""
+    found: dict[object, list[Measurement]] = {}
+    for m in left:
+        found.setdefault(m.key if m.case is None else m.process, []).append(m)
+    return list(found.values())
 
 
 def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
@@ -134,48 +133,6 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
         if row["status"] == "time_limit" and m.time_limit_s <= growth * row["time_limit_s"]
     ]
     return ", ".join(sorted({row["scene"] for row in late})) if len(late) == len(there) else ""
-
-
-def one_row(
-    m: Measurement, base: Ground, directory: Path, solver: Description, here: str, hopeless: str = ""
-) -> Row:
-    """Measure, judge, and put together the row. hopeless : the scene that shows that there is no time."""
-    start = time.monotonic()
-    answer = directory / "answers" / f"{m.stem}.npz"
-    if hopeless:
-        told: Row = {"status": "time_limit", "message": f"not run: too slow already on {hopeless}"}
-    elif m.form in solver.forms:
-        told = measure(m, answer)
-    else:
-        told = {"status": "unsupported", "message": f"takes {' and '.join(solver.forms)} only"}
-    if "cannot_save" in told:
-        raise OSError(told["cannot_save"])
-    limit_mm, judgement = base.limit_mm(m.limit_mm), Judgement("no_answer", base.reference.bound_mm)
-    if told.get("answer"):
-        judgement = base.judge_file(answer, limit_mm)
-    told = {name: told.get(name) for name in TOLD}
-    known = [told[name] for name in CLOCKS if told[name] is not None]
-    return {
-        "key": m.key,
-        **{name: getattr(m, name) for name in ("suite", "scene", "source", "solver", "form", "variant")},
-        "n": base.prepared.assembly.n,
-        "m": base.prepared.assembly.m,
-        "active": int(base.reference.active.sum()),
-        **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated")},
-        "limit_mm": limit_mm,
-        "limit_asked_mm": m.limit_mm,
-        "threads_asked": m.threads,
-        **told,
-        **asdict(judgement),
-        **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
-        "overhead_s": time.monotonic() - start - sum(known),
-        "machine": here,
-        "scene_key": base.scene.key,
-        "solver_version": solver.version,
-        "solver_code": solver.code,
-        "rivetbench_version": installed_version("rivetbench"),
-        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
 
 
 def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:

@@ -13,7 +13,7 @@ from small import make_prepared
 from harness.check import run
 from harness.trials import known_case, trials
 from problems.assembly import LoadCase
-from solvers.base import Answer, Form, Load, Problem, Solver
+from solvers.base import Answer, Form, Load, Near, Problem, Solver
 from solvers.registry import make_solver
 
 
@@ -163,6 +163,27 @@ def test_a_second_load_case_on_one_state() -> None:
             return self.inner.setup(state, self.first, tolerance)
 
     assert "wrong as a second load case" in words_of(Remembers, ("dual",))
+
+
+def test_an_update_that_keeps_the_case_before() -> None:
+    class Stale(Sound):
+        def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+            return ready
+
+    class TakesTheNearAnswer(Sound):
+        near: Near | None = None
+
+        def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+            self.near = near
+            return super().update(state, ready, load, tolerance, near)
+
+        def spoil(self, answer: Answer, load: Load) -> Answer:
+            return replace(answer, lam=self.near.lam) if self.near else answer
+
+    for solver in (Stale, TakesTheNearAnswer):
+        words = words_of(solver, ("dual",)).splitlines()
+        assert len(words) == 1
+        assert "wrong as a series by `update` (others closed" in words[0]
 
 
 def test_a_step_that_raises_is_named_with_its_line() -> None:
