@@ -63,6 +63,10 @@ def _check_trial(factory: Callable[[], Solver], trial: Trial, form: Form) -> Ite
         words = f"right when each is set up, wrong as a series by `update` ({wrong_in_series})"
         fix = "Let update renew all that depends on the load case; near is a start, not the answer"
         yield Finding(form, trial.name, words, fix)
+    if wrong_together := _together(factory, problem, trial):
+        words = f"right when each is set up, wrong when solved at once by `together` ({wrong_together})"
+        fix = "An answer to each load, in the order of the loads"
+        yield Finding(form, trial.name, words, fix)
     if _differ(first, steps.answer(first_case), trial, first_case):
         words = "the first load case, solved again after others, has another answer"
         yield Finding(form, trial.name, words, spoilt)
@@ -82,6 +86,21 @@ def _in_series(factory: Callable[[], Solver], problem: Problem, trial: Trial) ->
     steps.answer(trial.cases[0])
     for before, case in pairwise(trial.cases):
         wrong = list(inspect(steps.next_answer(case, before), trial, case, problem.form))
+        alone = _Steps(factory(), problem).answer(case)
+        if wrong and not list(inspect(alone, trial, case, problem.form)):
+            return f"{case.name}: {wrong[0].wrong}"
+    return ""
+
+
+def _together(factory: Callable[[], Solver], problem: Problem, trial: Trial) -> str:
+    """What is wrong with the cases solved by `together` that are right when each is set up; "" if nothing."""
+    answers = _Steps(factory(), problem).answers(trial.cases)
+    if answers is None:
+        return ""
+    if len(answers) != len(trial.cases):
+        return f"{len(answers)} answers to {len(trial.cases)} load cases"
+    for case, answer in zip(trial.cases, answers, strict=True):
+        wrong = list(inspect(answer, trial, case, problem.form))
         alone = _Steps(factory(), problem).answer(case)
         if wrong and not list(inspect(alone, trial, case, problem.form)):
             return f"{case.name}: {wrong[0].wrong}"
@@ -112,6 +131,16 @@ class _Steps:
         near = Near(before.load, before.lam, gap, before.x if self.form == "primal" else None)
         self.ready = self._call("update", self.state, self.ready, case.load, TOLERANCE, near)
         return self._call("solve", self.ready, case.load, TOLERANCE)
+
+    def answers(self, cases: Sequence[Case]) -> list[Answer] | None:
+        """Those of all cases at once; None where the solver has no such way."""
+        solve_all = self._call("together", self.state)
+        if solve_all is None:
+            return None
+        try:
+            return list(solve_all([case.load for case in cases], TOLERANCE))
+        except Exception as error:
+            raise _Raised(_raised(self.form, "together", error)) from error
 
     def _call(self, step: str, *arguments: Any) -> Any:
         try:

@@ -10,6 +10,8 @@ In a series of load cases on one assembly the first is set up so, and each that 
     update(state, ready, load, tol, near)           in the place of setup: the library's own way to the
                                                     next load case, a warm start
 
+or, where a solver has `together(state)`, some at a time by what that returns.
+
 Only `solve` must be written; each of the others hands on what it was given, and `update` sets up anew.
 The harness calls and times them; a solver never reads a clock, scores itself or knows of limits.
 """
@@ -17,6 +19,7 @@ The harness calls and times them; a solver never reads a clock, scores itself or
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -121,6 +124,13 @@ class Solver(ABC):
         may be changed and returned. near : where a warm start may begin; the case before is another one.
         """
         return self.setup(state, load, tolerance)
+
+    def together(self, state: Any) -> Callable[[Sequence[Load], float], list[Answer]] | None:
+        """Takes many load cases of the assembly at once, and a tolerance; None where there is no such way.
+
+        state : from `prepare`. An answer to each load, in their order.
+        """
+        return None
 
     @abstractmethod
     def solve(self, ready: Any, load: Load, tolerance: float) -> Answer: ...

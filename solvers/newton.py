@@ -19,12 +19,14 @@ from problems.assembly import Matrix, Vector
 from problems.errors import InputError
 
 from .active_set import solve_from
+from .banded_inverse import banded_inverse
 from .base import Answer, Form, Load, Near, Problem, Solver, failed
 from .block_pivoting import block_pivoting
 from .bordered_factor import Set
 from .contact_sets import ContactSets, product
 from .inverse import inverse_with_factor
 from .nested import Cells, cells_of, representatives
+from .together import Together
 
 WIDTHS = (4, 2)  # of the cells, in contacts
 COARSE_PASSES = 10  # a guess need not be right
@@ -82,6 +84,17 @@ class ActiveSetNewton(Solver):
     ) -> _Ready | Answer:
         """The first guess comes from the near answer."""
         return state if isinstance(state, Answer) else replace(state, near=near)
+
+    def together(self, state: _Ready | Answer) -> Together | None:
+        """Sweeps with a banded M ≈ Q⁻¹; contact sets as in `solve` for what they do not settle."""
+        if isinstance(state, Answer):
+            return None
+        Q, nodes, inverse = state.problem.Q, state.problem.assembly.contact_nodes, state.inverse
+
+        def alone(C: Set, p: Vector, tolerance: float) -> Answer:
+            return solve_from(C, ContactSets(Q, p, inverse), tolerance, self.max_sets)
+
+        return Together(Q, banded_inverse(Q, nodes), alone)
 
     def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
         if isinstance(ready, Answer):

@@ -213,6 +213,28 @@ def test_one_fault_is_reported_once_a_form() -> None:
     assert len(words) == 1
 
 
+def test_load_cases_at_once_in_another_order() -> None:
+    class Turned(Sound):
+        def together(self, state: Any) -> Any:
+            def answers(loads: Any, tolerance: float) -> list[Answer]:
+                ready = [self.setup(state, load, tolerance) for load in loads]
+                return [self.solve(*each, tolerance) for each in zip(ready, loads, strict=True)][::-1]
+
+            return answers
+
+    class Short(Sound):
+        def together(self, state: Any) -> Any:
+            return lambda loads, tolerance: []
+
+    class Raising(Sound):
+        def together(self, state: Any) -> Any:
+            return lambda loads, tolerance: loads.pop(9)
+
+    assert "wrong when solved at once by `together`" in words_of(Turned, ("dual",))
+    assert "0 answers to" in words_of(Short, ("dual",))
+    assert "together: raised IndexError" in words_of(Raising, ("dual",))
+
+
 def test_known_answers_fulfil_the_optimality_conditions() -> None:
     for trial in trials():
         prepared, assembly = trial.prepared, trial.prepared.assembly
