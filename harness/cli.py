@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from . import scene_commands, series_command
-from .console import ACCURACY_LOST, option, reported
+from .console import ACCURACY_LOST, Scheduler, option, reported
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
@@ -83,6 +83,7 @@ def run(
     memory_limit: Annotated[int | None, option("MIB", "For the solver's processes together.", min=1)] = None,
     out: Annotated[Path | None, option("DIR", "Where results go.  [default: results/SUITE]")] = None,
     plugin: Plugin = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Measure a suite and write rows, answers and report.
 
@@ -96,9 +97,11 @@ def run(
       python -m harness run --scene my-matrices.npz --tolerance 1e-6 --tolerance 1e-9
       python -m harness run gate --out results/gate
       python -m harness run my-suite.toml --repeat 5 --threads 1 --threads 2
+      python -m harness run --scheduler tcp://10.0.0.5:8786
 
     \b
-    Exit codes: 0 measured, 2 wrong usage or bad input, 3 nothing could be judged, 130 interrupted.
+    Exit codes: 0 measured, 1 not all, for workers were lost, 2 wrong usage or bad input,
+                3 nothing could be judged, 130 interrupted.
     """
     with reported() as console:
         from .plan import Overrides, overridden
@@ -120,7 +123,7 @@ def run(
         chosen = overridden(read_suite(suite), change)
         directory = out or Path("results") / chosen.name
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        code = run_suite(chosen, directory, console)
+        code = run_suite(chosen, directory, console, scheduler)
         from report.build import write  # slow to import: not before the first row
 
         console.print(f"Report: {write(directory)}")

@@ -1,16 +1,23 @@
-"""From what a worker tells to rows: judged, with all that the contract names."""
+"""Measurements, made here or on a worker of a scheduler, and the rows that come of them."""
 
 from __future__ import annotations
 
+import tempfile
 import time
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
+
+from problems.prepare import prepared
+from problems.scene import read_scene
+from solvers.base import Form
 
 from .describe import Description
 from .ground import Ground
 from .judge import Judgement
-from .machine import installed_version
+from .machine import installed_version, machine
 from .measure import measure
 from .plan import Measurement
 from .records import Row
@@ -24,28 +31,65 @@ TOLD = (
 CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
 
 
-def rows_of(
-    batch: list[Measurement],
-    base: Ground,
-    directory: Path,
-    solver: Description,
-    here: str,
-    hopeless: str = "",
-) -> list[Row]:
-    """Measure, judge, and put together the rows. hopeless : the scene that shows that there is no time."""
-    start = time.monotonic()
-    answers = [directory / "answers" / f"{m.stem}.npz" for m in batch]
-    if hopeless:
-        not_run: Row = {"status": "time_limit", "message": f"not run: too slow already on {hopeless}"}
+@dataclass(frozen=True)
+class Order:
+    """What one process is to measure: a measurement, or load cases of a series.
+
+    forms : that the solver takes. hopeless : the scene that shows that there is no time.
+    """
+
+    batch: list[Measurement]
+    forms: Sequence[Form]
+    hopeless: str = ""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the worker processes told, and how long it took.
+
+    From a worker of a scheduler also the answers' files, None where there is none, and its machine.
+    """
+
+    told: list[Row]
+    elapsed_s: float
+    files: list[bytes | None] | None = None
+    machine: dict[str, Any] | None = None
+
+
+def measured(order: Order, answers: Path) -> Measured:
+    """Carry out the order; the answers' files go into that directory."""
+    start, batch = time.monotonic(), order.batch
+    if order.hopeless:
+        not_run: Row = {"status": "time_limit", "message": f"not run: too slow already on {order.hopeless}"}
         told = [not_run] * len(batch)
-    elif batch[0].form in solver.forms:
-        told = measure(batch, answers)
+    elif batch[0].form in order.forms:
+        told = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
     else:
-        told = [{"status": "unsupported", "message": f"takes {' and '.join(solver.forms)} only"}] * len(batch)
-    elapsed = time.monotonic() - start
+        told = [{"status": "unsupported", "message": f"takes {' and '.join(order.forms)} only"}] * len(batch)
+    return Measured(told, time.monotonic() - start)
+
+
+def measured_on_worker(order: Order) -> Measured:
+    """The same on a worker of a scheduler, which has the assembly in its own cache, or builds it first."""
+    prepared(read_scene(order.batch[0].source))
+    with tempfile.TemporaryDirectory() as folder:
+        made = measured(order, Path(folder))
+        paths = [Path(folder) / f"{m.stem}.npz" for m in order.batch]
+        files = [path.read_bytes() if path.exists() else None for path in paths]
+    return Measured(made.told, made.elapsed_s, files, machine())
+
+
+def rows_of(
+    batch: list[Measurement], made: Measured, base: Ground, directory: Path, solver: Description, here: str
+) -> list[Row]:
+    """Judge what was measured, and put together the rows."""
+    answers = [directory / "answers" / f"{m.stem}.npz" for m in batch]
+    for answer, content in zip(answers, made.files or (), strict=bool(made.files)):
+        if content is not None:
+            answer.write_bytes(content)
     return [
-        one_row(m, answer, said, base, solver, here, elapsed)
-        for m, answer, said in zip(batch, answers, told, strict=True)
+        one_row(m, answer, said, base, solver, here, made.elapsed_s)
+        for m, answer, said in zip(batch, answers, made.told, strict=True)
     ]
 
 

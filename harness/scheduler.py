@@ -7,6 +7,7 @@ driver, which alone writes them.
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from problems.errors import Fault, InputError
 
 from .machine import PACKAGES, installed_version
 
+S = TypeVar("S")
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -72,8 +74,8 @@ def _checked(client: Any, scheduler: str) -> tuple[Executor, int]:
 
 
 def versions() -> dict[str, str]:
-    """The packages whose version an answer can depend on."""
-    return {name: installed_version(name) for name in PACKAGES}
+    """Of Python, and of the packages that an answer can depend on."""
+    return {"python": platform.python_version(), **{name: installed_version(name) for name in PACKAGES}}
 
 
 def other_versions(address: str, here: dict[str, str], there: dict[str, str]) -> list[Fault]:
@@ -86,20 +88,26 @@ def other_versions(address: str, here: dict[str, str], there: dict[str, str]) ->
 
 
 def done_as_completed(
-    executor: Executor, count: int, work: Callable[[T], R], tasks: Iterable[T]
+    executor: Executor, count: int, work: Callable[[S], R], tasks: Iterable[tuple[T, S]]
 ) -> Iterator[tuple[T, R | BaseException]]:
-    """Each task with its result, or with what it raised, as they end; only a few are handed out ahead."""
+    """Each task with its result, or with what it raised, as they end; only a few are handed out ahead.
+
+    tasks : what the task is here, and what of it is sent.
+    """
     todo = iter(tasks)
     running: dict[Future[R], T] = {}
     while True:
-        for task in todo:
-            running[executor.submit(work, task)] = task
+        for task, sent in todo:
+            running[executor.submit(work, sent)] = task
             if len(running) >= AHEAD * count:
                 break
         if not running:
             return
-        ended, _ = wait(running, return_when=FIRST_COMPLETED)
-        for future in ended:
+        ended = wait(running, return_when=FIRST_COMPLETED).done
+        while ended:
+            future = ended.pop()
             task = running.pop(future)
             raised = CancelledError() if future.cancelled() else future.exception()
-            yield task, future.result() if raised is None else raised
+            outcome = future.result() if raised is None else raised
+            del future  # what is still held is computed again when the worker that did it is lost
+            yield task, outcome

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import option, reported
+from .console import Scheduler, option, reported
 
 if TYPE_CHECKING:
     from problems.load_cases import LoadCases
@@ -53,9 +53,7 @@ def series(
     ] = 100,
     threads: Annotated[int, option("N", "Threads of the linear algebra.", min=1)] = 2,
     plugin: Annotated[Path | None, option("FILE", "Python file with a solver of your own.")] = None,
-    scheduler: Annotated[
-        str | None, option("WHERE", "Dask: local:N for N workers here, or a scheduler's address.")
-    ] = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
 

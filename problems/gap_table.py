@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from .assembly import LoadCase, Matrix, Prepared
+from .assembly import LoadCase, Matrix, Prepared, Vector
 from .cache import digest
 from .effect import GapEffect
 from .errors import Fault, InputError
@@ -24,11 +24,15 @@ ROWS_AT_A_TIME = 256
 
 @dataclass(frozen=True)
 class MeasuredGaps(LoadCases):
-    """Case k is the scene with row k of the table in place of its gaps. gaps : (rows, m) mm."""
+    """Case k is the scene with a row of the table in place of its gaps.
+
+    gaps : (rows, m) mm. numbers : the cases that the rows are, where they are not 0, 1, 2, …
+    """
 
     forces: LoadCase
     gaps: Matrix
     count: int
+    numbers: tuple[int, ...] = ()
 
     @property
     def key(self) -> str:
@@ -37,10 +41,17 @@ class MeasuredGaps(LoadCases):
 
     def parameters(self, k: int) -> dict[str, float | str]:
         """The hash of its gaps, by which a row that has changed since is found."""
-        return {"gaps": digest(np.ascontiguousarray(self.gaps[k]).tobytes())}
+        return {"gaps": digest(np.ascontiguousarray(self._row(k)).tobytes())}
 
     def load(self, k: int, prepared: Prepared) -> LoadCase:
-        return LoadCase(self.forces.f, np.array(self.gaps[k]))
+        return LoadCase(self.forces.f, np.array(self._row(k)))
+
+    def only(self, numbers: Sequence[int]) -> MeasuredGaps:
+        """Without the other rows."""
+        return replace(self, gaps=np.array([self._row(k) for k in numbers]), numbers=tuple(numbers))
+
+    def _row(self, k: int) -> Vector:
+        return self.gaps[self.numbers.index(k) if self.numbers else k]
 
 
 def measured_gaps(scene: Scene, prepared: Prepared, path: Path, count: int | None = None) -> MeasuredGaps:

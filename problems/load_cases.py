@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 from .assembly import LoadCase, Prepared
 
@@ -20,6 +21,10 @@ class LoadCases(ABC):
     @abstractmethod
     def load(self, k: int, prepared: Prepared) -> LoadCase:
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
+
+    def only(self, numbers: Sequence[int]) -> LoadCases:
+        """What is needed of it for these cases, to send it elsewhere. Their numbers stay."""
+        return self
 
     def parameters(self, k: int) -> dict[str, float | str]:
         """What sets case k apart, for its row."""

@@ -226,9 +226,12 @@ class Desk:
 _open: dict[str, Desk] = {}
 
 
-def solve_on_worker(job: Job, numbers: Sequence[int]) -> list[Result]:
-    """The cases, on the desk that this process keeps for the job: the assembly is opened once a worker."""
+def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
+    """Cases of a job, on the desk that this process keeps for it: the assembly is opened once a worker."""
+    job, numbers = task
     if job.key not in _open:
         _open.clear()
         _open[job.key] = Desk(job)
-    return [result for some in _open[job.key].solve(numbers) for result in some]
+    desk = _open[job.key]
+    desk.job = job  # with these cases
+    return [result for some in desk.solve(numbers) for result in some]

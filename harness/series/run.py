@@ -6,8 +6,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +50,7 @@ def run(
 ) -> int:
     """Solve what is left of a series. `facts` of the solver (version, code) are part of what it is.
 
-    Returns 0, 1 where an answer was found outside the limit or missing, 3 where none could be judged.
+    Returns 0, 1 where an answer was found outside the limit or is missing, 3 where none could be judged.
     Raises InputError where DIRECTORY holds another series; KeyboardInterrupt leaves one that resumes.
     """
     with records.held(directory, ()):
@@ -66,7 +65,7 @@ def run(
         for row in store.rows(directory):
             if row["case"] < job.cases.count:
                 tally.add(row)
-    return summary(tally, console)
+    return summary(tally, job.cases.count, console)
 
 
 @contextmanager
@@ -90,7 +89,8 @@ def on_workers(
     """Blocks of cases, small enough that the workers end together. What fails is left for another run."""
     size = min(max(len(left) // (4 * count), 1), BLOCK)
     blocks = [left[start : start + size] for start in range(0, len(left), size)]
-    for block, outcome in done_as_completed(executor, count, partial(solve_on_worker, job), blocks):
+    tasks = ((block, (replace(job, cases=job.cases.only(block)), block)) for block in blocks)
+    for block, outcome in done_as_completed(executor, count, solve_on_worker, tasks):
         if isinstance(outcome, BaseException):
             why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
             console.print(f"cases {block[0]} … {block[-1]} not solved, run again: {why}", style="red")
@@ -179,10 +179,14 @@ def remember_contacts(job: Job, directory: Path) -> int:
     return assembly.m
 
 
-def summary(tally: Tally, console: Console) -> int:
+def summary(tally: Tally, asked: int, console: Console) -> int:
     seen = [f"{count} {verdict.replace('_', ' ')}" for verdict, count in tally.counts.items() if count]
     error = f", largest of {tally.checked} checked {tally.worst_error_mm:.1e} mm" if tally.checked else ""
     console.print(f"{', '.join(seen)}; largest proven error bound {tally.worst_bound_mm:.1e} mm{error}")
+    missing = asked - sum(tally.counts.values())
+    if missing:
+        console.print(f"Not solved: {missing}. Run the same command again.", style="red")
+        return ACCURACY_LOST
     if not tally.counts["within"] + tally.counts["outside"]:
         return NOTHING_JUDGED
     return ACCURACY_LOST if tally.counts["outside"] + tally.counts["no_answer"] else DONE
