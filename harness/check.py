@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from problems.assembly import LoadCase, Vector
-from solvers.base import FORMS, Answer, Form, Problem, Solver
+from solvers.base import FORMS, Answer, Form, Near, Problem, Solver
 
 from .inspection import LIMIT_MM, TOLERANCE, Finding, distance, inspect
 from .trials import Case, Trial, trials
@@ -58,6 +59,14 @@ def _check_trial(factory: Callable[[], Solver], trial: Trial, form: Form) -> Ite
             yield Finding(form, f"{trial.name}, {case.name}", words, spoilt)
         else:
             yield from wrong
+    if wrong_in_series := _in_series(factory, problem, trial):
+        words = f"right when each is set up, wrong as a series by `update` ({wrong_in_series})"
+        fix = "Let update renew all that depends on the load case; near is a start, not the answer"
+        yield Finding(form, trial.name, words, fix)
+    if wrong_together := _together(factory, problem, trial):
+        words = f"right when each is set up, wrong when solved at once by `together` ({wrong_together})"
+        fix = "An answer to each load, in the order of the loads"
+        yield Finding(form, trial.name, words, fix)
     if _differ(first, steps.answer(first_case), trial, first_case):
         words = "the first load case, solved again after others, has another answer"
         yield Finding(form, trial.name, words, spoilt)
@@ -71,6 +80,33 @@ def _check_trial(factory: Callable[[], Solver], trial: Trial, form: Form) -> Ite
         yield Finding(form, trial.name, "the solver changed the arrays that it was given", fix)
 
 
+def _in_series(factory: Callable[[], Solver], problem: Problem, trial: Trial) -> str:
+    """What is wrong with the cases solved by `update` that are right when each is set up; "" if nothing."""
+    steps = _Steps(factory(), problem)
+    steps.answer(trial.cases[0])
+    for before, case in pairwise(trial.cases):
+        wrong = list(inspect(steps.next_answer(case, before), trial, case, problem.form))
+        alone = _Steps(factory(), problem).answer(case)
+        if wrong and not list(inspect(alone, trial, case, problem.form)):
+            return f"{case.name}: {wrong[0].wrong}"
+    return ""
+
+
+def _together(factory: Callable[[], Solver], problem: Problem, trial: Trial) -> str:
+    """What is wrong with the cases solved by `together` that are right when each is set up; "" if nothing."""
+    answers = _Steps(factory(), problem).answers(trial.cases)
+    if answers is None:
+        return ""
+    if len(answers) != len(trial.cases):
+        return f"{len(answers)} answers to {len(trial.cases)} load cases"
+    for case, answer in zip(trial.cases, answers, strict=True):
+        wrong = list(inspect(answer, trial, case, problem.form))
+        alone = _Steps(factory(), problem).answer(case)
+        if wrong and not list(inspect(alone, trial, case, problem.form)):
+            return f"{case.name}: {wrong[0].wrong}"
+    return ""
+
+
 class _Raised(Exception):
     """A step of the solver raised; the finding says what."""
 
@@ -82,12 +118,29 @@ class _Steps:
     """A solver taken through its steps as a measurement does; what it raises becomes a finding."""
 
     def __init__(self, solver: Solver, problem: Problem) -> None:
-        self.solver, self.form = solver, problem.form
+        self.solver, self.form, self.problem = solver, problem.form, problem
         self.state = self._call("prepare", self._call("convert", problem))
 
     def answer(self, case: Case, tolerance: float = TOLERANCE) -> Answer:
-        ready = self._call("setup", self.state, case.load, tolerance)
-        return self._call("solve", ready, case.load, tolerance)
+        self.ready = self._call("setup", self.state, case.load, tolerance)
+        return self._call("solve", self.ready, case.load, tolerance)
+
+    def next_answer(self, case: Case, before: Case) -> Answer:
+        """As a series does, from the answer of the case before."""
+        gap = before.load.g - self.problem.assembly.A.T @ before.x
+        near = Near(before.load, before.lam, gap, before.x if self.form == "primal" else None)
+        self.ready = self._call("update", self.state, self.ready, case.load, TOLERANCE, near)
+        return self._call("solve", self.ready, case.load, TOLERANCE)
+
+    def answers(self, cases: Sequence[Case]) -> list[Answer] | None:
+        """Those of all cases at once; None where the solver has no such way."""
+        solve_all = self._call("together", self.state)
+        if solve_all is None:
+            return None
+        try:
+            return list(solve_all([case.load for case in cases], TOLERANCE))
+        except Exception as error:
+            raise _Raised(_raised(self.form, "together", error)) from error
 
     def _call(self, step: str, *arguments: Any) -> Any:
         try:

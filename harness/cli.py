@@ -1,4 +1,5 @@
-"""The command line: run, report, gate, list, check; those of one scene are in scene_commands.py.
+"""The command line: run, report, gate, list, check; `series` is in series_command.py, those of one scene in
+scene_commands.py.
 
 What takes time to import is imported in the commands.
 """
@@ -13,13 +14,14 @@ from typing import Annotated
 
 import typer
 
-from . import scene_commands
-from .console import ACCURACY_LOST, option, reported
+from . import scene_commands, series_command
+from .console import ACCURACY_LOST, Scheduler, option, reported
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
 app.add_typer(scene_commands.app)
+app.add_typer(series_command.app)
 
 
 class FormName(StrEnum):
@@ -33,7 +35,7 @@ class Listed(StrEnum):
     suites = "suites"
 
 
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")]
+Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")]
 Plugin = Annotated[Path | None, option("FILE", "Python file with a solver of your own.")]
 
 
@@ -48,6 +50,7 @@ def harness() -> None:
       python -m harness list solvers              what can be measured
       python -m harness run --plugin mine.py      with a solver of your own
       python -m harness solve scene.toml --out d  one scene: gaps, displacements, forces, with pictures
+      python -m harness series SCENE --out DIR    thousands of load cases on one assembly
       python -m harness COMMAND --help            more on each command
 
     \b
@@ -80,6 +83,7 @@ def run(
     memory_limit: Annotated[int | None, option("MIB", "For the solver's processes together.", min=1)] = None,
     out: Annotated[Path | None, option("DIR", "Where results go.  [default: results/SUITE]")] = None,
     plugin: Plugin = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Measure a suite and write rows, answers and report.
 
@@ -93,9 +97,11 @@ def run(
       python -m harness run --scene my-matrices.npz --tolerance 1e-6 --tolerance 1e-9
       python -m harness run gate --out results/gate
       python -m harness run my-suite.toml --repeat 5 --threads 1 --threads 2
+      python -m harness run --scheduler tcp://10.0.0.5:8786
 
     \b
-    Exit codes: 0 measured, 2 wrong usage or bad input, 3 nothing could be judged, 130 interrupted.
+    Exit codes: 0 measured, 1 not all, for workers were lost, 2 wrong usage or bad input,
+                3 nothing could be judged, 130 interrupted.
     """
     with reported() as console:
         from .plan import Overrides, overridden
@@ -117,7 +123,7 @@ def run(
         chosen = overridden(read_suite(suite), change)
         directory = out or Path("results") / chosen.name
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        code = run_suite(chosen, directory, console)
+        code = run_suite(chosen, directory, console, scheduler)
         from report.build import write  # slow to import: not before the first row
 
         console.print(f"Report: {write(directory)}")
@@ -136,7 +142,13 @@ def report(directory: Directory) -> None:
         from problems.errors import InputError
 
         from . import records
+        from .series.store import SERIES
 
+        if (directory / SERIES).is_file():
+            from report.series_report import write as write_series
+
+            console.print(f"Report: {write_series(directory)}")
+            return
         path = directory / records.MEASUREMENTS
         if not path.is_file():
             raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` makes one")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,6 +18,11 @@ ACCURACY_LOST, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 
 def option(metavar: str, help: str, **limits: Any) -> Any:
     return typer.Option(metavar=metavar, help=help, **limits)
+
+
+Scheduler = Annotated[
+    str | None, option("WHERE", "Dask: local:N for N workers here, or a scheduler's address.")
+]
 
 
 @contextmanager

@@ -128,9 +128,9 @@ def _subtract_dense(total: Sum, rows: slice, K: Matrix, x: Double) -> None:
     n = len(K)
     bits = (53 - int(np.ceil(np.log2(max(n, 2))))) // 2 + 1
     slices, rest = [], x.hi
-    top = _exponent(np.max(abs(x.hi), initial=0.0))
+    top = exponent(np.max(abs(x.hi), initial=0.0))
     for k in range(X_SLICES):
-        piece, rest = _cut(rest, top - k * bits, bits)
+        piece, rest = cut(rest, top - k * bits, bits)
         slices.append(piece)
     exact, inexact = np.column_stack(slices), np.column_stack([rest, x.lo])
     left = float(abs(inexact).sum()) * (1 + 4 * n * U)
@@ -139,10 +139,10 @@ def _subtract_dense(total: Sum, rows: slice, K: Matrix, x: Double) -> None:
     for start in range(0, n, ROWS_AT_A_TIME):
         chunk = slice(start, min(start + ROWS_AT_A_TIME, n))
         remainder = K.T[chunk]  # K is symmetric and stored by columns, so these are contiguous rows
-        exponents = _exponent(np.max(abs(remainder), axis=1, keepdims=True))
+        exponents = exponent(np.max(abs(remainder), axis=1, keepdims=True))
         products[:2, chunk] = (remainder @ inexact).T
         for k in range(K_SLICES):
-            piece, remainder = _cut(remainder, exponents - k * bits, bits)
+            piece, remainder = cut(remainder, exponents - k * bits, bits)
             products[2 + k * X_SLICES : 2 + (k + 1) * X_SLICES, chunk] = (piece @ exact).T
         products[-1, chunk] = remainder @ x.hi
         error[chunk] = gamma(n) * np.exp2(exponents[:, 0]) * (left + 2.0 ** (-K_SLICES * bits) * length)
@@ -153,13 +153,13 @@ def _subtract_dense(total: Sum, rows: slice, K: Matrix, x: Double) -> None:
     total.error[rows] += 1.01 * error
 
 
-def _exponent(size: Matrix | float) -> Matrix:
+def exponent(size: Matrix | float) -> Matrix:
     """The least e with |size| < 2^e."""
     return np.frexp(size)[1].astype(float)
 
 
-def _cut(a: Matrix, exponent: Matrix, bits: int) -> tuple[Matrix, Matrix]:
-    """a = piece + rest exactly, piece in units of 2^(exponent − bits + 1), for |a| ≤ 2^exponent."""
-    sigma = 1.5 * np.exp2(exponent + 53 - bits)
+def cut(a: Matrix, top: Matrix | float, bits: int) -> tuple[Matrix, Matrix]:
+    """a = piece + rest exactly, piece in units of 2^(top − bits + 1), for |a| ≤ 2^top."""
+    sigma = 1.5 * np.exp2(top + 53 - bits)
     piece = (a + sigma) - sigma
     return piece, a - piece

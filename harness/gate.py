@@ -86,7 +86,7 @@ def judged(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
     for row in sorted(rows.values(), key=lambda row: str(row["source"])):
         if base is None or row["source"] != source:
             base, source = ground(row["source"]), row["source"]
-        yield judged_row(row, base, directory)
+        yield judged_row(row, base.of_case(row.get("series"), row.get("case")), directory)
 
 
 def judged_row(row: Row, base: Ground, directory: Path) -> Finding:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from problems.build import Progress
 from problems.effect import ForceEffect
 from problems.errors import InputError
 from problems.prepare import load_case, prepared
+from problems.random_gaps import random_gaps
 from problems.scene import Scene, read_scene
 
 from . import records
@@ -38,6 +39,13 @@ class Ground:
         cond_K: Any = self.prepared.facts["cond_K"]
         largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
         return conditioned_limit(asked, cond_K, largest)
+
+    def of_case(self, series: dict[str, Any] | None, case: int | None) -> Ground:
+        """That of a load case of a series on the scene, with a reference of its own."""
+        if series is None or case is None:
+            return self
+        load = random_gaps(self.scene, self.prepared, **series).load(case, self.prepared)
+        return replace(self, load=load, reference=reference(self.scene.key, self.prepared, load))
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""

@@ -15,6 +15,7 @@ import site
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,8 @@ FAMILY_S = 0.5  # between two looks for processes that the worker forked
 LAST_FORKS_S = 10.0  # for killing what forks on
 
 JOB = ("source", "solver", "options", "plugin", "form", "tolerance", "yardstick")
+#: What a worker says once, for all the load cases of a series.
+SHARED = ("load_s", "convert_s", "prepare_s", "data_mib")
 THREAD_VARIABLES = (
     *("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"),
     *("VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS", "RAYON_NUM_THREADS"),
@@ -51,22 +54,30 @@ def environment(threads: int) -> dict[str, str]:
     return {**os.environ, **count, "OMP_DYNAMIC": "FALSE", "PYTHONPATH": os.pathsep.join(paths)}
 
 
-def measure(measurement: Measurement, answer: Path) -> Row:
-    """Run one measurement in a process of its own; the answer is saved at `answer`.
+def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Row]:
+    """Run measurements in one process: one, or some load cases of a series. Each answer is saved.
 
-    Returns the worker's part of the row: status, message, times, peak memory, …
+    Returns the worker's part of each row: status, message, times, peak memory, … Where a case ends the
+    process, those that follow have its status.
     """
-    with Worker(measurement, answer) as worker:
+    with Worker(measurements, answers) as worker:
         while not worker.over():
             worker.listen(POLL_S)
-        return worker.outcome()
+        last = worker.outcome()
+        ended = measurements[len(worker.finished)].key
+        lost = {"status": last["status"], "message": f"not run: {ended} ended the process"}
+        rows = [*worker.finished, last]
+        return rows + [lost] * (len(measurements) - len(rows))
 
 
 class Worker:
     """A running measurement, as a context: on leaving it, every process of it is dead."""
 
-    def __init__(self, measurement: Measurement, answer: Path) -> None:
+    def __init__(self, measurements: Sequence[Measurement], answers: Sequence[Path]) -> None:
+        measurement = measurements[0]
         self.limits = measurement
+        self.count = len(measurements)
+        self.finished: list[Row] = []  # all but the last
         self.said: Row = {}
         self.verdict: Row = {}  # what the driver decided: a limit passed
         self.stderr = b""
@@ -77,7 +88,9 @@ class Worker:
         events, theirs = os.pipe()
         job = {
             "events": theirs,
-            "answer": str(answer),
+            "answers": list(map(str, answers)),
+            "cases": [each.case for each in measurements],
+            "series": measurement.series.model_dump() if measurement.series else None,
             **{name: getattr(measurement, name) for name in JOB},
         }
         try:
@@ -136,6 +149,9 @@ class Worker:
         if event.get("phase") in PHASES:
             self.phase, self.phase_started = event.pop("phase"), time.monotonic()
         self.said |= event
+        if "status" in event and len(self.finished) < self.count - 1:
+            self.finished.append({"stderr": None, **self.said})
+            self.said = {name: self.said[name] for name in SHARED if name in self.said}
 
     def _take_stderr(self, chunk: bytes) -> None:
         self.stderr = (self.stderr + chunk)[-STDERR_TAIL:]

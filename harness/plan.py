@@ -17,7 +17,7 @@ from problems.errors import Fault, InputError
 from problems.scene import read_scene
 from solvers.base import FORMS, Form
 
-from .suite import SolverEntry, Suite, checked, found_scenes
+from .suite import RandomCases, SolverEntry, Suite, checked, found_scenes
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,27 @@ class Measurement:
     gated: bool
     plugin: str | None = None
     yardstick: bool = False
+    series: RandomCases | None = None
+    case: int | None = None
+
+    @property
+    def process(self) -> tuple[object, ...]:
+        """What the load cases of a series that one process solves have in common."""
+        return self.scene, self.solver, self.form, self.variant, self.tolerance, self.threads, self.repeat
 
     @cached_property
     def key(self) -> str:
         """Identity of the measurement, the same in every run: '4386/0107 ipm dual tol=1e-09 …'."""
         words = [self.scene, self.solver, self.form, *([self.variant] if self.variant else [])]
         words += [f"tol={self.tolerance:g}", f"threads={self.threads}", f"repeat={self.repeat}"]
+        words += [] if self.case is None else [f"case={self.case}"]
         return " ".join(words + ([json.dumps(self.options, sort_keys=True)] if self.options else []))
 
     @property
     def stem(self) -> str:
         """A file name for it."""
         words = [self.scene, self.solver, self.form, self.variant, f"{self.tolerance:g}"]
-        words += [f"t{self.threads}", f"r{self.repeat}"]
+        words += [f"t{self.threads}", f"r{self.repeat}", "" if self.case is None else f"c{self.case}"]
         return re.sub(r"[^\w.+-]+", "-", "_".join(filter(None, words)))
 
 
@@ -130,7 +138,8 @@ def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
 
 
 def expand(suite: Suite) -> list[Measurement]:
-    """All measurements of a suite, by scene; none on a rung that the model is to refuse.
+    """All measurements of a suite, by scene, the load cases of a series one after another; none on a rung
+    that the model is to refuse.
 
     Repeats are interleaved, each round shuffled with a seed of its own, so that a drift of the machine
     does not fall on one solver. What differs in the tolerance alone keeps the suite's order, so that a
@@ -185,7 +194,8 @@ def _of_entry(
 ) -> Iterator[Measurement]:
     tolerances = entry.tolerances or suite.tolerances
     n, _ = read_scene(source).expected_size or (0, 0)
-    for form, tolerance, threads in product(entry.forms or FORMS, tolerances, suite.threads):
+    cases = range(suite.series.cases) if suite.series else (None,)
+    for form, tolerance, threads, case in product(entry.forms or FORMS, tolerances, suite.threads, cases):
         yield Measurement(
             suite=suite.name,
             scene=scene,
@@ -203,6 +213,8 @@ def _of_entry(
             gated=entry.gated,
             plugin=suite.plugin,
             yardstick=suite.yardstick,
+            series=suite.series,
+            case=case,
         )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -48,9 +48,9 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def append(path: Path, row: Row) -> None:
-    """Append one line and force it to the disk; on a failure (a full disk) leave the file as it was."""
-    rest = memoryview(to_line(row).encode() + b"\n")
+def append(path: Path, *rows: Row) -> None:
+    """Append a line each and force them to the disk; on a failure (a full disk) leave the file as it was."""
+    rest = memoryview("".join(to_line(row) + "\n" for row in rows).encode())
     with path.open("ab", buffering=0) as file:  # a buffer would write what is left of it on closing
         size = file.seek(0, os.SEEK_END)
         try:
@@ -129,11 +129,11 @@ def replace_text(path: Path, text: str) -> None:
 
 
 @contextmanager
-def held(directory: Path) -> Iterator[None]:
+def held(directory: Path, folders: Sequence[str] = ("answers", "scenes")) -> Iterator[None]:
     """Make the directory and hold it against a second run. Raises InputError if that cannot be."""
     try:
-        (directory / "answers").mkdir(parents=True, exist_ok=True)
-        (directory / "scenes").mkdir(exist_ok=True)
+        for folder in ("", *folders):
+            (directory / folder).mkdir(parents=True, exist_ok=True)
         lock = filelock.FileLock(directory / ".lock", timeout=0)
         lock.acquire()
     except filelock.Timeout:

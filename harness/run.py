@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from contextlib import suppress
-from dataclasses import asdict
-from datetime import UTC, datetime
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,32 +20,25 @@ from problems.scene import read_scene
 from . import records
 from .describe import Description, describe
 from .ground import Ground, ground, record, record_refusal
-from .judge import Judgement
-from .machine import installed_version, machine, physical_memory_mib
-from .measure import measure
+from .machine import machine, physical_memory_mib
 from .plan import Measurement, expand
 from .records import Row
+from .rows import Measured, Order, measured, measured_on_worker, rows_of
+from .scheduler import done_as_completed, workers
 from .show import Display
 from .suite import Suite, to_toml
 
-DONE, NOTHING_JUDGED = 0, 3
-
-#: A row's fields that the worker tells of; null where it does not.
-TOLD = (
-    *("status", "message", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
-    *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details"),
-    *("cholesky_s", "product_s", "stderr", "answer"),
-)
-CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
+DONE, NOT_MEASURED, NOTHING_JUDGED = 0, 1, 3
 
 Solvers = dict[tuple[str, str], Description]
 
 
-def run(suite: Suite, directory: Path, console: Console) -> int:
-    """Make the suite's measurements that DIRECTORY does not hold yet.
+def run(suite: Suite, directory: Path, console: Console, scheduler: str | None = None) -> int:
+    """Make the suite's measurements that DIRECTORY does not hold yet, here or on a scheduler's workers.
 
-    Returns 0, or 3 when no row of the suite could be judged. Raises InputError before the first
-    measurement where the suite cannot be run; KeyboardInterrupt leaves a directory that resumes.
+    Returns 0, 1 when a worker was lost too often, or 3 when no row of the suite could be judged. Raises
+    InputError before the first measurement where the suite cannot be run; KeyboardInterrupt leaves a
+    directory that resumes.
     """
     descriptions = describe(suite)
     suite = with_forms(suite, descriptions)
@@ -58,15 +51,20 @@ def run(suite: Suite, directory: Path, console: Console) -> int:
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)
-        here = remember_machine(directory)
+        here = remember_machine(directory, machine())
         made = {row["key"] for row in rows}
         left = [m for m in plan if m.key not in made]
         done = len(plan) - len(left)
         console.print(f"{suite.name}: {len(plan)} measurements, {done} of them already in {directory}")
         if left:
-            rows = measure_all(left, rows, done, directory, solvers, here, console)
+            with outcomes_of(scheduler, directory, console) as outcomes:
+                rows = measure_all(left, rows, done, directory, solvers, here, outcomes, console)
     planned = {m.key for m in plan}
-    return summary([row for row in rows if row["key"] in planned], console)
+    code = summary([row for row in rows if row["key"] in planned], console)
+    missing = len(planned - {row["key"] for row in rows})
+    if missing:
+        console.print(f"Not measured: {missing}. Run the same command again.", style="red")
+    return NOT_MEASURED if missing else code
 
 
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
@@ -76,6 +74,30 @@ def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
     return suite.model_copy(update={"solver": filled})
 
 
+@dataclass(frozen=True)
+class Due:
+    """A batch that is next, and what its answers are judged on."""
+
+    batch: list[Measurement]
+    base: Ground
+    solver: Description
+
+
+#: Takes what is due and what of it a process must know; gives back what is due with what was measured.
+Outcomes = Callable[[Iterator[tuple[Due, Order]]], Iterator[tuple[Due, Measured | BaseException]]]
+
+
+@contextmanager
+def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Iterator[Outcomes]:
+    """One measurement after another here, or one at a time on each worker of a scheduler."""
+    if scheduler is None:
+        yield lambda tasks: ((due, measured(order, directory / "answers")) for due, order in tasks)
+        return
+    with workers(scheduler) as (executor, count):
+        console.print(f"{count} workers at {scheduler}")
+        yield partial(done_as_completed, executor, count, measured_on_worker)
+
+
 def measure_all(
     left: list[Measurement],
     rows: list[Row],
@@ -83,27 +105,51 @@ def measure_all(
     directory: Path,
     solvers: Solvers,
     here: str,
+    outcomes: Outcomes,
     console: Console,
 ) -> list[Row]:
     """Make the measurements and append their rows. `rows` are those of DIRECTORY so far."""
     sizes = {m.scene: size[0] for m in left if (size := read_scene(m.source).expected_size)}
-    rows, base = list(rows), None
+    rows = list(rows)
     with Display(console, left, done, sizes) as display:
-        for measurement in left:
-            if base is None or base.scene.name != measurement.scene:
-                start = time.monotonic()
-                base = ground(measurement.source, partial(display.building, measurement.scene))
-                record(base, directory)
-                display.ready(measurement.scene, time.monotonic() - start)
-            display.doing(f"{measurement.scene}: {measurement.solver} {measurement.form}")
-            start = time.monotonic()
-            solver = solvers[measurement.solver, measurement.variant]
-            hopeless = out_of_time_before(measurement, base.prepared.assembly.n, rows)
-            row = one_row(measurement, base, directory, solver, here, hopeless)
-            records.append(directory / records.MEASUREMENTS, row)
-            rows.append(row)
-            display.finished(measurement, row, time.monotonic() - start)
+        for due, outcome in outcomes(due_next(left, rows, directory, solvers, display)):
+            if isinstance(outcome, BaseException):
+                why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
+                console.print(f"{due.batch[0].key}: not measured: {why}", style="red")
+                continue
+            where = remember_machine(directory, outcome.machine) if outcome.machine else here
+            made = rows_of(due.batch, outcome, due.base, directory, due.solver, where)
+            records.append(directory / records.MEASUREMENTS, *made)
+            rows += made
+            for each, row in zip(due.batch, made, strict=True):
+                display.finished(each, row, outcome.elapsed_s / len(due.batch))
     return rows
+
+
+def due_next(
+    left: list[Measurement], rows: list[Row], directory: Path, solvers: Solvers, display: Display
+) -> Iterator[tuple[Due, Order]]:
+    """One batch after another, each scene opened when its first is due. `rows` grow meanwhile."""
+    base = None
+    for batch in batches(left):
+        m = batch[0]
+        if base is None or base.scene.name != m.scene:
+            start = time.monotonic()
+            base = ground(m.source, partial(display.building, m.scene))
+            record(base, directory)
+            display.ready(m.scene, time.monotonic() - start)
+        display.doing(f"{m.scene}: {m.solver} {m.form}")
+        solver = solvers[m.solver, m.variant]
+        hopeless = out_of_time_before(m, base.prepared.assembly.n, rows)
+        yield Due(batch, base, solver), Order(batch, solver.forms, hopeless)
+
+
+def batches(left: list[Measurement]) -> list[list[Measurement]]:
+    """The measurements that one process makes: one each, or the load cases of a series."""
+    found: dict[object, list[Measurement]] = {}
+    for m in left:
+        found.setdefault(m.key if m.case is None else m.process, []).append(m)
+    return list(found.values())
 
 
 def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
@@ -134,48 +180,6 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
         if row["status"] == "time_limit" and m.time_limit_s <= growth * row["time_limit_s"]
     ]
     return ", ".join(sorted({row["scene"] for row in late})) if len(late) == len(there) else ""
-
-
-def one_row(
-    m: Measurement, base: Ground, directory: Path, solver: Description, here: str, hopeless: str = ""
-) -> Row:
-    """Measure, judge, and put together the row. hopeless : the scene that shows that there is no time."""
-    start = time.monotonic()
-    answer = directory / "answers" / f"{m.stem}.npz"
-    if hopeless:
-        told: Row = {"status": "time_limit", "message": f"not run: too slow already on {hopeless}"}
-    elif m.form in solver.forms:
-        told = measure(m, answer)
-    else:
-        told = {"status": "unsupported", "message": f"takes {' and '.join(solver.forms)} only"}
-    if "cannot_save" in told:
-        raise OSError(told["cannot_save"])
-    limit_mm, judgement = base.limit_mm(m.limit_mm), Judgement("no_answer", base.reference.bound_mm)
-    if told.get("answer"):
-        judgement = base.judge_file(answer, limit_mm)
-    told = {name: told.get(name) for name in TOLD}
-    known = [told[name] for name in CLOCKS if told[name] is not None]
-    return {
-        "key": m.key,
-        **{name: getattr(m, name) for name in ("suite", "scene", "source", "solver", "form", "variant")},
-        "n": base.prepared.assembly.n,
-        "m": base.prepared.assembly.m,
-        "active": int(base.reference.active.sum()),
-        **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated")},
-        "limit_mm": limit_mm,
-        "limit_asked_mm": m.limit_mm,
-        "threads_asked": m.threads,
-        **told,
-        **asdict(judgement),
-        **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
-        "overhead_s": time.monotonic() - start - sum(known),
-        "machine": here,
-        "scene_key": base.scene.key,
-        "solver_version": solver.version,
-        "solver_code": solver.code,
-        "rivetbench_version": installed_version("rivetbench"),
-        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
 
 
 def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
@@ -232,14 +236,17 @@ def refuse_what_cannot_fit(plan: list[Measurement]) -> None:
         raise InputError(faults)
 
 
-def remember_machine(directory: Path) -> str:
+def remember_machine(directory: Path, here: dict[str, Any]) -> str:
     """Write DIRECTORY/machine.json, keep that of another machine under another name; returns its line."""
-    here: dict[str, Any] = machine()
-    path = directory / "machine.json"
-    with suppress(OSError, ValueError):
-        if json.loads(path.read_text("utf-8"))["machine"] != here["machine"]:
-            path.rename(path.with_name(f"machine-{len(list(directory.glob('machine*.json')))}.json"))
-    records.replace_text(path, json.dumps(here, indent=1, ensure_ascii=False) + "\n")
+    new = directory / "machine.json"
+    for path in sorted(directory.glob("machine*.json")):
+        with suppress(OSError, ValueError):
+            if json.loads(path.read_text("utf-8"))["machine"] == here["machine"]:
+                new = path
+                break
+            if path == new:
+                path.rename(path.with_name(f"machine-{len(list(directory.glob('machine*.json')))}.json"))
+    records.replace_text(new, json.dumps(here, indent=1, ensure_ascii=False) + "\n")
     return str(here["machine"])
 
 

@@ -48,6 +48,21 @@ class SolverEntry(BaseModel):
     time_limit_s: PositiveFloat | None = None
 
 
+class RandomCases(BaseModel):
+    """[series]: each scene with so many random initial gaps, solved in one process one after another.
+
+    mean, sd and correlation_length, mm, are those of the scene's `initial_gap` where they are not given.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    cases: PositiveInt
+    seed: Annotated[int, Field(ge=0)] = 0
+    mean: float | None = None
+    sd: PositiveFloat | None = None
+    correlation_length: PositiveFloat | None = None
+
+
 class Suite(BaseModel):
     """What a suite file says; scenes are names, or absolute paths of files. `name` is the file's.
 
@@ -70,6 +85,7 @@ class Suite(BaseModel):
     limit_mm: PositiveFloat = 1e-7
     yardstick: bool = False
     plugin: str | None = None
+    series: RandomCases | None = None
     solver: Annotated[list[SolverEntry], Some]
 
     def time_limit(self, n: int) -> float:

@@ -1,9 +1,10 @@
-"""The process that measures: one solver on one load case, and nothing else in it.
+"""The process that measures: one solver on one load case, or on those of a series; nothing else in it.
 
 `python -m harness.worker`, with a job as the first line of stdin; events go back as JSON lines on the
 file descriptor that the job names. Every event is a piece of the row: the driver merges them, so that
 what is known of a killed worker is kept. An event with `phase` (start, solve, save) starts the clock of
-another limit, the one with `status` ends the measurement; then the worker waits to be ended.
+another limit, the one with `status` ends the measurement, or the case of a series that is due; after the
+last one the worker waits to be ended.
 """
 
 from __future__ import annotations
@@ -17,16 +18,17 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import numpy as np
 import threadpoolctl
 
-from problems.assembly import Prepared, Vector
+from problems.assembly import LoadCase, Prepared, Vector
 from problems.prepare import load_case, prepared
-from problems.scene import read_scene
-from solvers.base import Answer, Load, Problem, Status
+from problems.scene import Scene, read_scene
+from solvers.base import Answer, Load, Near, Problem, Solver, Status
 from solvers.registry import make_solver
 
 from .machine import resident_mib
@@ -97,6 +99,7 @@ class Run:
             return call()
 
     def measured(self) -> Row:
+        """Solve the job's load cases. How the last one ended is returned; of the others it is told here."""
         job = self.job
         solver = make_solver(job["solver"], job["options"], Path(job["plugin"]) if job["plugin"] else None)
         if job["form"] not in solver.forms:
@@ -104,35 +107,84 @@ class Run:
         with self.lap("load_s"):
             scene = read_scene(job["source"])
             data = prepared(scene)
-            case = load_case(scene, data)
+            cases = list(load_cases(scene, data, job))
             touch(data, job["form"])
+        series = Series(solver, Problem(data, job["form"]), job["tolerance"])
+        *others, last = zip(cases, job["answers"], strict=True)
+        for case, answer in others:
+            self.tell(**self.solved(series, case, Path(answer)))
+        return self.solved(series, last[0], Path(last[1]))
+
+    def solved(self, series: Series, case: LoadCase, answer_file: Path) -> Row:
+        """Solve one load case and save its answer; how that ended."""
+        data, form, tolerance = series.problem.prepared, series.problem.form, series.tolerance
         start = time.perf_counter()
         load = Load(case.f, case.g, data.dual_load(case))
         form_s = time.perf_counter() - start
         for array in (load.f, load.g, load.p):
             array.flags.writeable = False
+        near = series.nearest(load)
 
-        self.tell(phase="solve", data_mib=resident_mib("VmRSS"))
-        problem, tolerance = Problem(data, job["form"]), job["tolerance"]
-        converted = self.timed("convert_s", lambda: solver.convert(problem))
-        state = self.timed("prepare_s", lambda: solver.prepare(converted))
-        ready = self.timed("setup_s", lambda: solver.setup(state, load, tolerance))
-        answer = self.timed("solve_s", lambda: solver.solve(ready, load, tolerance))
-        said = checked(answer, data, job["form"])
+        self.tell(phase="solve", **({} if series.begun else {"data_mib": resident_mib("VmRSS")}))
+        solver = series.solver
+        if not series.begun:
+            converted = self.timed("convert_s", lambda: solver.convert(series.problem))
+            series.state = self.timed("prepare_s", lambda: solver.prepare(converted))
+            series.begun = True
+        set_up = partial(solver.setup, series.state, load, tolerance)
+        if near is not None:
+            set_up = partial(solver.update, series.state, series.ready, load, tolerance, near)
+        series.ready = self.timed("setup_s", set_up)
+        answer = self.timed("solve_s", lambda: solver.solve(series.ready, load, tolerance))
+        said = checked(answer, data, form)
         x, lam = answer.x, answer.lam
-        if job["form"] == "dual" and lam is not None:
+        if form == "dual" and lam is not None:
             with self.lap("form_s", form_s):
                 x = data.recover(np.asarray(lam, dtype=float), case)
         self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
-        if job["yardstick"]:
+        if self.job["yardstick"]:
             self.tell(**yardstick(data.Q))
+        series.keep(load, answer)
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
-            save(Path(job["answer"]), x, lam, data.assembly.m)
+            save(answer_file, x, lam, data.assembly.m)
         except OSError as error:
-            return {"status": "failed", "cannot_save": f"{job['answer']}: {error}"}
-        return {"status": answer.status, "answer": f"answers/{Path(job['answer']).name}"}
+            return {"status": "failed", "cannot_save": f"{answer_file}: {error}"}
+        return {"status": answer.status, "answer": f"answers/{answer_file.name}"}
+
+
+class Series:
+    """A solver on load case after load case: what it keeps between them, and the answers to start from."""
+
+    def __init__(self, solver: Solver, problem: Problem, tolerance: float) -> None:
+        self.solver, self.problem, self.tolerance = solver, problem, tolerance
+        self.state: Any = None
+        self.ready: Any = None
+        self.nears: list[Near] = []
+        self.begun = False
+
+    def nearest(self, load: Load) -> Near | None:
+        """The answer of the nearest overlap p, or None where there is none."""
+        return min(self.nears, key=lambda near: float(np.linalg.norm(near.load.p - load.p)), default=None)
+
+    def keep(self, load: Load, answer: Answer) -> None:
+        if answer.lam is not None:
+            lam = np.asarray(answer.lam, dtype=float)
+            x = answer.x if self.problem.form == "primal" else None
+            self.nears.append(Near(load, lam, self.problem.Q @ lam - load.p, x))
+
+
+def load_cases(scene: Scene, data: Prepared, job: Row) -> Iterator[LoadCase]:
+    """The scene's own load case, or those of a series."""
+    if job["series"] is None:
+        yield load_case(scene, data)
+        return
+    from problems.random_gaps import random_gaps
+
+    cases = random_gaps(scene, data, **job["series"])
+    for case in job["cases"]:
+        yield cases.load(case, data)
 
 
 def touch(data: Prepared, form: str) -> None:

@@ -31,6 +31,7 @@ from .sections import (
     recommendation,
     residual_error,
     rungs,
+    series,
     speed,
     stability,
     summary,
@@ -42,6 +43,7 @@ SECTIONS: list[Callable[[Results], Section | None]] = [
     summary.section,
     recommendation.section,
     speed.section,
+    series.section,
     claims.section,
     table1.section,
     table2.section,
@@ -84,25 +86,29 @@ def write(directory: Path) -> Path:
             sections = [section for section in made if section]
             parts.append((part, [_save(section, target, i) for section in sections]))
     path = target / "report.md"
-    path.write_text(_template().render(results=results, parts=parts, warnings=warnings(results)), "utf-8")
+    path.write_text(
+        template("report.md.j2").render(results=results, parts=parts, warnings=warnings(results)), "utf-8"
+    )
     return path
 
 
-def _template() -> jinja2.Template:
+def template(name: str) -> jinja2.Template:
+    """A template of report/templates."""
     loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
     environment = jinja2.Environment(
         loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    return environment.get_template("report.md.j2")
+    return environment.get_template(name)
 
 
 def _save(section: Section, target: Path, machine: int) -> Section:
     """Write the section's files; those of a second machine on take its number into their names."""
     prefix = f"machine{machine + 1}-" if machine else ""
-    return replace(section, blocks=[_save_block(block, target, prefix) for block in section.blocks])
+    return replace(section, blocks=[save_block(block, target, prefix) for block in section.blocks])
 
 
-def _save_block(block: Block, target: Path, prefix: str) -> Block:
+def save_block(block: Block, target: Path, prefix: str = "") -> Block:
+    """Write a table's CSV or a figure's PNG; returns the block under the name that it was given."""
     match block:
         case Table():
             block = replace(block, name=prefix + block.name)

@@ -23,7 +23,7 @@ from .numbers import tidy_power
 
 TIMES = ("convert_s", "prepare_s", "setup_s", "solve_s", "form_s")
 NUMBERS = (
-    *("n", "m", "active", "tolerance", "threads", "repeat", "iterations", "inner_iterations"),
+    *("n", "m", "active", "tolerance", "threads", "repeat", "case", "iterations", "inner_iterations"),
     *TIMES,
     *("solver_reported_s", "displacement_error_mm", "limit_mm", "reference_bound_mm", "contact_mismatch"),
     *("min_gap_mm", "primal_residual", "dual_residual", "duality_gap", "peak_rss_mib"),
@@ -171,7 +171,7 @@ def _frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[st
     for name in ("time_limit_s", "memory_limit_mib"):
         asked = rows["solver"].map(lambda s, key=name: options.get(s, {}).get(key, suite.get(key)))
         rows[name] = rows[name].fillna(pd.to_numeric(asked, errors="coerce"))
-    return rows.drop_duplicates([*CELL, "repeat"], keep="last").reset_index(drop=True)
+    return rows.drop_duplicates([*CELL, "repeat", "case"], keep="last").reset_index(drop=True)
 
 
 def _text(value: object) -> str:

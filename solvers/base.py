@@ -1,17 +1,25 @@
-"""What a solver is: up to four steps from the problem's data to an answer.
+"""What a solver is: up to five steps from the problem's data to an answer.
 
     convert(problem)             once an assembly   data into the library's own format
     prepare(data)                once an assembly   factorisations
     setup(state, load, tol)      once a load case   the library's own set-up
     solve(ready, load, tol)      once a load case   the answer
 
-Only `solve` must be written; each of the others hands on what it was given. The harness calls
-and times them; a solver never reads a clock, scores itself or knows of limits.
+In a series of load cases on one assembly the first is set up so, and each that follows by
+
+    update(state, ready, load, tol, near)           in the place of setup: the library's own way to the
+                                                    next load case, a warm start
+
+or, where a solver has `together(state)`, some at a time by what that returns.
+
+Only `solve` must be written; each of the others hands on what it was given, and `update` sets up anew.
+The harness calls and times them; a solver never reads a clock, scores itself or knows of limits.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -81,6 +89,19 @@ def failed(cause: str, iterations: int | None = None) -> Answer:
     return Answer("failed", None, iterations=iterations, details={"cause": cause})
 
 
+@dataclass(frozen=True)
+class Near:
+    """The answer of the solved load case that is nearest to the one to come.
+
+    load : that case. lam : (m,) N. gap : (m,) mm, y = g − Aᵀx = Qλ − p. x : (n,) mm; None in the dual form.
+    """
+
+    load: Load
+    lam: Vector
+    gap: Vector
+    x: Vector | None = None
+
+
 class Solver(ABC):
     """Base of all solvers. Options are keyword arguments of the constructor, checked there."""
 
@@ -95,6 +116,21 @@ class Solver(ABC):
 
     def setup(self, state: Any, load: Load, tolerance: float) -> Any:
         return state
+
+    def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+        """What `solve` takes for a further load case of the same assembly and tolerance.
+
+        state : from `prepare`. ready : from `setup` or `update` for the case solved before this one, which
+        may be changed and returned. near : where a warm start may begin; the case before is another one.
+        """
+        return self.setup(state, load, tolerance)
+
+    def together(self, state: Any) -> Callable[[Sequence[Load], float], list[Answer]] | None:
+        """Takes many load cases of the assembly at once, and a tolerance; None where there is no such way.
+
+        state : from `prepare`. An answer to each load, in their order.
+        """
+        return None
 
     @abstractmethod
     def solve(self, ready: Any, load: Load, tolerance: float) -> Answer: ...

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .adapter import Converted, answer, blocks_of, choice, upper_triangle
-from .base import Answer, Load, Problem, Solver, Status
+from .base import Answer, Load, Near, Problem, Solver, Status
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",
@@ -56,6 +56,15 @@ class Clarabel(Solver):
         cones = [clarabel.NonnegativeConeT(len(bounds))]
         library = clarabel.DefaultSolver(state.P, state.q(load), state.rows, bounds, cones, settings)
         return state.form, library
+
+    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+        """Clarabel's update of the vectors, with the equilibration kept; it has no warm start."""
+        form, library = ready
+        if form == "primal":
+            library.update(q=state.q(load), b=load.g)
+        else:
+            library.update(q=state.q(load))
+        return ready
 
     def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
         form, library = ready

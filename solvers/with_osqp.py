@@ -14,7 +14,7 @@ import osqp
 import scipy.sparse as sp
 
 from .adapter import Converted, answer, blocks_of, choice, upper_triangle
-from .base import Answer, Load, Problem, Solver, Status
+from .base import Answer, Load, Near, Problem, Solver, Status
 
 STATUS: dict[int, Status] = {
     int(osqp.SolverStatus.OSQP_SOLVED): "solved",
@@ -58,6 +58,17 @@ class Osqp(Solver):
             verbose=False,
         )
         return state.form, library
+
+    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+        """OSQP.update and warm_start; the factors and the last ρ are kept."""
+        form, library = ready
+        if form == "primal":
+            library.update(q=state.q(load), u=load.g)
+            library.warm_start(x=near.x, y=near.lam)
+        else:
+            library.update(q=state.q(load))
+            library.warm_start(x=near.lam, y=-np.maximum(near.gap, 0.0))
+        return ready
 
     def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
         form, library = ready

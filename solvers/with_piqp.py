@@ -13,7 +13,7 @@ import piqp
 import scipy.sparse as sp
 
 from .adapter import Converted, answer, blocks_of, choice, dense, upper_triangle
-from .base import Answer, Load, Problem, Solver, Status
+from .base import Answer, Load, Near, Problem, Solver, Status
 
 STATUS: dict[Any, Status] = {
     piqp.PIQP_SOLVED: "solved",
@@ -51,6 +51,15 @@ class Piqp(Solver):
         else:
             library.setup(state.P, state.q(load), x_l=np.zeros(len(load.p)))
         return state.form, library
+
+    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+        """PIQP's update of the vectors, with the preconditioner kept; it has no warm start."""
+        form, library = ready
+        if form == "primal":
+            library.update(c=state.q(load), h_u=load.g)
+        else:
+            library.update(c=state.q(load))
+        return ready
 
     def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
         form, library = ready

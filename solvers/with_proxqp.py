@@ -12,7 +12,7 @@ import numpy as np
 from proxsuite import proxqp
 
 from .adapter import Converted, answer, blocks_of, choice, dense
-from .base import Answer, Load, Problem, Solver, Status
+from .base import Answer, Load, Near, Problem, Solver, Status
 
 BACKENDS = {
     "automatic": proxqp.dense.DenseBackend.Automatic,
@@ -58,11 +58,27 @@ class ProxQp(Solver):
         else:
             upper = np.full(m, INFINITY)
             library.init(H=state.P, g=state.q(load), l_box=np.zeros(m), u_box=upper)
-        return state.form, library
+        return state.form, library, ()
+
+    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+        """QP.update, with the preconditioner kept, and a warm start.
+
+        It cannot be given the multipliers of box constraints, so that the dual form starts from the case
+        before, whichever is near.
+        """
+        form, library, start = ready
+        if form == "primal":
+            library.settings.initial_guess = proxqp.InitialGuess.WARM_START
+            library.update(g=state.q(load), u=load.g)
+            start = near.x, np.zeros(0), near.lam
+        else:
+            library.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+            library.update(g=state.q(load))
+        return form, library, start
 
     def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
-        form, library = ready
-        library.solve()
+        form, library, start = ready
+        library.solve(*start)
         result, info = library.results, library.results.info
         lam, x = (result.z, result.x) if form == "primal" else (result.x, None)
         return answer(

@@ -13,7 +13,7 @@ from small import make_prepared
 from harness.check import run
 from harness.trials import known_case, trials
 from problems.assembly import LoadCase
-from solvers.base import Answer, Form, Load, Problem, Solver
+from solvers.base import Answer, Form, Load, Near, Problem, Solver
 from solvers.registry import make_solver
 
 
@@ -165,6 +165,27 @@ def test_a_second_load_case_on_one_state() -> None:
     assert "wrong as a second load case" in words_of(Remembers, ("dual",))
 
 
+def test_an_update_that_keeps_the_case_before() -> None:
+    class Stale(Sound):
+        def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+            return ready
+
+    class TakesTheNearAnswer(Sound):
+        near: Near | None = None
+
+        def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+            self.near = near
+            return super().update(state, ready, load, tolerance, near)
+
+        def spoil(self, answer: Answer, load: Load) -> Answer:
+            return replace(answer, lam=self.near.lam) if self.near else answer
+
+    for solver in (Stale, TakesTheNearAnswer):
+        words = words_of(solver, ("dual",)).splitlines()
+        assert len(words) == 1
+        assert "wrong as a series by `update` (others closed" in words[0]
+
+
 def test_a_step_that_raises_is_named_with_its_line() -> None:
     class Raises(Sound):
         def setup(self, state: Any, load: Load, tolerance: float) -> Any:
@@ -190,6 +211,28 @@ def test_wrong_forms_and_a_failing_constructor() -> None:
 def test_one_fault_is_reported_once_a_form() -> None:
     words = words_of(spoiling(lambda a: replace(a, lam=-lam_of(a))), ("dual",)).splitlines()
     assert len(words) == 1
+
+
+def test_load_cases_at_once_in_another_order() -> None:
+    class Turned(Sound):
+        def together(self, state: Any) -> Any:
+            def answers(loads: Any, tolerance: float) -> list[Answer]:
+                ready = [self.setup(state, load, tolerance) for load in loads]
+                return [self.solve(*each, tolerance) for each in zip(ready, loads, strict=True)][::-1]
+
+            return answers
+
+    class Short(Sound):
+        def together(self, state: Any) -> Any:
+            return lambda loads, tolerance: []
+
+    class Raising(Sound):
+        def together(self, state: Any) -> Any:
+            return lambda loads, tolerance: loads.pop(9)
+
+    assert "wrong when solved at once by `together`" in words_of(Turned, ("dual",))
+    assert "0 answers to" in words_of(Short, ("dual",))
+    assert "together: raised IndexError" in words_of(Raising, ("dual",))
 
 
 def test_known_answers_fulfil_the_optimality_conditions() -> None:

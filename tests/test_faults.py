@@ -21,7 +21,7 @@ import tiny
 from rich.console import Console
 
 from harness import measure, records
-from harness import run as run_module
+from harness import rows as rows_module
 from harness.run import run
 from harness.suite import read_suite
 
@@ -231,7 +231,7 @@ def test_a_clock_that_jumps_ends_no_run_and_loses_no_row(
             return datetime(2000, 1, 1, tzinfo=UTC) - timedelta(days=next(leaps))
 
     monkeypatch.setattr(time, "time", leaping)
-    monkeypatch.setattr(run_module, "datetime", Leaping)
+    monkeypatch.setattr(rows_module, "datetime", Leaping)
     assert measure.time is time
     suite = suite_of(folder / "clock", "hang", "gives_up", "hang")
     out = folder / "clock" / "out"

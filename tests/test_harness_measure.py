@@ -49,7 +49,7 @@ def outcome(folder: Path, fault: str | None, **changes: Any) -> dict[str, Any]:
             **changes,
         }
     )
-    return measure(measurement, folder / "answer.npz")
+    return measure([measurement], [folder / "answer.npz"])[0]
 
 
 def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
@@ -150,4 +150,4 @@ def test_a_full_disk_is_not_the_solvers_fault(folder: Path) -> None:
         "s", "tiny", str(folder / "tiny.npz"), "exact", "dual", "", {}, 1e-9, 1, 0, 20, MIB, 1e-7, True,
         str(folder / "exact.py"),
     )  # fmt: skip
-    assert str(nowhere) in measure(made, nowhere)["cannot_save"]
+    assert str(nowhere) in measure([made], [nowhere])[0]["cannot_save"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -55,6 +56,14 @@ class InitialGap(GapEffect):
 
 def _square_root(grid: Vector, correlation_length: float) -> Matrix:
     """Symmetric square root of exp(−(x_i − x_j)² / 2ℓ²); unique, so no sign depends on the machine."""
+    return _kept_root(grid.tobytes(), correlation_length)
+
+
+@lru_cache(maxsize=8)  # a series draws field after field on one grid
+def _kept_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
+    grid = np.frombuffer(grid_bytes)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / correlation_length) ** 2)
     w, V = np.linalg.eigh(C)
-    return (V * np.sqrt(np.clip(w, 0.0, None))) @ V.T
+    root: Matrix = (V * np.sqrt(np.clip(w, 0.0, None))) @ V.T
+    root.flags.writeable = False
+    return root

@@ -1,0 +1,113 @@
+"""Work on Dask workers: `local:N`, or the address of a scheduler. Dask is imported here, when asked for.
+
+Each worker takes one task at a time, so that a measurement has its worker to itself. A worker that is lost
+has its tasks done by others; one that keeps killing workers fails by itself. Results come back to the
+driver, which alone writes them.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from problems.errors import Fault, InputError
+
+from .machine import PACKAGES, installed_version
+
+S = TypeVar("S")
+T = TypeVar("T")
+R = TypeVar("R")
+
+ANSWERS_WITHIN = "20s"
+RETRIES = 2  # of a task that raises
+AHEAD = 2  # tasks handed out for each worker: one being done, one that waits
+
+
+@contextmanager
+def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
+    """An executor on the workers and how many there are.
+
+    Raises InputError where Dask is not installed, the scheduler does not answer, it has no worker, a worker
+    has more than one thread, or other versions than this process.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        allowed = "needs Dask: pip install 'rivetbench[distributed]'"
+        raise InputError.one("--scheduler", "scheduler", scheduler, f"{allowed} ({error})") from error
+    kind, _, count = scheduler.partition(":")
+    if kind == "local":
+        if not (count.isdecimal() and int(count) > 0):
+            raise InputError.one("--scheduler", "scheduler", scheduler, "local:N with N ≥ 1, or an address")
+        cluster = LocalCluster(
+            n_workers=int(count), threads_per_worker=1, processes=True, dashboard_address=None
+        )
+        with cluster, Client(cluster) as client:
+            yield _checked(client, scheduler)
+        return
+    try:
+        client = Client(scheduler, timeout=ANSWERS_WITHIN)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError.one("--scheduler", "scheduler", scheduler, f"does not answer: {error}") from error
+    with client:
+        yield _checked(client, scheduler)
+
+
+def _checked(client: Any, scheduler: str) -> tuple[Executor, int]:
+    threads = client.nthreads()
+    faults = [
+        Fault(f"worker {address}", "nthreads", n, "start it with --nthreads 1: a measurement needs it alone")
+        for address, n in threads.items()
+        if n != 1
+    ]
+    if not threads:
+        faults.append(Fault("--scheduler", "scheduler", scheduler, "has no worker; start one: dask worker"))
+    here = versions()
+    for address, there in client.run(versions).items():
+        faults += other_versions(address, here, there)
+    if faults:
+        raise InputError(faults)
+    return client.get_executor(pure=False, retries=RETRIES), len(threads)
+
+
+def versions() -> dict[str, str]:
+    """Of Python, and of the packages that an answer can depend on."""
+    return {"python": platform.python_version(), **{name: installed_version(name) for name in PACKAGES}}
+
+
+def other_versions(address: str, here: dict[str, str], there: dict[str, str]) -> list[Fault]:
+    """A fault for each package that a worker has in another version."""
+    return [
+        Fault(f"worker {address}", name, there.get(name), f"the driver has {version}: install the same")
+        for name, version in here.items()
+        if there.get(name) != version
+    ]
+
+
+def done_as_completed(
+    executor: Executor, count: int, work: Callable[[S], R], tasks: Iterable[tuple[T, S]]
+) -> Iterator[tuple[T, R | BaseException]]:
+    """Each task with its result, or with what it raised, as they end; only a few are handed out ahead.
+
+    tasks : what the task is here, and what of it is sent.
+    """
+    todo = iter(tasks)
+    running: dict[Future[R], T] = {}
+    while True:
+        for task, sent in todo:
+            running[executor.submit(work, sent)] = task
+            if len(running) >= AHEAD * count:
+                break
+        if not running:
+            return
+        ended = wait(running, return_when=FIRST_COMPLETED).done
+        while ended:
+            future = ended.pop()
+            task = running.pop(future)
+            raised = CancelledError() if future.cancelled() else future.exception()
+            outcome = future.result() if raised is None else raised
+            del future  # what is still held is computed again when the worker that did it is lost
+            yield task, outcome

@@ -1,0 +1,237 @@
+"""Where load cases are solved: the assembly open, the solver prepared, the last answers for warm starts."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+import threadpoolctl
+from numpy.typing import NDArray
+
+from problems.assembly import LoadCase, Prepared, Vector
+from problems.load_cases import LoadCases
+from problems.prepare import prepared
+from problems.scene import Scene
+from solvers.base import Answer, Form, Load, Near, Problem
+from solvers.registry import make_solver
+
+from ..judge import judge
+from ..reference import refined_active_set
+from .bound import Bound
+from .vouch import Vouched, vouch
+
+Row = dict[str, Any]
+Gaps = NDArray[np.float32]
+
+BLOCK = 64  # cases that share a pass over K and Q
+AT_ONCE_S = 5.0  # a block is closed after so long, so that slow cases are not lost with it
+NEARS = 32  # answers kept for warm starts: memory does not grow with the number of cases
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a series solves, and how. check : every so many cases are compared with the reference; 0: none."""
+
+    scene: Scene
+    cases: LoadCases
+    solver: str
+    form: Form
+    tolerance: float
+    limit_mm: float
+    check: int
+    threads: int
+    options: dict[str, Any] = field(default_factory=dict)
+    plugin: Path | None = None
+    key: str = field(default_factory=lambda: uuid4().hex)
+
+
+@dataclass(frozen=True)
+class Result:
+    """The row of a case and the gap that is left, (m,) mm; None where there is no answer."""
+
+    row: Row
+    gap: Gaps | None
+
+
+@dataclass(frozen=True)
+class _Tried:
+    case: int
+    load: Load
+    row: Row
+    answer: Answer
+
+
+class Desk:
+    """A job being done in this process."""
+
+    def __init__(self, job: Job) -> None:
+        threadpoolctl.threadpool_limits(job.threads)
+        self.job = job
+        self.data: Prepared = prepared(job.scene)
+        self.bound = Bound.of(self.data)
+        self.solver = make_solver(job.solver, job.options, job.plugin)
+        self.state = self.solver.prepare(self.solver.convert(Problem(self.data, job.form)))
+        self.together = self.solver.together(self.state)
+        self.ready: Any = None
+        self.nears: deque[tuple[int, Near]] = deque(maxlen=NEARS)
+
+    def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
+        """The cases, some at a time, each list as soon as it is done."""
+        for start in range(0, len(numbers), BLOCK):
+            loads = self._loads(numbers[start : start + BLOCK])
+            if self.together is not None:
+                yield self._finished(self._try_together(loads))
+                continue
+            begun, tried = time.monotonic(), []
+            for case, load in loads:
+                tried.append(self._try(case, load))
+                if time.monotonic() - begun > AT_ONCE_S:
+                    yield self._finished(tried)
+                    begun, tried = time.monotonic(), []
+            if tried:
+                yield self._finished(tried)
+
+    def _loads(self, numbers: Sequence[int]) -> list[tuple[int, Load]]:
+        """f, g and p = AᵀK⁻¹f − g of the cases, K⁻¹f once where they share their f."""
+        cases = [self.job.cases.load(k, self.data) for k in numbers]
+        shared = all(case.f is cases[0].f for case in cases)
+        f = cases[0].f[:, None] if shared else np.column_stack([case.f for case in cases])
+        p = self.data.assembly.A.T @ self.data.solve_K(f) - np.column_stack([case.g for case in cases])
+        loads = [
+            Load(case.f, case.g, np.ascontiguousarray(column))
+            for case, column in zip(cases, p.T, strict=True)
+        ]
+        for load in loads:
+            for array in (load.f, load.g, load.p):
+                array.flags.writeable = False
+        return list(zip(numbers, loads, strict=True))
+
+    def _try_together(self, loads: list[tuple[int, Load]]) -> list[_Tried]:
+        """Solve them all at once; where that raises, one after another, so that it is known which does."""
+        assert self.together is not None
+        start = time.perf_counter()
+        try:
+            answers = self.together([load for _, load in loads], self.job.tolerance)
+            tried = [
+                _Tried(case, load, self._begun(case), self._checked(answer))
+                for (case, load), answer in zip(loads, answers, strict=True)
+            ]
+        except Exception:
+            return [self._try(case, load) for case, load in loads]
+        for each in tried:
+            each.row["solve_s"] = (time.perf_counter() - start) / len(tried)
+        return tried
+
+    def _begun(self, case: int) -> Row:
+        return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
+
+    def _try(self, case: int, load: Load) -> _Tried:
+        """Solve one; what the solver raises becomes its status."""
+        row = self._begun(case)
+        first = self.ready is None or not self.nears
+        if not first:
+            row["warm_from"], near = self._nearest(load)
+        start = time.perf_counter()
+        try:
+            if first:
+                self.ready = self.solver.setup(self.state, load, self.job.tolerance)
+            else:
+                self.ready = self.solver.update(self.state, self.ready, load, self.job.tolerance, near)
+            row["setup_s"] = time.perf_counter() - start
+            start = time.perf_counter()
+            answer = self.solver.solve(self.ready, load, self.job.tolerance)
+            row["solve_s"] = time.perf_counter() - start
+            answer = self._checked(answer)
+        except Exception as error:
+            self.ready = None
+            answer = Answer("failed", None, details={"message": f"{type(error).__name__}: {error}"[:500]})
+        if answer.lam is not None:
+            gap = self.data.Q @ answer.lam - load.p
+            x = answer.x if self.job.form == "primal" else None
+            self.nears.append((case, Near(load, answer.lam, gap, x)))
+        return _Tried(case, load, row, answer)
+
+    def _checked(self, answer: Answer) -> Answer:
+        """The answer with arrays of numbers in the right shape. Raises ValueError."""
+        if answer.lam is None:
+            return answer
+        wanted = [("lam", answer.lam, self.data.assembly.m)]
+        if self.job.form == "primal":
+            wanted.append(("x", np.asarray(answer.x, dtype=float), self.data.assembly.n))
+        for name, value, size in wanted:
+            if np.shape(value) != (size,) or not np.isfinite(value).all():
+                raise ValueError(f"{name} must be ({size},) finite numbers")
+        return answer
+
+    def _nearest(self, load: Load) -> tuple[int, Near]:
+        """Of the answers kept, the one with the nearest overlap p."""
+        return min(self.nears, key=lambda kept: float(np.linalg.norm(kept[1].load.p - load.p)))
+
+    def _finished(self, tried: list[_Tried]) -> list[Result]:
+        """Rows, with what is known of the answers."""
+        start = time.perf_counter()
+        answered = [each for each in tried if each.answer.lam is not None]
+        vouched: dict[int, Vouched] = {}
+        if answered:
+            lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
+            own = [each.answer.x if self.job.form == "primal" else None for each in answered]
+            found = vouch(self.bound, [each.load for each in answered], lams, own)
+            vouched = {each.case: about for each, about in zip(answered, found, strict=True)}
+        share = (time.perf_counter() - start) / len(tried)
+        return [self._result(each, vouched.get(each.case), share) for each in tried]
+
+    def _result(self, tried: _Tried, about: Vouched | None, vouch_s: float) -> Result:
+        answer, job = tried.answer, self.job
+        row = tried.row | {
+            "status": answer.status,
+            "message": answer.details.get("message"),
+            "iterations": answer.iterations,
+            "inner_iterations": answer.inner_iterations,
+            "form_s": vouch_s,
+            "verdict": "no_answer",
+            "limit_mm": job.limit_mm,
+        }
+        if about is None:
+            return Result(row, None)
+        row |= {
+            "active": about.active,
+            "bound_mm": about.bound_mm,
+            **{name: getattr(about, name) for name in ("primal_residual", "dual_residual", "duality_gap")},
+            "min_gap_mm": float(about.gap.min()),
+            "mean_gap_mm": float(about.gap.mean()),
+            "max_gap_mm": float(about.gap.max()),
+            "verdict": "within" if about.bound_mm <= job.limit_mm else "cannot_be_judged",
+        }
+        if job.check and tried.case % job.check == 0:
+            row |= self._compared(tried, about.x)
+        return Result(row, about.gap.astype(np.float32))
+
+    def _compared(self, tried: _Tried, x: Vector) -> Row:
+        """The distance to the certified reference, which outweighs the bound."""
+        case = LoadCase(tried.load.f, tried.load.g)
+        known = refined_active_set(self.data, case)
+        lam = np.asarray(tried.answer.lam, dtype=float)
+        judged = judge(self.data, case, known, x, lam, self.job.limit_mm)
+        names = ("displacement_error_mm", "reference_bound_mm", "contact_mismatch")
+        found: Row = {name: getattr(judged, name) for name in names}
+        return found if judged.verdict == "cannot_be_judged" else found | {"verdict": judged.verdict}
+
+
+_open: dict[str, Desk] = {}
+
+
+def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
+    """Cases of a job, on the desk that this process keeps for it: the assembly is opened once a worker."""
+    job, numbers = task
+    if job.key not in _open:
+        _open.clear()
+        _open[job.key] = Desk(job)
+    desk = _open[job.key]
+    desk.job = job  # with these cases
+    return [result for some in desk.solve(numbers) for result in some]

@@ -1,0 +1,215 @@
+"""Load cases of a series: random gaps, a table of measured ones, a sweep; and what is said of bad ones."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from strip import write_strip
+
+from problems.assembly import Prepared
+from problems.errors import InputError
+from problems.gap_table import measured_gaps
+from problems.load_cases import LoadCases
+from problems.prepare import load_case, prepared
+from problems.random_gaps import random_gaps
+from problems.scene import Scene, read_scene
+from problems.sweep import sweep
+
+RANDOM = "random = { sd = 0.2, correlation_length = 100.0, seed = 7 }"
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return read_scene(str(write_strip(tmp_path_factory.mktemp("strip"))))
+
+
+@pytest.fixture(scope="module")
+def data(scene: Scene) -> Prepared:
+    return prepared(scene)
+
+
+def said(error: pytest.ExceptionInfo[InputError]) -> str:
+    return str(error.value)
+
+
+def gaps_of(cases: LoadCases, data: Prepared) -> np.ndarray:
+    return np.array([cases.load(k, data).g for k in range(cases.count)])
+
+
+def test_a_random_case_is_a_scene_with_the_seed_of_its_row(
+    scene: Scene, data: Prepared, tmp_path: Path
+) -> None:
+    cases = random_gaps(scene, data, 20, seed=3)
+    for k in (0, 7, 19):
+        seed = cases.parameters(k)["gap_seed"]
+        written = write_strip(tmp_path, ("seed = 7", f"seed = {seed}"))
+        wanted = load_case(read_scene(str(written)), data)
+        np.testing.assert_array_equal(cases.load(k, data).g, wanted.g)
+        np.testing.assert_array_equal(cases.load(k, data).f, wanted.f)
+
+
+def test_a_random_case_depends_on_seed_and_number_alone(scene: Scene, data: Prepared) -> None:
+    few, many = random_gaps(scene, data, 3, seed=3), random_gaps(scene, data, 300, seed=3)
+    many.load(250, data)
+    np.testing.assert_array_equal(gaps_of(few, data)[2], many.load(2, data).g)
+    np.testing.assert_array_equal(many.load(250, data).g, pickle.loads(pickle.dumps(many)).load(250, data).g)
+    assert few.key == many.key != random_gaps(scene, data, 3, seed=4).key
+    drawn = {many.load(k, data).g.tobytes() for k in range(300)}
+    others = {random_gaps(scene, data, 300, seed=4).load(k, data).g.tobytes() for k in range(300)}
+    assert len(drawn | others) == 600
+    assert many.load(0, data).f is many.load(1, data).f
+
+
+def test_the_statistics_of_the_random_gaps(scene: Scene, data: Prepared) -> None:
+    """Mean, standard deviation and correlation over 2000 cases, each within four standard errors."""
+    count, sd, length = 2000, 0.3, 80.0
+    gaps = gaps_of(random_gaps(scene, data, count, 1, mean=0.5, sd=sd, correlation_length=length), data)
+    assert abs(gaps.mean(axis=0) - 0.5).max() < 4 * sd / np.sqrt(count)
+    assert abs(gaps.std(axis=0) / sd - 1).max() < 4 / np.sqrt(2 * count)
+    nodes = data.assembly.contact_nodes
+    assert nodes is not None
+    found = np.corrcoef(gaps.T)[0]
+    wanted = np.exp(-0.5 * (np.linalg.norm(nodes - nodes[0], axis=1) / length) ** 2)
+    assert abs(found - wanted).max() < 4 / np.sqrt(count)
+    assert abs(np.corrcoef(gaps[:-1, 0], gaps[1:, 0])[0, 1]) < 4 / np.sqrt(count)  # case to case
+
+
+def test_the_field_comes_from_the_options_where_the_scene_has_none(tmp_path: Path) -> None:
+    bare = read_scene(str(write_strip(tmp_path, (RANDOM, ""))))
+    with pytest.raises(InputError) as error:
+        random_gaps(bare, prepared(bare), 5, 0)
+    assert "--sd" in said(error)
+    assert "--correlation-length" in said(error)
+    assert "--mean" not in said(error)
+    assert (
+        random_gaps(bare, prepared(bare), 5, 0, sd=0.1, correlation_length=50.0)
+        .load(3, prepared(bare))
+        .g.std()
+        > 0
+    )
+    with pytest.raises(InputError, match="greater than 0"):
+        random_gaps(bare, prepared(bare), 5, 0, sd=-0.1, correlation_length=50.0)
+
+
+def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
+    import tiny
+
+    own = read_scene(str(tiny.write_problem(tmp_path / "own.npz")))
+    with pytest.raises(InputError, match="--gaps"):
+        random_gaps(own, prepared(own), 5, 0)
+    table = tmp_path / "gaps.csv"
+    np.savetxt(table, np.full((2, 10), 0.25), delimiter=",")
+    case = measured_gaps(own, prepared(own), table).load(1, prepared(own))
+    np.testing.assert_array_equal(case.g, np.full(10, 0.25))
+    np.testing.assert_array_equal(case.f, np.load(tmp_path / "own.npz", data)["f"])
+
+
+@pytest.mark.parametrize("kind", ["csv", "npz", "npy"])
+def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
+    gaps = np.random.default_rng(0).uniform(0, 1, (30, data.assembly.m))
+    path = tmp_path / f"gaps.{kind}"
+    match kind:
+        case "csv":
+            np.savetxt(path, gaps, fmt="%.17g", delimiter=",", header="measured on Monday")
+        case "npz":
+            np.savez(path, gaps=gaps, other=np.zeros(3))
+        case "npy":
+            np.save(path, gaps)
+    cases = measured_gaps(scene, data, path)
+    assert cases.count == 30
+    np.testing.assert_array_equal(gaps_of(cases, data), gaps)
+    np.testing.assert_array_equal(cases.load(0, data).f, load_case(scene, data).f)
+    assert measured_gaps(scene, data, path, 4).count == 4
+    with pytest.raises(InputError, match="has 30 rows"):
+        measured_gaps(scene, data, path, 31)
+
+
+def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_path: Path) -> None:
+    m = data.assembly.m
+    gaps = np.full((500, m), 0.1)
+    path = tmp_path / "gaps.npy"
+    gaps[412, 7] = gaps[412, 9] = np.nan
+    gaps[499, 0] = np.inf
+    np.save(path, gaps)
+    with pytest.raises(InputError) as error:
+        measured_gaps(scene, data, path)
+    lines = said(error).splitlines()
+    assert len(lines) == 2
+    assert "gaps.npy: case 412, contact 7 and 1 more = nan: every gap must be a finite number" in lines[0]
+    assert "case 499, contact 0 = inf" in lines[1]
+    gaps[:, 3] = np.nan
+    np.save(path, gaps)
+    with pytest.raises(InputError) as error:
+        measured_gaps(scene, data, path)
+    assert len(error.value.faults) == 11
+    assert "490 more" in said(error)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1,2,3\n4,5,6\n", r"shape = \(2, 3\).*45 contacts"),
+        ("1,2\n1,2,3\n", "line 2"),
+        ("", "EmptyDataError"),
+        (",".join(["x"] * 45) + "\n", "case 0, contact 0 and 44 more = nan"),
+    ],
+)
+def test_a_csv_that_is_no_table(text: str, words: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
+    (tmp_path / "gaps.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        measured_gaps(scene, data, tmp_path / "gaps.csv")
+
+
+@pytest.mark.parametrize("name", ["gaps.csv", "gaps.npz", "gaps.npy", "gaps.txt"])
+def test_a_table_that_cannot_be_read(name: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=name):
+        measured_gaps(scene, data, tmp_path / name)
+    np.savez(tmp_path / "two.npz", a=np.zeros(3), b=np.zeros(3))
+    with pytest.raises(InputError, match=r"two\.npz"):
+        measured_gaps(scene, data, tmp_path / "two.npz")
+
+
+def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, data: Prepared, tmp_path: Path) -> None:
+    cases = sweep(scene, ["initial_gap.random.sd=0.1,0.3", "fasteners.preload=50:150:3"])
+    assert cases.count == 6
+    assert [cases.parameters(k)["fasteners.preload"] for k in range(6)] == [50, 100, 150] * 2
+    for k in (0, 5):
+        sd, preload = cases.parameters(k).values()
+        changes = (("sd = 0.2", f"sd = {sd}"), ("preload = 60.0", f"preload = {preload}"))
+        wanted = load_case(read_scene(str(write_strip(tmp_path, *changes))), data)
+        np.testing.assert_array_equal(cases.load(k, data).f, wanted.f)
+        np.testing.assert_array_equal(cases.load(k, data).g, wanted.g)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("fasteners.preload", "KIND.KEY=FIRST:LAST:COUNT"),
+        ("fasteners.preload=1:2", "KIND.KEY=FIRST:LAST:COUNT"),
+        ("fasteners.preload=1:2:0", "KIND.KEY=FIRST:LAST:COUNT"),
+        ("fasteners.preload=1,nan", "KIND.KEY=FIRST:LAST:COUNT"),
+        ("fasteners.load=1:2:3", "one of initial_gap.mean, initial_gap.random.sd, .*fasteners.preload"),
+        ("ribs.I=1:2:3", "what changes K"),
+        ("fasteners.preload=-1:1:3", "greater than 0"),
+    ],
+)
+def test_a_bad_sweep(text: str, words: str, scene: Scene, data: Prepared) -> None:
+    with pytest.raises(InputError, match=words):
+        sweep(scene, [text])
+
+
+def test_a_key_swept_twice_and_two_effects_of_a_kind(data: Prepared, tmp_path: Path) -> None:
+    more = '[[effect]]\nkind = "pressure"\npart = "a"\nvalue = 2e-4\n[[effect]]\nkind = "ribs"'
+    scene = read_scene(str(write_strip(tmp_path, ('[[effect]]\nkind = "ribs"', more))))
+    with pytest.raises(InputError, match="swept twice"):
+        sweep(scene, ["pressure.1.value=1,2", "pressure.1.value=3"])
+    first, second = (
+        sweep(scene, [f"pressure.{text}"]) for text in ("0.value=1e-4,2e-4", "1.value=2e-4,4e-4")
+    )
+    np.testing.assert_array_equal(first.load(0, data).f, load_case(scene, data).f)
+    moved, twice = (cases.load(1, data).f - cases.load(0, data).f for cases in (first, second))
+    assert abs(moved).max() > 0
+    np.testing.assert_allclose(twice, 2 * moved, atol=1e-12)

@@ -1,0 +1,269 @@
+"""Work on other processes: through a plain executor, and through Dask where it is installed."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tiny
+from rich.console import Console
+from strip import write_strip
+
+from harness import scheduler
+from harness.records import MEASUREMENTS, read
+from harness.run import run as run_suite
+from harness.scheduler import AHEAD, done_as_completed, other_versions, versions, workers
+from harness.series import store
+from harness.series.desk import Job, solve_on_worker
+from harness.series.run import on_workers, run
+from harness.suite import read_suite
+from problems.errors import InputError
+from problems.gap_table import measured_gaps
+from problems.prepare import prepared
+from problems.random_gaps import random_gaps
+from problems.scene import read_scene
+
+CASES = 60
+VERSIONS = versions()
+DASK = importlib.util.find_spec("distributed") is not None
+needs_dask = pytest.mark.skipif(not DASK, reason="needs Dask")
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Job:
+    scene = read_scene(str(write_strip(tmp_path)))
+    return Job(scene, random_gaps(scene, prepared(scene), CASES, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """Two workers, processes of their own; one that is killed is replaced."""
+    import distributed
+
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as made:
+        yield made
+
+
+def pids(cluster: Any) -> list[int]:
+    import distributed
+
+    with distributed.Client(cluster) as client:
+        client.wait_for_workers(2)
+        return list(client.run(os.getpid).values())
+
+
+@contextmanager
+def once(happened: Callable[[], bool], then: Callable[[], None]) -> Iterator[None]:
+    """While the body runs, `then` is called as soon as something has happened; it must happen."""
+
+    def watch() -> None:
+        while not happened():
+            time.sleep(0.02)
+        then()
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    yield
+    thread.join(timeout=10)
+    assert not thread.is_alive()
+
+
+def quiet() -> Console:
+    return Console(file=StringIO(), width=200)
+
+
+def double(k: int) -> int:
+    if k == 13:
+        raise ValueError("unlucky")
+    return 2 * k
+
+
+def test_every_task_comes_back_once_and_few_are_handed_out() -> None:
+    drawn = 0
+
+    def tasks() -> Any:
+        nonlocal drawn
+        for k in range(40):
+            drawn += 1
+            yield k
+
+    seen = {}
+    with ProcessPoolExecutor(2) as executor:
+        tagged = ((str(k), k) for k in tasks())
+        for done, (name, outcome) in enumerate(done_as_completed(executor, 2, double, tagged), start=1):
+            k = int(name)
+            assert drawn <= done + 2 * AHEAD + 2
+            assert k not in seen
+            seen[k] = outcome
+    assert isinstance(seen.pop(13), ValueError)
+    assert seen == {k: 2 * k for k in range(40) if k != 13}
+
+
+def test_a_series_on_other_processes_is_the_series_on_this_one(job: Job) -> None:
+    alone = {result.row["case"]: result for result in solve_on_worker((job, range(CASES)))}
+    with ProcessPoolExecutor(2) as executor:
+        results = [r for some in on_workers(job, list(range(CASES)), executor, 2, quiet()) for r in some]
+    assert sorted(result.row["case"] for result in results) == list(range(CASES))
+    for result in results:
+        np.testing.assert_allclose(result.gap, alone[result.row["case"]].gap, atol=1e-9)
+        assert result.row["verdict"] == "within"
+
+
+def test_versions_that_differ_are_named() -> None:
+    here = versions()
+    assert other_versions("tcp://a", here, here) == []
+    (fault,) = other_versions("tcp://a", here, here | {"numpy": "1.0"})
+    assert "worker tcp://a: numpy = '1.0'" in str(fault)
+    assert here["numpy"] in str(fault)
+
+
+@pytest.mark.skipif(DASK, reason="Dask is installed")
+def test_without_dask_it_says_what_to_install() -> None:
+    with pytest.raises(InputError, match=r"pip install 'rivetbench\[distributed\]'"), workers("local:2"):
+        pass
+
+
+@needs_dask
+@pytest.mark.parametrize("wrong", ["local:0", "local:x", "local:-1"])
+def test_a_number_of_workers_that_cannot_be(wrong: str) -> None:
+    with pytest.raises(InputError, match="local:N"), workers(wrong):
+        pass
+
+
+@needs_dask
+def test_a_scheduler_that_does_not_answer_leaves_the_solved_cases(
+    job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("harness.scheduler.ANSWERS_WITHIN", "1s")
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9.*does not answer"):
+        run(job, {}, out, quiet(), "tcp://127.0.0.1:9")
+    assert run(job, {}, out, quiet()) == 0
+    before = (out / store.CASES).read_text()
+    more = replace(job, cases=replace(job.cases, count=CASES + 5))  # type: ignore[type-var]
+    with pytest.raises(InputError, match="does not answer"):
+        run(more, {}, out, quiet(), "tcp://127.0.0.1:9")
+    assert (out / store.CASES).read_text() == before
+
+
+@needs_dask
+def test_workers_that_will_not_do_are_named(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver thinks that it has other packages than its workers; it says which, of each worker."""
+    monkeypatch.setattr(scheduler, "installed_version", lambda name: (VERSIONS | {"scipy": "0.1"})[name])
+    with pytest.raises(InputError) as raised, workers(cluster.scheduler_address):
+        pass
+    assert len(raised.value.faults) == 2
+    for fault in raised.value.faults:
+        assert f"scipy = '{VERSIONS['scipy']}': the driver has 0.1" in str(fault)
+
+
+@needs_dask
+def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
+    import distributed
+
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        with pytest.raises(InputError, match="nthreads = 2: start it with --nthreads 1"), workers(
+            cluster.scheduler_address
+        ):
+            pass
+        cluster.scale(0)
+        while cluster.scheduler.workers:
+            time.sleep(0.05)
+        with pytest.raises(InputError, match="has no worker"), workers(cluster.scheduler_address):
+            pass
+
+
+@needs_dask
+def test_a_worker_that_is_killed_costs_no_row(job: Job, tmp_path: Path, cluster: Any) -> None:
+    """One of two workers dies in the middle: each case has one row, and gaps as if nothing had been."""
+    slow = tmp_path / "slow.py"
+    slow.write_text(tiny.EXACT.replace("L = sla", "__import__('time').sleep(0.05); L = sla"))
+    job = replace(job, solver="slow", plugin=slow)
+    out = tmp_path / "out"
+    victim = pids(cluster)[0]
+    with once((out / store.CASES).exists, lambda: os.kill(victim, signal.SIGKILL)):
+        assert run(job, {}, out, quiet(), cluster.scheduler_address) == 0
+    assert victim not in pids(cluster)
+    rows = [json.loads(line) for line in (out / store.CASES).read_text().splitlines()]
+    assert sorted(row["case"] for row in rows) == list(range(CASES))
+    gaps = np.fromfile(out / store.GAPS, np.float32).reshape(CASES, 45)
+    for result in solve_on_worker((job, range(0, CASES, 7))):
+        np.testing.assert_allclose(gaps[result.row["case"]], result.gap, atol=1e-7)
+
+
+@needs_dask
+def test_a_table_is_solved_on_workers_a_case_each_row(cluster: Any, tmp_path: Path) -> None:
+    """Each block is sent with its own rows of the table; a resumed series has blocks with gaps in them."""
+    scene = read_scene(str(write_strip(tmp_path)))
+    np.save(tmp_path / "gaps.npy", np.random.default_rng(0).uniform(0, 0.5, (30, 45)))
+    table = measured_gaps(scene, prepared(scene), tmp_path / "gaps.npy")
+    job = Job(scene, table, "newton", "dual", 1e-11, 1e-7, 0, 1)
+    alone, out = tmp_path / "alone", tmp_path / "out"
+    assert run(job, {}, alone, quiet()) == 0
+    assert run(job, {}, out, quiet()) == 0
+    lines = (out / store.CASES).read_text().splitlines()
+    (out / store.CASES).write_text("\n".join(lines[1::3]) + "\n")
+    (out / store.GAPS).unlink()
+    assert run(job, {}, out, quiet(), cluster.scheduler_address) == 0
+    gaps, wanted = (np.fromfile(each / store.GAPS, np.float32).reshape(30, 45) for each in (out, alone))
+    again = [k for k in range(30) if k % 3 != 1]
+    np.testing.assert_allclose(gaps[again], wanted[again], atol=1e-7)
+
+
+@needs_dask
+def test_a_suite_on_workers_one_of_which_is_killed(cluster: Any, tmp_path: Path) -> None:
+    """Rows and answers are those of a suite that is measured here; the lost measurement is made again."""
+    table = '[[solver]]\nname = "{}"\nforms = ["dual"]\n'
+    text = "".join(map(table.format, ("exact", "newton")))
+    suite = read_suite(str(tiny.write_suite(tmp_path, text, tolerances=[1e-8, 1e-10])))
+    slow = (tmp_path / "exact.py").read_text().replace("L = sla", "__import__('time').sleep(2); L = sla")
+    (tmp_path / "exact.py").write_text(slow)
+    out, here = tmp_path / "out", tmp_path / "here"
+    victim = pids(cluster)[0]
+    with once((out / MEASUREMENTS).exists, lambda: os.kill(victim, signal.SIGKILL)):
+        assert run_suite(suite, out, quiet(), cluster.scheduler_address) == 0
+    assert run_suite(suite, here, quiet()) == 0
+    rows, wanted = ({row["key"]: row for row in read(each / MEASUREMENTS)} for each in (out, here))
+    assert len(read(out / MEASUREMENTS)) == len(rows) == 4
+    assert rows.keys() == wanted.keys()
+    for key, row in rows.items():
+        assert (row["status"], row["verdict"]) == ("solved", "within")
+        assert row["machine"] == wanted[key]["machine"]
+        with np.load(out / row["answer"]) as got, np.load(here / wanted[key]["answer"]) as expected:
+            np.testing.assert_allclose(got["x"], expected["x"], atol=1e-8)
+
+
+@needs_dask
+def test_a_measurement_that_kills_its_workers_is_left_and_said(cluster: Any, tmp_path: Path) -> None:
+    """Worker after worker dies of it (here: of a plugin that kills its parent); the others are measured."""
+    suite = read_suite(
+        str(tiny.write_suite(tmp_path, "".join(f'[[solver]]\nname = "{n}"\n' for n in ("newton", "exact"))))
+    )
+    killer = tiny.EXACT.replace("L = sla", "import os; os.kill(os.getppid(), 9); L = sla")
+    (tmp_path / "exact.py").write_text(killer)
+    console = quiet()
+    assert run_suite(suite, tmp_path / "out", console, cluster.scheduler_address) == 1
+    (row,) = read(tmp_path / "out" / MEASUREMENTS)
+    assert row["solver"] == "newton"
+    assert isinstance(console.file, StringIO)
+    said = console.file.getvalue()
+    assert re.search("tiny exact dual .*: not measured: KilledWorker", said)
+    assert "Not measured: 1. Run the same command again." in said

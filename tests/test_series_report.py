@@ -1,0 +1,109 @@
+"""Statistics of a series against brute force, and the report's files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from report import series as statistics
+from report.series import QUANTILES, convergence, exceedance, quantile_maps, read
+from report.series_report import write
+
+CASES, M = 240, 12
+IDENTITY = {"solver": "newton", "form": "dual", "tolerance": 1e-11}
+UNANSWERED = 17
+
+
+def made(directory: Path, swept: bool = False) -> np.ndarray:
+    """A series of random gaps whose rows came in another order, one without an answer."""
+    rng = np.random.default_rng(0)
+    gaps = rng.gamma(1.0, 0.1, (CASES, M)).astype(np.float32)
+    gaps[:, 0] = 0.0
+    gaps.tofile(directory / "gaps.f4")
+    facts = {"scene": "made", "title": "Made", "cases": CASES, "threads": 1, "machine": "a machine"}
+    (directory / "series.json").write_text(json.dumps({"identity": IDENTITY, **facts}))
+    lines = []
+    for case in rng.permutation(CASES):
+        row = {"case": int(case), "verdict": "within", "setup_s": 0.001, "solve_s": 0.01, "form_s": 0.002}
+        row |= {
+            "max_gap_mm": float(gaps[case].max()),
+            "mean_gap_mm": float(gaps[case].mean()),
+            "bound_mm": 1e-9,
+        }
+        if swept:
+            row["initial_gap.mean"] = case // 4 / 10
+        if case == UNANSWERED:
+            row = {"case": int(case), "verdict": "no_answer"} | {k: row[k] for k in row if "." in k}
+        lines.append(json.dumps(row) + "\n")
+    (directory / "cases.jsonl").write_text("".join(lines) + '{"case": 3, "ver')  # being written
+    nodes = np.column_stack([np.tile(np.arange(6.0), 2), np.repeat([0.0, 1.0], 6)])
+    np.savez(directory / "contacts.npz", m=M, contact_nodes=nodes, fasteners=nodes[:2])
+    return np.delete(gaps, UNANSWERED, axis=0).astype(float)
+
+
+@pytest.mark.parametrize("at_once", [1, 1000, 2**22])
+def test_maps_and_exceedance_in_pieces(at_once: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gaps = made(tmp_path)
+    monkeypatch.setattr(statistics, "AT_ONCE", at_once)
+    series = read(tmp_path)
+    assert series.counts == {"within": CASES - 1, "no_answer": 1}
+    maps = quantile_maps(series)
+    for q, values in zip(QUANTILES, maps, strict=False):
+        np.testing.assert_allclose(values, np.quantile(gaps, q, axis=0))
+    np.testing.assert_allclose(maps[-1], gaps.mean(axis=0))
+    curve = exceedance(series)
+    for t, cases, contacts in curve.to_numpy()[::17]:
+        assert cases == pytest.approx((gaps.max(axis=1) > t).mean())
+        assert contacts == pytest.approx((gaps > np.float32(t)).mean())
+    assert curve["share_of_contacts"][0] < 1  # a contact without a gap does not exceed zero
+    assert curve["share_of_cases"].iloc[-1] == 0
+
+
+def test_the_interval_of_a_quantile_covers_it_as_often_as_it_says(tmp_path: Path) -> None:
+    """Median of 100: the 40th and the 61st value. And by simulation for the 95 % quantile."""
+    made(tmp_path)
+    series = read(tmp_path)
+    table = convergence(series)
+    values = np.sort(series.cases["max_gap_mm"].to_numpy())
+    last = table[table["cases"] == len(values)].set_index("quantile")
+    assert last.loc[0.95, "gap_mm"] == pytest.approx(np.quantile(values, 0.95))
+    assert np.isnan(last.loc[0.99, "high_mm"])  # 239 cases do not bound it from above
+    rng = np.random.default_rng(1)
+    hits = 0
+    for _ in range(200):
+        cases = pd.DataFrame({"max_gap_mm": rng.uniform(size=100)})
+        found = convergence(statistics.Series({}, {}, cases, series.gaps, None, series.fasteners, []))
+        row = found[(found["cases"] == 100) & (found["quantile"] == 0.5)].iloc[0]
+        ordered = np.sort(cases["max_gap_mm"])
+        assert (row["low_mm"], row["high_mm"]) == (ordered[39], ordered[60])
+        hits += row["low_mm"] <= 0.5 <= row["high_mm"]
+    assert 0.9 <= hits / 200 <= 1.0
+
+
+@pytest.mark.parametrize("swept", [False, True])
+def test_the_report_and_its_files(swept: bool, tmp_path: Path) -> None:
+    gaps = made(tmp_path, swept)
+    text = write(tmp_path).read_text()
+    last = "sweep-initial_gap.mean" if swept else "convergence"
+    for name in ("quantile-maps", "worst-case", "exceedance", last):
+        assert (tmp_path / "report" / f"{name}.png").stat().st_size > 5000
+        assert f"![{name}]({name}.png)" in text
+        assert len(pd.read_csv(tmp_path / "report" / f"{name}.csv")) > 3
+    worst = pd.read_csv(tmp_path / "report" / "worst-case.csv")
+    assert worst["gap_mm"].max() == pytest.approx(gaps.max())
+    maps = pd.read_csv(tmp_path / "report" / "quantile-maps.csv")
+    np.testing.assert_allclose(maps["q0.95_mm"], np.quantile(gaps, 0.95, axis=0))
+    assert "239 within, 1 no answer" in text.replace("1 no answer, 239 within", "239 within, 1 no answer")
+    assert "76.9 cases a second of work" in text
+
+
+def test_a_series_without_an_answer_or_nodes(tmp_path: Path) -> None:
+    made(tmp_path)
+    np.savez(tmp_path / "contacts.npz", m=M)
+    assert "exceedance.png" in write(tmp_path).read_text()
+    (tmp_path / "cases.jsonl").write_text('{"case": 1, "verdict": "no_answer"}\n')
+    assert "1 no answer" in write(tmp_path).read_text()

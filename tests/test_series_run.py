@@ -1,0 +1,265 @@
+"""A series from the command line to rows and gaps, against independent answers; ended, resumed, refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tiny
+from small import solve_by_nnls
+from strip import write_strip
+from typer.testing import CliRunner
+
+from harness.cli import app
+from harness.series import desk as desk_module
+from harness.series import store
+from harness.series.desk import Desk, Job
+from problems.prepare import load_case, prepared
+from problems.random_gaps import random_gaps
+from problems.scene import read_scene
+
+ROOT = Path(__file__).parent.parent
+SLOW = tiny.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("here")
+        write_strip(folder)
+        (folder / "exact.py").write_text(tiny.EXACT)
+        (folder / "slow.py").write_text(SLOW)
+        patch.chdir(folder)
+        yield
+
+
+def series(*arguments: str, code: int = 0) -> Any:
+    ended = CliRunner().invoke(app, ["series", "strip.toml", "--threads", "1", *arguments])
+    assert ended.exit_code == code, ended.output
+    return ended
+
+
+def rows_of(directory: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (Path(directory) / store.CASES).read_text().splitlines()]
+
+
+def gaps_of(directory: str) -> np.ndarray:
+    return np.fromfile(Path(directory) / store.GAPS, np.float32).reshape(-1, 45)
+
+
+def test_rows_and_gaps_against_nnls_on_scenes_of_their_own(tmp_path: Path) -> None:
+    """Each case solved again as the scene that its row names, by another method."""
+    series("--cases", "70", "--seed", "5", "--check", "10", "--out", "plain")
+    rows, gaps = rows_of("plain"), gaps_of("plain")
+    assert [row["case"] for row in rows] == list(range(70))
+    assert {row["verdict"] for row in rows} == {"within"}
+    assert all(row["bound_mm"] < 1e-9 for row in rows)
+    checked = [row for row in rows if "displacement_error_mm" in row]
+    assert [row["case"] for row in checked] == list(range(0, 70, 10))
+    assert all(row["displacement_error_mm"] <= row["bound_mm"] for row in checked)
+    for row in rows[::9]:
+        scene = read_scene(str(write_strip(tmp_path, ("seed = 7", f"seed = {row['gap_seed']}"))))
+        data = prepared(scene)
+        case = load_case(scene, data)
+        x, lam = solve_by_nnls(data, case)
+        gap = case.g - data.assembly.A.T @ x
+        np.testing.assert_allclose(gaps[row["case"]], gap, rtol=1e-7, atol=1e-9)
+        assert row["active"] == (lam > 0).sum() > 0
+        assert row["max_gap_mm"] == pytest.approx(gap.max(), abs=1e-9)
+        assert row["mean_gap_mm"] == pytest.approx(gap.mean(), abs=1e-9)
+
+
+def test_again_solves_nothing_and_more_cases_extend() -> None:
+    series("--cases", "20", "--out", "grown")
+    before = (Path("grown") / store.CASES).read_text()
+    assert "20 cases, 20 already" in series("--cases", "20", "--out", "grown").output
+    assert (Path("grown") / store.CASES).read_text() == before
+    assert "45 cases, 20 already" in series("--cases", "45", "--out", "grown").output
+    assert (Path("grown") / store.CASES).read_text().startswith(before)
+    series("--cases", "45", "--out", "at-once")
+    np.testing.assert_allclose(gaps_of("grown"), gaps_of("at-once"), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "change", [("--seed", "1"), ("--sd", "0.3"), ("--solver", "gi"), ("--limit", "1e-6")]
+)
+def test_another_series_is_refused(change: tuple[str, str]) -> None:
+    series("--cases", "3", "--out", "mine")
+    ended = series("--cases", "3", "--out", "mine", *change, code=2)
+    assert "name another directory" in ended.output
+    assert len(rows_of("mine")) == 3
+
+
+def test_a_torn_row_is_solved_again() -> None:
+    series("--cases", "30", "--out", "torn")
+    path, wanted = Path("torn") / store.CASES, gaps_of("torn")
+    text = path.read_text()
+    path.write_text(text[: text.rindex('"status"')])
+    assert "30 cases, 29 already" in series("--cases", "30", "--out", "torn").output
+    assert sorted(row["case"] for row in rows_of("torn")) == list(range(30))
+    np.testing.assert_allclose(gaps_of("torn"), wanted, atol=1e-9)
+
+
+def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve = Desk._try
+
+    def interrupted(self: Desk, case: int, load: Any) -> Any:
+        if case == 50:
+            raise KeyboardInterrupt
+        return solve(self, case, load)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Desk, "_try", interrupted)
+        patch.setattr(desk_module, "BLOCK", 32)
+        some = ("--cases", "60", "--solver", "gi", "--out", "stopped")
+        assert "the same command goes on" in series(*some, code=130).output
+    assert [row["case"] for row in rows_of("stopped")] == list(range(32))  # whole blocks
+    series(*some)
+    assert [row["case"] for row in rows_of("stopped")] == list(range(60))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_kill_loses_and_doubles_no_row() -> None:
+    command = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1", "--cases", "200"]
+    command += ["--solver", "slow", "--plugin", "slow.py", "--out", "killed"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
+    path = Path("killed") / store.CASES
+    while not path.exists() or not path.stat().st_size:
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept = rows_of("killed")
+    assert 0 < len(kept) < 200
+    series("--cases", "200", "--solver", "slow", "--plugin", "slow.py", "--out", "killed")
+    rows = rows_of("killed")
+    assert rows[: len(kept)] == kept
+    assert sorted(row["case"] for row in rows) == list(range(200))
+
+
+def test_a_table_with_a_bad_case_keeps_what_is_solved() -> None:
+    gaps = np.random.default_rng(0).uniform(0, 0.5, (12, 45))
+    np.save("gaps.npy", gaps[:8])
+    series("--gaps", "gaps.npy", "--out", "table")
+    gaps[10, 3] = np.nan
+    np.save("gaps.npy", gaps)
+    ended = series("--gaps", "gaps.npy", "--out", "table", code=2)
+    assert "case 10, contact 3 = nan" in ended.output
+    assert len(rows_of("table")) == 8
+    gaps[10, 3] = 0.1
+    np.save("gaps.npy", gaps)
+    assert "12 cases, 8 already" in series("--gaps", "gaps.npy", "--out", "table").output
+
+
+def test_a_table_that_has_changed_since_is_refused_by_case() -> None:
+    gaps = np.random.default_rng(1).uniform(0, 0.5, (6, 45))
+    np.save("changed.npy", gaps)
+    series("--gaps", "changed.npy", "--out", "changed")
+    gaps[4, 44] += 1e-12
+    np.save("changed.npy", gaps)
+    ended = series("--gaps", "changed.npy", "--out", "changed", code=2)
+    assert "case 4, gaps = " in ended.output
+    assert ended.output.count("name another directory") == 1
+
+
+def test_a_sweep_starts_from_its_neighbour(tmp_path: Path) -> None:
+    series("--sweep", "initial_gap.mean=0.1:1.0:40", "--solver", "gi", "--out", "swept")
+    rows = rows_of("swept")
+    assert [row["warm_from"] for row in rows[1:]] == list(range(39))
+    assert rows[7]["initial_gap.mean"] == pytest.approx(0.1 + 7 * 0.9 / 39)
+    scene = read_scene(str(write_strip(tmp_path, ("mean = 0.4", f"mean = {rows[7]['initial_gap.mean']}"))))
+    data = prepared(scene)
+    case = load_case(scene, data)
+    gap = case.g - data.assembly.A.T @ solve_by_nnls(data, case)[0]
+    np.testing.assert_allclose(gaps_of("swept")[7], gap, rtol=1e-7, atol=1e-9)
+
+
+def test_what_cannot_be_together_is_said_at_once() -> None:
+    ended = series("--gaps", "gaps.csv", "--sweep", "a=1", "--form", "primal", "--out", "none", code=2)
+    assert "random gaps, --gaps or --sweep" in ended.output
+    assert "newton takes dual" in ended.output
+    assert not Path("none").exists()
+    series("--sweep", "initial_gap.mean=1:2:3", "--cases", "5", "--out", "none", code=2)
+
+
+@pytest.mark.parametrize(("solver", "form"), [("gi", "primal"), ("osqp", "dual"), ("piqp", "primal")])
+def test_other_solvers_and_forms(solver: str, form: str) -> None:
+    out = f"{solver}-{form}"
+    series(
+        "--cases",
+        "12",
+        "--check",
+        "1",
+        "--solver",
+        solver,
+        "--form",
+        form,
+        "--tolerance",
+        "1e-10",
+        "--out",
+        out,
+    )
+    rows = rows_of(out)
+    assert [row["status"] for row in rows] == ["solved"] * 12
+    assert all(row["displacement_error_mm"] <= min(1e-7, row["bound_mm"]) for row in rows)
+
+
+@pytest.mark.parametrize("fault", ["nan", "shape", "none", "raises", "no_lam"])
+def test_a_solver_that_fails_is_a_row(fault: str) -> None:
+    Path("faulty.py").write_text(tiny.FAULTY)
+    scene = read_scene("strip.toml")
+    job = Job(scene, random_gaps(scene, prepared(scene), 3, 0), "faulty", "dual", 1e-9, 1e-7, 0, 1,
+              {"fault": fault}, Path("faulty.py"))  # fmt: skip
+    (results,) = Desk(job).solve([0, 1, 2])
+    assert [result.row["verdict"] for result in results] == ["no_answer"] * 3
+    assert all(result.gap is None for result in results)
+    if fault == "raises":
+        assert "ValueError: no step" in results[0].row["message"]
+
+
+def test_a_wrong_answer_is_not_vouched_for() -> None:
+    scene = read_scene("strip.toml")
+    Path("faulty.py").write_text(tiny.FAULTY)
+    job = Job(scene, random_gaps(scene, prepared(scene), 4, 0), "faulty", "dual", 1e-9, 1e-7, 2, 1,
+              {"fault": "big_details"}, Path("faulty.py"))  # fmt: skip
+    (results,) = Desk(job).solve([0, 1, 2, 3])  # its λ is zero
+    assert [result.row["verdict"] for result in results] == ["outside", "cannot_be_judged"] * 2
+
+
+def test_memory_does_not_grow_with_the_cases() -> None:
+    scene = read_scene("strip.toml")
+    job = Job(scene, random_gaps(scene, prepared(scene), 10**9, 0), "gi", "dual", 1e-9, 1e-7, 0, 1)
+    desk = Desk(job)
+    for _ in desk.solve(range(10**8, 10**8 + 5 * desk_module.NEARS)):
+        assert len(desk.nears) <= desk_module.NEARS
+
+
+@pytest.mark.parametrize("fault", ["raise RuntimeError", "return answers[:-1]", "return [None] * len(loads)"])
+def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault: str) -> None:
+    """A plugin whose `together` fails on one block."""
+    text = tiny.EXACT + f"""
+    def together(self, state):
+        def answers(loads, tolerance):
+            answers = [self.solve(state, load, tolerance) for load in loads]
+            if len(loads) < {desk_module.BLOCK}:
+                {fault}
+            return answers
+        return answers
+"""
+    Path("atonce.py").write_text(text)
+    scene, count = read_scene("strip.toml"), desk_module.BLOCK + 5
+    job = Job(scene, random_gaps(scene, prepared(scene), count, 0), "atonce", "dual", 1e-9, 1e-7, 0, 1,
+              {}, Path("atonce.py"))  # fmt: skip
+    rows = [result.row for results in Desk(job).solve(range(count)) for result in results]
+    assert [row["case"] for row in rows] == list(range(count))
+    assert {row["status"] for row in rows} == {"solved"}
+    assert [("setup_s" in row) for row in rows] == [False] * desk_module.BLOCK + [True] * 5

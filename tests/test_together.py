@@ -1,0 +1,174 @@
+"""A banded M ≈ Q⁻¹, and many load cases at once with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small import make_load, make_prepared, solve_by_nnls
+from strip import write_strip
+
+from harness.trials import contact_rows, prepared_from
+from problems.assembly import Vector
+from problems.prepare import load_case, prepared
+from problems.random_gaps import random_gaps
+from problems.scene import read_scene
+from solvers.banded_inverse import BandedInverse, along, banded_inverse
+from solvers.base import Answer, Load, Problem
+from solvers.bordered_factor import Set
+from solvers.newton import ActiveSetNewton
+from solvers.together import Together
+
+TOLERANCE = 1e-10
+
+
+def dense(M: BandedInverse) -> np.ndarray:
+    return np.column_stack([M.product(e) for e in np.eye(len(M.order))])
+
+
+def chain(m: int) -> np.ndarray:
+    """The stiffness of m masses in a row, each held to the next and to the ground."""
+    rng = np.random.default_rng(m)
+    k = rng.uniform(1, 3, m)
+    return np.diag(rng.uniform(0.1, 1, m) + k + np.r_[0, k[:-1]]) - np.diag(k[:-1], 1) - np.diag(k[:-1], -1)
+
+
+def grid(nx: int, ny: int, rng: np.random.Generator | None = None) -> np.ndarray:
+    x, y = np.meshgrid(10.0 * np.arange(nx), 10.0 * np.arange(ny))
+    nodes = np.column_stack([x.ravel(), y.ravel()])
+    return nodes if rng is None else nodes[rng.permutation(len(nodes))]
+
+
+def alone(C: Set, p: Vector, tolerance: float) -> Answer:
+    raise AssertionError("all are settled together")
+
+
+def test_where_forces_act_on_neighbours_alone_it_is_the_inverse() -> None:
+    """Q⁻¹ tridiagonal: what is known of the contacts before says nothing more than the last one."""
+    K = chain(40)
+    shuffled = np.random.default_rng(0).permutation(40)
+    Q = np.asfortranarray(np.linalg.inv(K)[np.ix_(shuffled, shuffled)])
+    M = banded_inverse(Q, np.column_stack([7.0 * shuffled, np.zeros(40)]))
+    np.testing.assert_array_equal(shuffled[M.order], np.arange(40))
+    np.testing.assert_allclose(dense(M), K, atol=1e-12)
+
+
+def test_a_window_of_all_contacts_gives_the_inverse() -> None:
+    Q = make_prepared(1, 30).Q
+    M = banded_inverse(Q, None)
+    np.testing.assert_allclose(dense(M) @ Q, np.eye(30), atol=1e-10)
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(9, 4), (4, 9), (12, 1), (6, 6)])
+def test_contacts_stand_in_lines_across_the_joint(nx: int, ny: int) -> None:
+    nodes = grid(nx, ny, np.random.default_rng(0))
+    order, across = along(nodes, len(nodes))
+    longer = 0 if nx >= ny else 1
+    assert across == min(nx, ny)
+    assert (np.diff(nodes[order, longer]) >= 0).all()
+    both, twice = along(np.vstack([nodes, nodes]), 2 * len(nodes))  # a stack of two contacts at each place
+    assert twice == 2 * across
+    assert sorted(both) == list(range(2 * len(nodes)))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
+def test_a_band_factor_solves_with_the_principal_submatrix(share: float, tmp_path: Path) -> None:
+    data = prepared(read_scene(str(write_strip(tmp_path))))
+    M = banded_inverse(data.Q, data.assembly.contact_nodes)
+    full, rng = dense(M), np.random.default_rng(2)
+    assert len(M.band) - 2 < 44  # a band, not all of it
+    assert np.linalg.eigvalsh(full)[0] > 0
+    S, b = rng.random(45) < share, rng.standard_normal(45)
+    wanted = np.zeros(45)
+    wanted[S] = np.linalg.solve(full[np.ix_(S, S)], b[S])
+    np.testing.assert_allclose(M.factor(S).solve(b), wanted, rtol=1e-10, atol=1e-12)
+
+
+def test_what_is_not_positive_definite_is_said() -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="minor 3"):
+        banded_inverse(np.diag([1.0, 1.0, -1.0, 1.0]), None)
+
+
+@pytest.mark.parametrize("tools", [0, 7])
+def test_answers_against_nnls(tools: int) -> None:
+    data = make_prepared(3, 25, tools)
+    pairs = [make_load(seed, data) for seed in range(20)]
+    solve = ActiveSetNewton().together(ActiveSetNewton().prepare(Problem(data, "dual")))
+    assert solve is not None
+    for (case, _), answer in zip(pairs, solve([load for _, load in pairs], TOLERANCE), strict=True):
+        x, lam = solve_by_nnls(data, case)
+        assert answer.status == "solved"
+        assert answer.lam is not None
+        np.testing.assert_allclose(answer.lam, lam, atol=1e-6)
+        np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-9)
+
+
+def strip_loads(folder: Path, count: int) -> tuple[Any, list[Any], list[Load]]:
+    scene = read_scene(str(write_strip(folder)))
+    data = prepared(scene)
+    series = random_gaps(scene, data, count, 3)
+    cases = [load_case(scene, data), *(series.load(k, data) for k in range(count - 1))]
+    return data, cases, [Load(case.f, case.g, data.dual_load(case)) for case in cases]
+
+
+def test_a_strip_with_random_gaps_in_blocks_of_any_size(tmp_path: Path) -> None:
+    """Sweeps settle all of them, as NNLS does, whatever was solved before."""
+    data, cases, loads = strip_loads(tmp_path, 24)
+    M = banded_inverse(data.Q, data.assembly.contact_nodes)
+    at_once = Together(data.Q, M, alone)(loads, TOLERANCE)
+    in_threes = Together(data.Q, M, alone)
+    three = [answer for k in range(0, 24, 3) for answer in in_threes(loads[k : k + 3], TOLERANCE)]
+    backwards = Together(data.Q, M, alone)(loads[::-1], TOLERANCE)[::-1]
+    closed = set()
+    for case, *answers in zip(cases, at_once, three, backwards, strict=True):
+        x, lam = solve_by_nnls(data, case)
+        closed.add(int((lam > 0).sum()))
+        for answer in answers:
+            assert answer.status == "solved"
+            assert answer.lam is not None
+            assert answer.details["closed"] == (lam > 0).sum()
+            np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-9)
+    assert len(closed) > 3
+
+
+def test_contacts_that_all_open_or_all_close(tmp_path: Path) -> None:
+    data, _, loads = strip_loads(tmp_path, 2)
+    spread = np.full(45, 100.0)  # N at each contact
+    closed = Load(loads[0].f, loads[0].g, data.Q @ spread)
+    opened = Load(loads[0].f, loads[0].g, -spread)
+    M = banded_inverse(data.Q, data.assembly.contact_nodes)
+    shut, free = Together(data.Q, M, alone)([closed, opened], TOLERANCE)
+    np.testing.assert_allclose(shut.lam, spread, rtol=1e-6)
+    assert free.lam is not None
+    assert not free.lam.any()
+
+
+def test_what_sweeps_do_not_settle_is_solved_alone_and_soon_at_once() -> None:
+    """Contacts that know nothing of their neighbours: M is worth nothing, the answers are right."""
+    rng = np.random.default_rng(5)
+    W, _ = np.linalg.qr(rng.standard_normal((120, 120)))
+    K = (W * np.geomspace(1.0, 1e4, 120)) @ W.T
+    data = prepared_from((np.asfortranarray((K + K.T) / 2),), contact_rows(0, 120))
+    pairs = [make_load(seed, data) for seed in range(6)]
+    solver = ActiveSetNewton()
+    together = solver.together(solver.prepare(Problem(data, "dual")))
+    assert together is not None
+    for again in range(2):
+        answers = together([load for _, load in pairs], TOLERANCE)
+        alone = ["factorisations" in answer.details for answer in answers]
+        assert sum(alone) >= (6 if again else 3)
+        for (case, _), answer in zip(pairs, answers, strict=True):
+            x, lam = solve_by_nnls(data, case)
+            assert answer.lam is not None
+            assert answer.details["closed"] == (lam > 0).sum()
+            np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-8)
+        assert not together.of_use
+
+
+def test_newton_has_no_such_way_without_a_factor() -> None:
+    data = make_prepared(1, 5)
+    broken = type(data)(data.assembly, data.factors, -data.Q)
+    solver = ActiveSetNewton()
+    assert solver.together(solver.prepare(Problem(broken, "dual"))) is None

@@ -1,0 +1,95 @@
+"""Series of load cases: each solver's `update` in the place of `setup`, from a near answer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from small import make_load, make_prepared, solve_by_nnls
+
+from problems.assembly import LoadCase, Prepared
+from solvers.base import FORMS, Form, Load, Near, Problem, Solver
+from solvers.registry import SOLVERS, make_solver
+
+VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    *((name, {}) for name in SOLVERS),
+    ("piqp", {"backend": "sparse"}),
+]
+CASES = [(name, options, form) for name, options in VARIANTS for form in make_solver(name, options).forms]
+TOLERANCE = 1e-9
+
+
+def near_of(prepared: Prepared, case: LoadCase, form: Form) -> Near:
+    x, lam = solve_by_nnls(prepared, case)
+    load = Load(case.f, case.g, prepared.dual_load(case))
+    return Near(load, lam, case.g - prepared.assembly.A.T @ x, x if form == "primal" else None)
+
+
+def started(name: str, options: dict[str, Any], prepared: Prepared, form: Form) -> tuple[Solver, Any]:
+    solver = make_solver(name, options)
+    return solver, solver.prepare(solver.convert(Problem(prepared, form)))
+
+
+@pytest.mark.parametrize(("name", "options", "form"), CASES, ids=str)
+def test_a_series_agrees_with_nnls(name: str, options: dict[str, Any], form: Form) -> None:
+    """Other forces, other gaps, both; each from an answer that is not the last one's."""
+    prepared = make_prepared(2, 20, 5)
+    solver, state = started(name, options, prepared, form)
+    first, load = make_load(3, prepared)
+    ready = solver.setup(state, load, TOLERANCE)
+    solver.solve(ready, load, TOLERANCE)
+    nears = [near_of(prepared, first, form)]
+    rng = np.random.default_rng(0)
+    for k in range(5):
+        g = first.g + rng.uniform(0, 0.1, len(first.g)) if k != 1 else first.g
+        case = LoadCase(first.f * (1 + 0.1 * k), g)
+        load = Load(case.f, case.g, prepared.dual_load(case))
+        ready = solver.update(state, ready, load, TOLERANCE, nears[max(len(nears) - 2, 0)])
+        got = solver.solve(ready, load, TOLERANCE)
+        x, lam = solve_by_nnls(prepared, case)
+        assert got.lam is not None
+        assert got.status == "solved"
+        found = got.x if form == "primal" else prepared.recover(got.lam, case)
+        assert found is not None
+        np.testing.assert_allclose(found, x, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(got.lam, lam, rtol=0, atol=1e-3)
+        nears.append(near_of(prepared, case, form))
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", ["osqp", "proxqp"])
+def test_a_warm_start_is_taken(name: str, form: Form) -> None:
+    """From its own answer a case takes fewer iterations than from the answer of another."""
+    prepared = make_prepared(4, 30, 5)
+    case, load = make_load(5, prepared)
+    other = make_load(6, prepared)[0]
+    taken = {}
+    for near in (case, other):
+        solver, state = started(name, {}, prepared, form)
+        before = Load(near.f, near.g, prepared.dual_load(near))
+        ready = solver.setup(state, before, TOLERANCE)
+        solver.solve(ready, before, TOLERANCE)
+        ready = solver.update(state, ready, load, TOLERANCE, near_of(prepared, near, form))
+        answer = solver.solve(ready, load, TOLERANCE)
+        assert answer.iterations is not None
+        taken[id(near)] = answer.inner_iterations or answer.iterations
+    assert taken[id(case)] < taken[id(other)]
+
+
+def test_newton_begins_with_a_near_answer_and_only_with_a_near_one() -> None:
+    prepared = make_prepared(7, 60)
+    case, load = make_load(8, prepared)
+    solver, state = started("newton", {}, prepared, "dual")
+    cold = solver.solve(state, load, TOLERANCE)
+    warm = solver.solve(
+        solver.update(state, state, load, TOLERANCE, near_of(prepared, case, "dual")), load, TOLERANCE
+    )
+    assert (warm.iterations, warm.inner_iterations) == (1, 0)
+    assert cold.inner_iterations
+    far = make_load(9, prepared)[0]
+    again = solver.solve(
+        solver.update(state, state, load, TOLERANCE, near_of(prepared, far, "dual")), load, TOLERANCE
+    )
+    assert again.inner_iterations == cold.inner_iterations
+    np.testing.assert_array_equal(again.lam, cold.lam)
