@@ -15,7 +15,8 @@ from .errors import Fault, InputError
 from .joint import Joint
 from .load_cases import LoadCases
 from .prepare import load_case
-from .scene import Scene, validation_faults
+from .scene import Scene
+from .validation import validation_faults
 
 #: The bits of a case's seed: so many are exact in every reader of JSON.
 SEED_BITS = 53
@@ -90,6 +91,6 @@ def random_gaps(
     try:
         field = InitialGap.model_validate(table | {"random": random})
     except ValidationError as error:
-        raise InputError(list(validation_faults("series", "initial_gap", error))) from error
+        raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = replace(scene, effects=tuple(effect for effect in scene.effects if effect not in found))
     return RandomGaps(scene.joint, load_case(others, prepared), field, seed, cases)

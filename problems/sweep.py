@@ -16,7 +16,8 @@ from .effect import TieEffect
 from .errors import Fault, InputError
 from .load_cases import LoadCases
 from .prepare import load_case
-from .scene import Scene, validation_faults
+from .scene import Scene
+from .validation import validation_faults
 
 FORM = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
 
@@ -63,7 +64,8 @@ def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
             try:
                 effect = _changed(scene.effects[step.effect], step, value)
             except ValidationError as error:
-                faults += validation_faults(f"--sweep {step.name}", effect_name(scene, step.effect), error)
+                effect, name = scene.effects[step.effect], effect_name(scene, step.effect)
+                faults += validation_faults(f"--sweep {step.name}", type(effect), error, name, effect.units)
                 continue
             assert scene.joint is not None
             faults += [Fault(f"--sweep {step.name}", *fault) for fault in effect.faults(scene.joint)]

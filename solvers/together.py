@@ -27,8 +27,8 @@ from .base import Answer, Load
 from .block_pivoting import block_pivoting, wrong_signs
 from .bordered_factor import Set
 from .contact_sets import Trial
-from .product import product
 from .kkt import EPS, checked
+from .product import product
 
 SWEEPS = 20  # for an error that shrinks by half each time, and then some
 SETS = 3  # tried a sweep: M is not worth more
