@@ -208,7 +208,8 @@ def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vec
             yield "springs between parts: K stays block diagonal"
         if not any(isinstance(effect, PartLoadEffect) for effect in scene.effects):
             yield "condensing loads: none stands beyond the junction"
-        yield f"effects that the scene does not name, not imported: {', '.join(not_called_for(scene))}"
+        if others := not_called_for(scene):
+            yield f"effects that the scene does not name, not imported: {', '.join(others)}"
 
 
 def _save(out: Path, record: dict[str, Any], data: Prepared, load: LoadCase, x: Vector, lam: Vector) -> None:
