@@ -12,14 +12,13 @@ from problems import formats
 from problems.assembly import LoadCase, Prepared
 from problems.build import load_case as own_load_case
 from problems.build import prepared as own_prepared
-from problems.digits import DOUBLE, apparent_digits, expected_error
 from problems.errors import Fault, InputError
 from problems.matrices import read_matrices
 from problems.prepare import load_case, prepared
 from problems.scene import read_scene
 
 from .active_set import contact_set
-from .judge import LIMIT_MM
+from .few_digits import said_of_digits
 
 
 def export(source: str, form: str, out: Path, console: Console) -> None:
@@ -90,19 +89,10 @@ def _checked(out: Path, console: Console) -> None:
     blocks = " + ".join(str(len(K)) for K in data.assembly.blocks)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
     console.print(f"K is symmetric and positive definite, cond(K) = {data.facts['cond_K']:.2e}.")
-    digits = min(apparent_digits(K[np.nonzero(K)]) for K in data.assembly.blocks)
-    if digits == DOUBLE:
-        console.print("Its entries have all digits of double precision.")
-        return
     p = data.dual_load(load)
     closed = contact_set(data.Q, p)
     lam = np.zeros(data.assembly.m)
     rows = np.flatnonzero(closed)
     lam[rows] = np.linalg.solve(data.Q[np.ix_(rows, rows)], p[rows])
-    error = expected_error(data, data.recover(lam, load), lam, digits)
-    text = f"Its entries seem to have {digits} digits: if they were rounded, displacements are off by"
-    few = error > LIMIT_MM
-    text += (
-        f" about {error:.0e} mm{f', more than {LIMIT_MM:g} mm: export it with more digits' if few else ''}."
-    )
-    console.print(text, style="yellow" if few else None)
+    said, few = said_of_digits(data, data.recover(lam, load), lam)
+    console.print(f"{said}.", style="yellow" if few else None)

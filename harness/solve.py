@@ -23,6 +23,7 @@ from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
 from solvers.base import Form, Load, Problem, Solver
 
+from .few_digits import said_of_digits
 from .judge import LIMIT_MM, judge
 from .ledger import Entry, ledger, not_called_for
 from .machine import resident_mib
@@ -109,6 +110,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
         "route": known.route,
         **_layout(scene, data),
         "ledger": [vars(entry) for entry in entries],
+        "digits": said_of_digits(data, known.x, known.lam)[0] if scene.matrices else None,
         "skipped": list(_skipped(scene, steps, meets, solver, p)),
         "steps": steps.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
@@ -201,14 +203,15 @@ def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vec
         yield f"the quadratic program: it was not called for. {why}{instead}"
     if not steps.built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
-    elif not steps.condensed:
+    elif scene.joint is not None and not steps.condensed:
         yield "condensation: the parts came from the cache"
     if scene.joint is not None:
         if not any(isinstance(effect, TieEffect) for effect in scene.effects):
             yield "springs between parts: K stays block diagonal"
         if not any(isinstance(effect, PartLoadEffect) for effect in scene.effects):
             yield "condensing loads: none stands beyond the junction"
-        yield f"effects that the scene does not name, not imported: {', '.join(not_called_for(scene))}"
+        if others := not_called_for(scene):
+            yield f"effects that the scene does not name, not imported: {', '.join(others)}"
 
 
 def _save(out: Path, record: dict[str, Any], data: Prepared, load: LoadCase, x: Vector, lam: Vector) -> None:
@@ -235,6 +238,8 @@ def _show(record: dict[str, Any], entries: list[Entry], known: Reference, consol
         table.add_row(entry.effect, entry.adds, entry.amount, *cost)
     if entries:
         console.print(table)
+    if record["digits"]:
+        console.print(f"{record['digits']}.")
     for line in record["skipped"]:
         console.print(f"Skipped: {line}.", style="dim")
     error = record["judged_error_mm"]

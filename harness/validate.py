@@ -12,12 +12,14 @@ from rich.console import Console
 from rich.table import Table
 
 from problems import cache
-from problems.build import cache_key
+from problems.build import cache_key, factor
 from problems.effect import PartLoadEffect, TieEffect
 from problems.errors import InputError
 from problems.joint import Joint, Part
+from problems.matrices import read_matrices
 from problems.scene import Scene, read_scene
 
+from .few_digits import digits_of
 from .machine import physical_memory_mib
 
 TRIAL = 700  # unknowns of the Cholesky factorisation that the machine's speed is taken from
@@ -40,14 +42,7 @@ def validate(source: str, console: Console) -> None:
     """Read and check a scene, print what it is made of and an estimate. Raises InputError."""
     scene = read_scene(source)
     if scene.joint is None:
-        from problems.digits import apparent_digits
-        from problems.matrices import read_matrices
-
-        assembly = read_matrices(dict(scene.matrices))[0]
-        blocks = ", ".join(str(len(K)) for K in assembly.blocks)
-        digits = min(apparent_digits(K[np.nonzero(K)]) for K in assembly.blocks)
-        console.print(f"{scene.name}: own matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
-        console.print(f"K is symmetric, its entries seem to have {digits} digits. Fine.")
+        _matrices(scene, console)
         return
     joint = scene.joint
     refuse_what_cannot_fit(scene, source)
@@ -72,6 +67,17 @@ def validate(source: str, console: Console) -> None:
     beyond = [effect.kind for effect in scene.effects if isinstance(effect, PartLoadEffect)]
     if beyond:
         console.print(f"Loads beyond the junction are condensed once: {', '.join(beyond)}.")
+
+
+def _matrices(scene: Scene, console: Console) -> None:
+    """Say what given matrices are. Raises InputError where K is not positive definite."""
+    assembly = scene.made.assembly if scene.made else read_matrices(dict(scene.matrices))[0]
+    for K, name in zip(assembly.blocks, assembly.parts, strict=True):
+        factor(K, name, scene)
+    blocks = ", ".join(str(len(K)) for K in assembly.blocks)
+    console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
+    digits = digits_of(assembly)
+    console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
 
 
 def refuse_what_cannot_fit(scene: Scene, source: str) -> None:

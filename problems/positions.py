@@ -51,14 +51,15 @@ class Positions(Table):
     def misplaced(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         """(key, value, what is allowed) of points that are not on the junction."""
         length, width = joint.junction.length, joint.junction.width
-        if self.pattern and 2 * self.pattern.edge > min(length, width):
-            allowed = f"at most half the junction, {min(length, width) / 2:g} mm"
-            yield "pattern.edge", self.pattern.edge, allowed
+        if pattern := self.pattern:
+            spread = [size for size, n in ((length, pattern.columns), (width, pattern.rows)) if n > 1]
+            if 2 * pattern.edge > min(spread, default=np.inf):
+                yield "pattern.edge", pattern.edge, f"at most half the junction, {min(spread) / 2:g} mm"
             return
         allowed = f"on the junction, 0 … {length:g} × 0 … {width:g} mm"
-        for k, (x, y) in enumerate(self.marks(joint)):
+        for k, (x, y) in enumerate(self.points):
             if not (0 <= x <= length and 0 <= y <= width):
-                yield f"points[{k}]", [float(x), float(y)], allowed
+                yield f"points[{k}]", [x, y], allowed
 
     def nearest_nodes(self, joint: Joint) -> NDArray[np.intp]:
         """The junction node nearest to each point, at most half a node spacing away along x and y."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import jinja2
 import numpy as np
@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from . import style
 from .maps import Array, draw, grid_of, outline
@@ -25,6 +26,7 @@ from .vtu import write_vtu
 #: Marks of what stands on the junction, by the kind of the effect.
 MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 STRIP, TALLEST = 7.4, 5.5  # inches: the width of a map over the whole page, the largest height of one
+MARGIN = 0.12  # inches
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps below one another, all side by side
 
 Columns = dict[str, list[Any]]
@@ -42,9 +44,7 @@ def write(directory: Path) -> Path:
     figures = _figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
-            # Titles overhang narrow maps; elsewhere the second layout would only take time.
-            narrow = drawing.get_figwidth() < style.WIDTH
-            drawing.savefig(directory / f"{name}.png", dpi=style.DPI, bbox_inches="tight" if narrow else None)
+            drawing.savefig(directory / f"{name}.png", dpi=style.DPI, bbox_inches=_bounds(drawing))
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
@@ -60,6 +60,16 @@ def write(directory: Path) -> Path:
         template.render(record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu), "utf-8"
     )
     return path
+
+
+def _bounds(drawing: Figure) -> Bbox | Literal["tight"]:
+    """What of a drawing is saved, in inches.
+
+    Titles overhang narrow maps. Elsewhere the layout is at most a little off, where the maps' proportions
+    leave it no room: a margin does, and the second layout of "tight" would only take time.
+    """
+    width, height = drawing.get_size_inches()
+    return Bbox([[-MARGIN, -MARGIN], [width + MARGIN, height + MARGIN]]) if width >= style.WIDTH else "tight"
 
 
 def _nodes(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:

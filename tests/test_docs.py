@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 import sys
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from pydantic_core import PydanticUndefined
+from rich.console import Console
 
+from harness.solve import solve
 from problems import effects
 from problems.effect import Effect, effect_class, effect_kinds
 from problems.errors import InputError
@@ -22,11 +26,15 @@ PAGE = (DOCS / "effects.md").read_text("utf-8")
 JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
-def test_the_scene_of_the_page_can_be_solved(tmp_path: Path) -> None:
+def test_the_scene_of_the_page_is_solved_and_drawn_whole(tmp_path: Path) -> None:
+    """Its parts meet; the borders of the pictures are white, so that no title is cut."""
     assert JOINT is not None
     (tmp_path / "scene.toml").write_text(JOINT[1])
-    scene = read_scene(str(tmp_path / "scene.toml"))
-    assert (prepared(scene).dual_load(load_case(scene, prepared(scene))) > 0).any()
+    assert solve(str(tmp_path / "scene.toml"), None, 1e-9, tmp_path, Console(file=StringIO())) == 0
+    for name in ("gap", "forces", "displacement"):
+        picture = imread(tmp_path / f"{name}.png")[:, :, :3]
+        for border in (picture[:3], picture[-3:], picture[:, :3], picture[:, -3:]):
+            assert (border == 1.0).all()
 
 
 def test_the_new_effect_of_the_page_is_one_short_file(

@@ -78,6 +78,19 @@ def test_pattern_spreads_evenly_up_to_the_edge() -> None:
     np.testing.assert_allclose(single.marks(JOINT), [(200.0, 60.0)])
 
 
+@pytest.mark.parametrize(
+    ("rows", "edge", "most"), [(1, 200.0, None), (1, 201.0, "200 mm"), (2, 60.0, None), (2, 61.0, "60 mm")]
+)
+def test_the_edge_of_a_pattern_is_bounded_along_its_rows_and_columns(
+    rows: int, edge: float, most: str | None
+) -> None:
+    """On 400 × 120 mm: a single row stands in the middle, whatever the edge."""
+    pattern = {"columns": 4, "rows": rows, "edge": edge}
+    made = Fasteners.model_validate({"kind": "fasteners", "preload": 1.0, "pattern": pattern})
+    said = [allowed for _, _, allowed in made.faults(JOINT)]
+    assert said == ([f"at most half the junction, {most}"] if most else [])
+
+
 @pytest.mark.parametrize("extra", [{}, {"points": [[1.0, 1.0]], "pattern": {"columns": 1, "rows": 1}}])
 def test_fasteners_by_points_or_by_a_pattern(extra: dict[str, object]) -> None:
     with pytest.raises(ValidationError, match="one of points, file and pattern"):

@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 
 from harness.cli import app
 from harness.exchange import export, import_, matrices
+from harness.solve import solve
 from harness.trials import prepared_from
 from problems import build, formats
 from problems.assembly import LoadCase, Prepared
@@ -331,10 +332,12 @@ def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     K = data["K"].toarray()
     data["K"] = sp.csr_array(rounded(K, 7))
     formats.write("npz", tmp_path / "seven.npz", data)
-    shown = StringIO()
+    shown, solved = StringIO(), StringIO()
     import_([str(tmp_path / "seven.npz")], tmp_path / "out.npz", Console(file=shown, width=200))
-    assert "seem to have 7 digits" in shown.getvalue()
-    assert "export it with more digits" in shown.getvalue()
+    solve(str(tmp_path / "seven.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
+    for said in (shown.getvalue(), solved.getvalue(), (tmp_path / "answer" / "answer.md").read_text()):
+        assert "seem to have 7 digits" in said
+        assert "more than 1e-07 mm: export it with more digits" in said
     formats.write("npz", tmp_path / "all.npz", data | {"K": sp.csr_array(K)})
     shown = StringIO()
     import_([str(tmp_path / "all.npz")], tmp_path / "out2.npz", Console(file=shown, width=200))

@@ -398,6 +398,18 @@ def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> No
     assert slower.build_s == pytest.approx(10 * estimate.build_s)
 
 
+def test_validate_looks_at_given_matrices(tmp_path: Path) -> None:
+    """Of a rung, and of a user: one that is not positive definite is refused."""
+    done = CliRunner().invoke(app, ["validate", "hard/loads/zero-gap"])
+    assert done.exit_code == 0
+    assert "n = 128, m = 64" in done.output
+    np.savez(tmp_path / "mine.npz", K=np.diag([1.0, -1.0]), A=np.eye(2), f=np.ones(2), g=np.ones(2))
+    done = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")])
+    assert done.exit_code == 2
+    assert "K of part 2" in done.output
+    assert "positive definite" in done.output
+
+
 def test_a_scene_of_own_matrices_has_no_ledger(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", K=np.eye(2), A=np.eye(2)[:, :1], f=np.ones(2), g=np.ones(1))
     scene = read_scene(str(tmp_path / "mine.npz"))
