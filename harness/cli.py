@@ -105,6 +105,7 @@ def run(
     """
     with reported() as console:
         from .plan import Overrides, overridden
+        from .records import MEASUREMENTS
         from .run import run as run_suite
         from .suite import read_suite
 
@@ -124,9 +125,10 @@ def run(
         directory = out or Path("results") / chosen.name
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         code = run_suite(chosen, directory, console, scheduler)
-        from report.build import write  # slow to import: not before the first row
+        if (directory / MEASUREMENTS).is_file():
+            from report.build import write  # slow to import: not before the first row
 
-        console.print(f"Report: {write(directory)}")
+            console.print(f"Report: {write(directory)}")
         raise typer.Exit(code)
 
 

@@ -43,7 +43,7 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
         if not (count.isdecimal() and int(count) > 0):
             raise InputError.one("--scheduler", "scheduler", scheduler, "local:N with N ≥ 1, or an address")
         cluster = LocalCluster(
-            n_workers=int(count), threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=int(count), threads_per_worker=1, memory_limit=None, dashboard_address=":0"
         )
         with cluster, Client(cluster) as client:
             yield _checked(client, scheduler)
@@ -66,11 +66,21 @@ def _checked(client: Any, scheduler: str) -> tuple[Executor, int]:
     if not threads:
         faults.append(Fault("--scheduler", "scheduler", scheduler, "has no worker; start one: dask worker"))
     here = versions()
-    for address, there in client.run(versions).items():
-        faults += other_versions(address, here, there)
+    for who, theirs in _versions_of(client).items():
+        faults += other_versions(who, here, theirs)
     if faults:
         raise InputError(faults)
     return client.get_executor(pure=False, retries=RETRIES), len(threads)
+
+
+def _versions_of(client: Any) -> dict[str, dict[str, str]]:
+    """What the scheduler and each worker have. Raises InputError where one cannot find these packages."""
+    try:
+        scheduler = {"scheduler": client.run_on_scheduler(versions)}
+        return scheduler | {f"worker {name}": found for name, found in client.run(versions).items()}
+    except Exception as error:  # of an import, over there
+        allowed = "install rivetbench for the scheduler and its workers, or start them with PYTHONPATH"
+        raise InputError.one("--scheduler", "import", str(error), allowed) from error
 
 
 def versions() -> dict[str, str]:
@@ -78,10 +88,10 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version(), **{name: installed_version(name) for name in PACKAGES}}
 
 
-def other_versions(address: str, here: dict[str, str], there: dict[str, str]) -> list[Fault]:
+def other_versions(who: str, here: dict[str, str], there: dict[str, str]) -> list[Fault]:
     """A fault for each package that a worker has in another version."""
     return [
-        Fault(f"worker {address}", name, there.get(name), f"the driver has {version}: install the same")
+        Fault(who, name, there.get(name), f"the driver has {version}: install the same")
         for name, version in here.items()
         if there.get(name) != version
     ]

@@ -84,6 +84,7 @@ def series(
         from .describe import code_of
         from .series.desk import Job
         from .series.run import run
+        from .series.store import CASES
 
         random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
         drawn = [name for name, value in random.items() if value is not None]
@@ -125,7 +126,8 @@ def series(
             "solver_code": code_of(type(made).__module__),
         }
         code = run(job, facts, out, console, scheduler)
-        from report.series_report import write  # slow to import: not before the first row
+        if (out / CASES).is_file():
+            from report.series_report import write  # slow to import: not before the first row
 
-        console.print(f"Report: {write(out)}")
+            console.print(f"Report: {write(out)}")
         raise typer.Exit(code)

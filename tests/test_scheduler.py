@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 import tiny
 from rich.console import Console
@@ -54,7 +55,7 @@ def cluster() -> Iterator[Any]:
     """Two workers, processes of their own; one that is killed is replaced."""
     import distributed
 
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as made:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
         yield made
 
 
@@ -125,9 +126,9 @@ def test_a_series_on_other_processes_is_the_series_on_this_one(job: Job) -> None
 
 def test_versions_that_differ_are_named() -> None:
     here = versions()
-    assert other_versions("tcp://a", here, here) == []
-    (fault,) = other_versions("tcp://a", here, here | {"numpy": "1.0"})
-    assert "worker tcp://a: numpy = '1.0'" in str(fault)
+    assert other_versions("worker a", here, here) == []
+    (fault,) = other_versions("worker a", here, here | {"numpy": "1.0"})
+    assert "worker a: numpy = '1.0'" in str(fault)
     assert here["numpy"] in str(fault)
 
 
@@ -142,6 +143,15 @@ def test_without_dask_it_says_what_to_install() -> None:
 def test_a_number_of_workers_that_cannot_be(wrong: str) -> None:
     with pytest.raises(InputError, match="local:N"), workers(wrong):
         pass
+
+
+@needs_dask
+def test_workers_of_this_machine_are_processes_of_their_own() -> None:
+    with workers("local:2") as (executor, count):
+        seen = {executor.submit(os.getpid).result() for _ in range(20)}
+    assert count == 2
+    assert 1 <= len(seen - {os.getpid()}) == len(seen) <= 2
+    assert not any(map(psutil.pid_exists, seen))
 
 
 @needs_dask
@@ -168,9 +178,26 @@ def test_workers_that_will_not_do_are_named(
     monkeypatch.setattr(scheduler, "installed_version", lambda name: (VERSIONS | {"scipy": "0.1"})[name])
     with pytest.raises(InputError) as raised, workers(cluster.scheduler_address):
         pass
-    assert len(raised.value.faults) == 2
+    assert [fault.where.split()[0] for fault in raised.value.faults] == ["worker", "worker"]
     for fault in raised.value.faults:
         assert f"scipy = '{VERSIONS['scipy']}': the driver has 0.1" in str(fault)
+
+
+@needs_dask
+def test_workers_without_these_packages_are_told_of(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Elsewhere:
+        """Unpickles nowhere but here."""
+
+        def __reduce__(self) -> Any:
+            return __import__, ("a_package_of_the_driver",)
+
+        def __call__(self) -> dict[str, str]:
+            return VERSIONS
+
+    monkeypatch.setattr(scheduler, "versions", Elsewhere())
+    told = "No module named 'a_package_of_the_driver'\": install rivetbench for the scheduler"
+    with pytest.raises(InputError, match=re.escape(told)), workers(cluster.scheduler_address):
+        pass
 
 
 @needs_dask
@@ -178,7 +205,7 @@ def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
     import distributed
 
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
     ) as cluster:
         with pytest.raises(InputError, match="nthreads = 2: start it with --nthreads 1"), workers(
             cluster.scheduler_address

@@ -18,7 +18,7 @@ from harness.exact_residual import gamma
 from harness.reference import refined_active_set
 from harness.series.bound import Bound, gaps, independence
 from harness.series.compliance import largest_compliance
-from harness.series.residual import bits, residual, split
+from harness.series.residual import bits, refined, residual, split
 from harness.series.vouch import Vouched, vouch
 from harness.trials import known_case, prepared_from, stiffness
 from problems.assembly import Assembly, LoadCase, Prepared
@@ -54,6 +54,15 @@ def test_the_residual_against_rational_numbers(seed: int) -> None:
         off = [abs(Fraction(a) - b) for a, b in zip(r[:, k], wanted, strict=True)]
         assert all(o <= Fraction(e) for o, e in zip(off, error[:, k], strict=True))
     assert error.max() < 1e-10
+    stiffest = max(float(abs(K).sum(axis=0).max()) for K in prepared.assembly.blocks)
+    d = prepared.solve_K(r) * (1 + 1e-3 * rng.standard_normal((n, 3)))  # a correction that leaves something
+    there, r, error = refined(prepared.assembly, x, r, error, d, stiffest)
+    for k in range(3):
+        wanted = exact(prepared.assembly, f[:, k], np.array([there.head[:, k], there.tail[:, k]]), lam[:, k])
+        off = [abs(Fraction(a) - b) for a, b in zip(r[:, k], wanted, strict=True)]
+        assert all(o <= Fraction(e) for o, e in zip(off, error[:, k], strict=True))
+    assert error.max() < 1e-10
+    assert abs(r).max() > 0
 
 
 def test_products_that_cancel_are_still_in_doubt() -> None:

@@ -61,6 +61,19 @@ def residual(assembly: Assembly, f: Matrix, x: Split, lam: Matrix) -> tuple[Matr
     return r, SAFE * (error + gamma(depth) * size)
 
 
+def refined(
+    assembly: Assembly, x: Split, r: Matrix, error: Matrix, d: Matrix, stiffest: float
+) -> tuple[Split, Matrix, Matrix]:
+    """x + d, and its residual r − Kd with a bound on its error. stiffest ≥ ‖K‖_∞, N/mm.
+
+    d is small, so that a plain product with it will do: |fl(Kd) − Kd| ≤ γ_n ‖K‖_∞ max|d|.
+    """
+    there, n = x.plus(d), assembly.n
+    Kd = assembly.multiply_K(d)
+    moved = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(there.tail).max(axis=0)
+    return there, r - Kd, SAFE * (error + stiffest * moved + gamma(1) * (abs(r) + abs(Kd)))
+
+
 def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matrix]:
     """K₁x₁, K₂x₁ and Kx₂, and what they are in doubt by together."""
     n, b = len(K), bits(len(K))

@@ -68,8 +68,10 @@ def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
 
 
 def rows(directory: Path) -> Iterator[dict[str, Any]]:
-    """The rows one by one. Raises InputError at a line that is none."""
+    """The rows one by one; no file is no rows. Raises InputError at a line that is none."""
     path = directory / CASES
+    if not path.exists():
+        return
     with path.open("rb") as file:
         for number, line in enumerate(file, start=1):
             try:
