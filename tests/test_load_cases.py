@@ -203,7 +203,7 @@ def test_a_bad_sweep(text: str, words: str, scene: Scene, data: Prepared) -> Non
 
 def test_springs_between_parts_are_no_sweep() -> None:
     scene = read_scene("gallery/installed-fasteners")
-    with pytest.raises(InputError, match="installed_fasteners.stiffness.*what changes K"):
+    with pytest.raises(InputError, match=r"installed_fasteners\.stiffness.*what changes K"):
         sweep(scene, ["installed_fasteners.stiffness=1e4,1e5"])
 
 
