@@ -60,7 +60,8 @@ def _summary(series: Series) -> str:
                 f"{significant(checked.max())} mm off."
             )
         seconds = sum(float(cases[name].sum()) for name in STEPS)
-        steps = (f"{significant(1e3 * cases[name].mean())} ms {text}" for name, text in STEPS.items())
+        told = {name: text for name, text in STEPS.items() if cases[name].notna().any()}
+        steps = (f"{significant(1e3 * cases[name].mean())} ms {text}" for name, text in told.items())
         lines.append(
             f"{significant(len(cases) / seconds)} cases a second of work; a case took {listed(list(steps))} "
             "on average."

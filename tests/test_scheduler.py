@@ -29,7 +29,8 @@ from harness.records import MEASUREMENTS, read
 from harness.run import run as run_suite
 from harness.scheduler import AHEAD, done_as_completed, other_versions, versions, workers
 from harness.series import store
-from harness.series.desk import Job, solve_on_worker
+from harness.series.desk import Job
+from harness.series.on_worker import solve_on_worker
 from harness.series.run import on_workers, run
 from harness.suite import read_suite
 from problems.errors import InputError

@@ -65,15 +65,33 @@ def test_the_residual_against_rational_numbers(seed: int) -> None:
     assert abs(r).max() > 0
 
 
+def test_a_large_correction_is_in_doubt_by_its_product() -> None:
+    """All of x as a correction of nothing, where the terms of Kx are a million times their sum."""
+    n, rng = 40, np.random.default_rng(4)
+    smooth = np.ones(n) + 1e-6 * rng.standard_normal(n)
+    P = np.eye(n) - np.ones((n, n)) / n  # takes the mean away
+    K = P @ np.diag(rng.uniform(1, 2, n) * 1e5) @ P + np.eye(n) * 1e-3
+    assembly = Assembly((np.asfortranarray((K + K.T) / 2),), sp.csc_array(np.eye(n, 1)))
+    zero, nothing = np.zeros((n, 1)), np.zeros((1, 1))
+    at = split(assembly, zero)
+    r, error = residual(assembly, zero, at, nothing)
+    stiffest = float(abs(K).sum(axis=0).max())
+    there, r, error = refined(assembly, at, r, error, smooth[:, None], stiffest)
+    wanted = exact(assembly, zero[:, 0], np.array([there.head[:, 0], there.tail[:, 0]]), np.zeros(1))
+    off = np.array([float(abs(Fraction(a) - b)) for a, b in zip(r[:, 0], wanted, strict=True)])
+    assert (off <= error[:, 0]).all()
+    assert (off > gamma(4) * abs(r[:, 0])).any()
+
+
 def test_products_that_cancel_are_still_in_doubt() -> None:
-    """Kx = 0 with every product zero: what a sum of K₂x₁ may lose is there all the same, in each row."""
-    n = 64
-    K = np.asfortranarray((-1.0) ** np.add.outer(np.arange(n), np.arange(n)))
+    """Kx = 0, its sums without rounding: what a sum of K₂x₁ may lose is there all the same, in each row."""
+    n, rest = 64, 2.0**-40  # 1 is cut off, the rest is K₂
+    K = np.asfortranarray((1 + rest) * (-1.0) ** np.add.outer(np.arange(n), np.arange(n)))
     assembly = Assembly((K,), sp.csc_array(np.eye(n, 1)))
     zero = np.zeros((n, 1))
     r, error = residual(assembly, zero, split(assembly, np.ones((n, 1))), np.zeros((1, 1)))
     assert not r.any()
-    assert (error >= gamma(n) * 2.0 ** -bits(n) * n).all()
+    assert (error >= gamma(n) * n * rest).all()
 
 
 @pytest.mark.parametrize("n", [1, 2, 100, 2193, 5654, 10**6])

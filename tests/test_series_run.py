@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -233,6 +234,31 @@ def test_a_wrong_answer_is_not_vouched_for() -> None:
               {"fault": "big_details"}, Path("faulty.py"))  # fmt: skip
     (results,) = Desk(job).solve([0, 1, 2, 3])  # its λ is zero
     assert [result.row["verdict"] for result in results] == ["outside", "cannot_be_judged"] * 2
+
+
+def test_what_p_has_lost_in_rounding_is_made_good(monkeypatch: pytest.MonkeyPatch) -> None:
+    """p is off by 1e-6 mm: the gaps that were found say so, and a second answer is within 1e-8 mm."""
+    scene, rng = read_scene("strip.toml"), np.random.default_rng(0)
+    loads = Desk._loads
+
+    def spoilt(self: Desk, numbers: Any) -> Any:
+        return [
+            (case, replace(load, p=load.p + 1e-6 * rng.standard_normal(45)))
+            for case, load in loads(self, numbers)
+        ]
+
+    monkeypatch.setattr(Desk, "_loads", spoilt)
+    found = {}
+    for limit in (1e-3, 1e-8):
+        job = Job(scene, random_gaps(scene, prepared(scene), 9, 0), "newton", "dual", 1e-11, limit, 1, 1)
+        (results,) = Desk(job).solve(range(9))
+        found[limit] = [result.row for result in results]
+        assert {row["verdict"] for row in found[limit]} == {"within"}
+        for row in found[limit]:
+            assert row["displacement_error_mm"] <= row["bound_mm"] <= limit
+    for once, twice in zip(*found.values(), strict=True):
+        assert once["bound_mm"] > 1e-8
+        assert twice["iterations"] > once["iterations"]
 
 
 def test_memory_does_not_grow_with_the_cases() -> None:

@@ -11,13 +11,14 @@ from small import make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
 from harness.trials import contact_rows, prepared_from
-from problems.assembly import Vector
+from problems.assembly import LoadCase, Vector
 from problems.prepare import load_case, prepared
 from problems.random_gaps import random_gaps
 from problems.scene import read_scene
 from solvers.banded_inverse import BandedInverse, along, banded_inverse
 from solvers.base import Answer, Load, Problem
 from solvers.bordered_factor import Set
+from solvers.contact_sets import Trial
 from solvers.newton import ActiveSetNewton
 from solvers.together import Together
 
@@ -165,6 +166,62 @@ def test_what_sweeps_do_not_settle_is_solved_alone_and_soon_at_once() -> None:
             assert answer.details["closed"] == (lam > 0).sum()
             np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-8)
         assert not together.of_use
+
+
+def test_a_near_case_is_where_the_next_one_begins() -> None:
+    """M = Q⁻¹: from a case with the same contacts a single sweep is right, wherever p has gone."""
+    data = make_prepared(3, 25)
+    first = make_load(1, data)[1]
+    closed = solve_by_nnls(data, LoadCase(first.f, first.g))[1] > 0
+    change = data.Q @ np.where(closed, 1.0, 0.0)  # N more on each closed contact
+    second = Load(first.f, first.g, first.p + change)
+    together = Together(data.Q, banded_inverse(data.Q, None), alone)
+    one, two = (together([load], TOLERANCE)[0] for load in (first, second))
+    assert one.lam is not None
+    assert two.iterations == 1
+    np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
+
+
+def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, cases, loads = strip_loads(tmp_path, 6)
+    M = banded_inverse(data.Q, data.assembly.contact_nodes)
+    assert (M.order != np.arange(45)).any()
+    starts: list[Set] = []
+
+    def told(C: Set, p: Vector, tolerance: float) -> Answer:
+        starts.append(C)
+        return Answer("solved", np.zeros(45))
+
+    monkeypatch.setattr("solvers.together.SWEEPS", 4)  # not enough to be done, but for the set
+    together = Together(data.Q, M, told)
+    together(loads[:1], TOLERANCE)
+    starts.clear()
+    together.of_use = True
+    together(loads[1:], TOLERANCE)
+    assert len(starts) == 5
+    for C, case in zip(starts, cases[1:], strict=True):
+        assert ((solve_by_nnls(data, case)[1] > 0) == C).mean() > 0.9
+
+
+def test_an_answer_is_worth_what_its_own_forces_say(tmp_path: Path) -> None:
+    """A force below zero is cut off, and the gaps are looked at again."""
+    data, _, loads = strip_loads(tmp_path, 1)
+    M = banded_inverse(data.Q, data.assembly.contact_nodes)
+    together = Together(data.Q, M, alone)
+    together(loads, TOLERANCE)
+    (case,) = together.last
+    lam = case.trial.lam.copy()
+    lam[case.C.argmax()] = -1e-3
+    case.trial = Trial(lam, case.trial.y, 0.0)
+    answer = together._answer(case, loads[0], TOLERANCE)
+    assert answer.status == "inaccurate"
+    assert answer.lam is not None
+    assert answer.lam.min() == 0
+    y = data.Q @ answer.lam - loads[0].p
+    residual = max(-y.min(), abs(y[answer.lam > 0]).max())
+    assert answer.details["kkt_residual_mm"] == pytest.approx(residual)
 
 
 def test_newton_has_no_such_way_without_a_factor() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -18,7 +18,7 @@ from problems.assembly import LoadCase, Prepared, Vector
 from problems.load_cases import LoadCases
 from problems.prepare import prepared
 from problems.scene import Scene
-from solvers.base import Answer, Form, Load, Near, Problem
+from solvers.base import Answer, Form, Load, Near, Problem, failed
 from solvers.registry import make_solver
 
 from ..judge import judge
@@ -150,7 +150,7 @@ class Desk:
             answer = self._checked(answer)
         except Exception as error:
             self.ready = None
-            answer = Answer("failed", None, details={"message": f"{type(error).__name__}: {error}"[:500]})
+            answer = failed(f"{type(error).__name__}: {error}"[:500])
         if answer.lam is not None:
             gap = self.data.Q @ answer.lam - load.p
             x = answer.x if self.job.form == "primal" else None
@@ -176,21 +176,46 @@ class Desk:
     def _finished(self, tried: list[_Tried]) -> list[Result]:
         """Rows, with what is known of the answers."""
         start = time.perf_counter()
-        answered = [each for each in tried if each.answer.lam is not None]
-        vouched: dict[int, Vouched] = {}
-        if answered:
-            lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
-            own = [each.answer.x if self.job.form == "primal" else None for each in answered]
-            found = vouch(self.bound, [each.load for each in answered], lams, own)
-            vouched = {each.case: about for each, about in zip(answered, found, strict=True)}
+        known = self._vouched(tried)
+        if self.together is not None:
+            self._try_again(tried, known)
         share = (time.perf_counter() - start) / len(tried)
-        return [self._result(each, vouched.get(each.case), share) for each in tried]
+        return [self._result(each, known.get(each.case), share) for each in tried]
+
+    def _try_again(self, tried: list[_Tried], known: dict[int, Vouched]) -> None:
+        """What is not proven to be within the limit, with the p for which Qλ − p is the gap that was found.
+
+        So the answers lose what Q and p have lost in rounding. The better of the two stays.
+        """
+        places = {each.case: k for k, each in enumerate(tried)}
+        far = [tried[places[case]] for case, about in known.items() if about.bound_mm > self.job.limit_mm]
+        if not far:
+            return
+        lams = np.column_stack([each.answer.lam for each in far if each.answer.lam is not None])
+        p = self.data.Q @ lams - np.column_stack([known[each.case].gap for each in far])
+        loads = [(each.case, replace(each.load, p=column)) for each, column in zip(far, p.T, strict=True)]
+        new = self._try_together(loads)
+        for case, about in self._vouched(new).items():
+            if about.bound_mm < known[case].bound_mm:
+                known[case] = about
+                old, better = tried[places[case]], next(each for each in new if each.case == case)
+                count = (old.answer.iterations or 0) + (better.answer.iterations or 0)
+                tried[places[case]] = replace(old, answer=replace(better.answer, iterations=count))
+
+    def _vouched(self, tried: list[_Tried]) -> dict[int, Vouched]:
+        answered = [each for each in tried if each.answer.lam is not None]
+        if not answered:
+            return {}
+        lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
+        own = [each.answer.x if self.job.form == "primal" else None for each in answered]
+        found = vouch(self.bound, [each.load for each in answered], lams, own)
+        return {each.case: about for each, about in zip(answered, found, strict=True)}
 
     def _result(self, tried: _Tried, about: Vouched | None, vouch_s: float) -> Result:
         answer, job = tried.answer, self.job
         row = tried.row | {
             "status": answer.status,
-            "message": answer.details.get("message"),
+            "message": answer.details.get("cause"),
             "iterations": answer.iterations,
             "inner_iterations": answer.inner_iterations,
             "form_s": vouch_s,
@@ -221,17 +246,3 @@ class Desk:
         names = ("displacement_error_mm", "reference_bound_mm", "contact_mismatch")
         found: Row = {name: getattr(judged, name) for name in names}
         return found if judged.verdict == "cannot_be_judged" else found | {"verdict": judged.verdict}
-
-
-_open: dict[str, Desk] = {}
-
-
-def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
-    """Cases of a job, on the desk that this process keeps for it: the assembly is opened once a worker."""
-    job, numbers = task
-    if job.key not in _open:
-        _open.clear()
-        _open[job.key] = Desk(job)
-    desk = _open[job.key]
-    desk.job = job  # with these cases
-    return [result for some in desk.solve(numbers) for result in some]

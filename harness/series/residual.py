@@ -2,7 +2,7 @@
 
 K and x are cut in two, K = K₁ + K₂ and x = x₁ + x₂ with so few bits in K₁ and x₁ that BLAS multiplies them
 exactly (see `exact_residual`). K₂ and x₂ are 2⁻ᵇ times smaller, b ≈ 20, and so is what the products with
-them lose: |fl(K₂x₁) − K₂x₁| ≤ γ_n |K₂||x₁|, |fl(Kx₂) − Kx₂| ≤ γ_n |K||x₂|, in whatever order.
+them lose, in whatever order: |fl(K₂x₁) − K₂x₁| ≤ γ_n |K₂||x₁| ≤ γ_n (Σ_j |K₂|_ij) max|x₁|, and Kx₂ likewise.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matr
     n, b = len(K), bits(len(K))
     products = [np.empty_like(head) for _ in range(3)]
     lost = np.empty_like(head)
-    head_length, tail_length = abs(head).sum(axis=0), abs(tail).sum(axis=0)
+    head_size, tail_size = abs(head).max(axis=0), abs(tail).max(axis=0)
     for start in range(0, n, ROWS_AT_A_TIME):
         chunk = slice(start, min(start + ROWS_AT_A_TIME, n))
         whole = K.T[chunk]  # K is symmetric and stored by columns, so these are contiguous rows
@@ -87,5 +87,6 @@ def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matr
         K1, K2 = cut(whole, top, b)
         for product, left, right in zip(products, (K1, K2, whole), (head, head, tail), strict=True):
             product[chunk] = left @ right
-        lost[chunk] = SAFE * gamma(n) * np.exp2(top) * (2.0**-b * head_length + tail_length)
+        sums = [abs(each).sum(axis=1, keepdims=True) for each in (K2, whole)]
+        lost[chunk] = SAFE * gamma(n) * (sums[0] * head_size + sums[1] * tail_size)
     return products, lost

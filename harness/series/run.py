@@ -21,7 +21,8 @@ from .. import records
 from ..machine import installed_version, machine
 from ..scheduler import done_as_completed, workers
 from . import store
-from .desk import BLOCK, Desk, Job, Result, solve_on_worker
+from .desk import BLOCK, Desk, Job, Result
+from .on_worker import solve_on_worker
 
 DONE, ACCURACY_LOST, NOTHING_JUDGED = 0, 1, 3
 VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
