@@ -11,12 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from problems.assembly import Matrix, Vector
 
 from .base import Status
+from .gi_border import Border
 from .growing_factor import GrowingFactor
+from .product import product
 
 #: u → (s, T): the slacks from the original data, and for each the size of its terms.
 Slacks = Callable[[Vector], tuple[Vector, Vector]]
@@ -100,7 +103,7 @@ class _State:
 
     def slacks(self) -> Vector:
         """s, of the multipliers as they are now."""
-        return self.base + self.G @ (self.u - self.u_base)
+        return self.base + product(self.G, self.u - self.u_base)
 
     def refine(self, slacks: Slacks) -> Vector:
         """Powell: s from the original data, and u_C so that s_C = 0; drops what is then negative in u."""
@@ -124,40 +127,55 @@ class _State:
             if not violated.size:
                 return
             worst = violated[np.argsort(s[violated])[:CANDIDATES]]
-            rows = self.G[:, worst].T  # G is symmetric
-            while self.pivots < self.max_pivots:
-                s = self.base[worst] + rows @ (self.u - self.u_base)
-                s[self.is_active[worst]] = 0.0
-                pick = int(np.argmin(s + limit[worst]))
-                if s[pick] >= -limit[worst[pick]]:
-                    break
-                self.add(int(worst[pick]), float(s[pick]))
+            self.pivot_among(worst, s[worst], limit[worst])
 
-    def add(self, k: int, s_k: float) -> None:
+    def pivot_among(self, worst: NDArray[np.intp], s: Vector, limit: Vector) -> None:
+        """Add of these constraints, with the slacks s, the worst one as long as there is a violated one."""
+        border = Border(self.G, np.array(self.C, dtype=np.intp), self.factor, worst)
+        while self.pivots < self.max_pivots and len(border.left) < len(worst):
+            outside = ~self.is_active[worst]
+            column = int(np.argmin(np.where(outside, s + limit, np.inf)))
+            if not outside[column] or s[column] >= -limit[column]:
+                break
+            self.add(border, column, s)
+        self.take_in(border)
+
+    def add(self, border: Border, column: int, s: Vector) -> None:
         """Raise u_k until s_k = 0, dropping each active constraint whose multiplier reaches zero."""
+        k = int(border.candidates[column])
         while self.pivots < self.max_pivots:
             self.pivots += 1
-            C = np.array(self.C, dtype=np.intp)
-            d = self.factor.solve_transposed(self.G[C, k])
-            r = self.factor.solve(d)
-            curvature = float(self.G[k, k] - d @ d)
-            independent = curvature > 10 * (len(C) + 1) * EPS * self.G[k, k]
-            full = -s_k / curvature if independent else np.inf
+            active, (r, ds) = border.active, border.direction(column)
+            curvature = float(ds[column])
+            independent = curvature > 10 * (len(active) + 1) * EPS * self.G[k, k]
+            full = -float(s[column]) / curvature if independent else np.inf
             falling = np.flatnonzero(r > 0)
-            ratios = self.u[C[falling]] / r[falling]
+            ratios = self.u[active[falling]] / r[falling]
             partial = float(ratios.min(initial=np.inf))
             step = min(full, partial)
             if not np.isfinite(step):
                 raise np.linalg.LinAlgError(f"constraint {k} depends on the active ones: G is not definite")
-            self.u[C] -= step * r
+            self.u[active] -= step * r
             self.u[k] += step
-            s_k += step * curvature
+            s += step * ds
             if full <= partial:
-                self.factor.append(d, np.sqrt(curvature))
-                self.C.append(k)
+                border.entered.append(column)
                 self.is_active[k] = True
                 return
-            self.drop(int(falling[np.argmin(ratios)]))
+            self.drops += 1
+            place = int(falling[np.argmin(ratios)])
+            self.u[active[place]], self.is_active[active[place]] = 0.0, False
+            border.drop(place)
+
+    def take_in(self, border: Border) -> None:
+        """Make C and its factor those of the border's end."""
+        for position in sorted(border.left, reverse=True):
+            del self.C[position]
+            self.factor.delete(position)
+        C, E = np.array(self.C, dtype=np.intp), border.candidates[border.entered]
+        D = self.factor.solve_transposed(self.G[np.ix_(C, E)]) if border.left else border.D[:, border.entered]
+        self.factor.extend(D, sla.cholesky(self.G[np.ix_(E, E)] - D.T @ D, check_finite=False))
+        self.C += E.tolist()
 
     def drop(self, position: int) -> None:
         k = self.C.pop(position)

@@ -32,10 +32,13 @@ class GrowingFactor:
 
     def append(self, d: Vector, sigma: float) -> None:
         """C ← C ∪ {k}, with d = R⁻ᵀ G_Ck and σ² = G_kk − dᵀd."""
-        q = self.size
-        self._R[:q, q] = d
-        self._R[q, q] = sigma
-        self.size += 1
+        self.extend(d[:, None], np.array([[sigma]]))
+
+    def extend(self, D: Matrix, T: Matrix) -> None:
+        """C ← C ∪ E, with D = R⁻ᵀ G_CE and T upper triangular, TᵀT = G_EE − DᵀD."""
+        q, self.size = self.size, self.size + len(T)
+        self._R[:q, q : self.size] = D
+        self._R[q : self.size, q : self.size] = T
         self._renew_diagonal(q)
 
     def delete(self, j: int) -> None:
@@ -63,12 +66,12 @@ class GrowingFactor:
             self._diagonal.append(np.asfortranarray(self._R[a:e, a:e]))
 
     def solve_transposed(self, b: Vector) -> Vector:
-        """R⁻ᵀ b."""
+        """R⁻ᵀ b, for one right-hand side or several columns."""
         R, z = self._R, b.copy()
         for k, block in enumerate(self._diagonal):
             a, e = k * BLOCK, k * BLOCK + len(block)
             z[a:e] -= R[:a, a:e].T @ z[:a]
-            z[a:e] = blas.dtrsv(block, z[a:e], trans=1)
+            z[a:e] = _solved(block, z[a:e], 1)
         return z
 
     def solve(self, b: Vector) -> Vector:
@@ -76,6 +79,12 @@ class GrowingFactor:
         R, z = self._R, b.copy()
         for k, block in reversed(list(enumerate(self._diagonal))):
             a, e = k * BLOCK, k * BLOCK + len(block)
-            z[a:e] = blas.dtrsv(block, z[a:e])
+            z[a:e] = _solved(block, z[a:e], 0)
             z[:a] -= R[:a, a:e] @ z[a:e]
         return z
+
+
+def _solved(block: Matrix, b: Vector, transposed: int) -> Vector:
+    if b.ndim == 1:
+        return blas.dtrsv(block, b, trans=transposed)
+    return blas.dtrsm(1.0, block, b, trans_a=transposed)

@@ -14,6 +14,7 @@ from small import make_load, make_prepared, solve_by_nnls
 from problems.assembly import Assembly, LoadCase, Prepared
 from solvers.base import Answer, Form, Load, Problem
 from solvers.gi import GoldfarbIdnani
+from solvers.gi_border import Border
 from solvers.goldfarb_idnani import _State, goldfarb_idnani
 from solvers.growing_factor import BLOCK, GrowingFactor
 
@@ -75,6 +76,28 @@ def test_members_come_and_go_many_times() -> None:
             factor.delete(position)
             del members[position]
     assert_is_factor(factor, G, members)
+
+
+def test_directions_after_some_have_entered_and_left() -> None:
+    """s of the active stays zero as u_k rises; those that left keep u = 0."""
+    G = definite(60, seed=5)
+    C, candidates = np.arange(30), np.arange(30, 50)
+    border = Border(G, C, grow(G, list(range(30))), candidates)
+    for step in ["enter 3", "leave 7", "enter 11", "leave 0", "enter 0", "drop 3", "leave 29", "enter 3"]:
+        act, which = step.split()
+        if act == "enter":
+            border.entered.append(int(which))
+        else:
+            border.drop(int(which) if act == "leave" else len(C) + border.entered.index(int(which)))
+        active = [k for place, k in enumerate(border.active) if place not in border.left]
+        r, ds = border.direction(5)
+        du = np.zeros(60)
+        du[border.active] = -r
+        du[35] = 1.0
+        wanted = np.linalg.solve(G[np.ix_(active, active)], G[active, 35])
+        np.testing.assert_allclose(du[active], -wanted, atol=1e-9)
+        assert not du[border.left].any()
+        np.testing.assert_allclose(ds, (G @ du)[candidates], atol=1e-9 * abs(G).max())
 
 
 def by_nnls(G: np.ndarray, s0: np.ndarray) -> np.ndarray:
