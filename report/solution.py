@@ -44,7 +44,7 @@ def write(directory: Path) -> Path:
     figures = _figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
-            drawing.savefig(directory / f"{name}.png", dpi=style.DPI, bbox_inches=_bounds(drawing))
+            _save(drawing, directory / f"{name}.png")
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
@@ -62,14 +62,20 @@ def write(directory: Path) -> Path:
     return path
 
 
-def _bounds(drawing: Figure) -> Bbox | Literal["tight"]:
-    """What of a drawing is saved, in inches.
+def _save(drawing: Figure, path: Path) -> None:
+    """Lay out once and draw once; savefig by itself would draw twice.
 
-    Titles overhang narrow maps. Elsewhere the layout is at most a little off, where the maps' proportions
-    leave it no room: a margin does, and the second layout of "tight" would only take time.
+    Titles overhang narrow maps, which "tight" takes in. Elsewhere the layout is at most a little off, where
+    the maps' proportions leave it no room: a margin is enough.
     """
     width, height = drawing.get_size_inches()
-    return Bbox([[-MARGIN, -MARGIN], [width + MARGIN, height + MARGIN]]) if width >= style.WIDTH else "tight"
+    bounds: Bbox | Literal["tight"] = "tight"
+    if (engine := drawing.get_layout_engine()) and width >= style.WIDTH:
+        drawing.set_dpi(style.DPI)
+        engine.execute(drawing)
+        drawing.set_layout_engine(None)
+        bounds = Bbox([[-MARGIN, -MARGIN], [width + MARGIN, height + MARGIN]])
+    drawing.savefig(path, dpi=style.DPI, bbox_inches=bounds)
 
 
 def _nodes(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
