@@ -44,8 +44,9 @@ class Ipm(Solver):
     s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance asked for; the paper tests μ alone, because it
     solves its systems exactly. No feasibility is asked for below the rounding of Qλ − p, which is at most
     4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). And it goes on until each contact is closed or open,
-    min(y_i, q_ii λ_i), to that or √(0.1 mm/N · ε_μ): one that touches without a force stands off by
-    √(μ q_ii), which is more than ε_μ vouches for where the contact is soft.
+    min(y_i, q_ii λ_i) / max_j |a_ji|, to that or √(0.1 mm/N · ε_μ): one that touches without a force
+    stands off by √(μ q_ii), which is more than ε_μ vouches for where the contact is soft; and a gap of
+    y_i is y_i / max_j |a_ji| of displacement, in whatever unit the contact is written.
 
     Where the iteration stalls, because what inexact systems leave in s1 outlasts y or because a step ended
     too near to the boundary, it begins anew with a smaller cg_tolerance and theta (details: restarts).
@@ -135,13 +136,14 @@ class Ipm(Solver):
             return failed(str(error), iterations=0)
         first = newton.at(start.lam, start.y)  # step 3
         details["start"] = _about(start, first)
-        status, cause, point = self._iterate(newton, first, tolerance)
+        units = _units(ready.problem)
+        status, cause, point = self._iterate(newton, first, tolerance, units)
         for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
             if status != "inaccurate":
                 break
             newton.cg_tolerance = min(newton.cg_tolerance, cg_tolerance)
             newton.theta = min(newton.theta, theta)
-            status, cause, point = self._iterate(newton, first, tolerance)
+            status, cause, point = self._iterate(newton, first, tolerance, units)
             details["restarts"] = restart
         if newton.unconverged:
             details["cg_unconverged"] = newton.unconverged
@@ -171,7 +173,9 @@ class Ipm(Solver):
             details["start_instead"] = f"mehrotra, because {error}"
             return mehrotra_start(problem.Q, load.p)
 
-    def _iterate(self, newton: Newton, point: Point, tolerance: float) -> tuple[Status, str, Point]:
+    def _iterate(
+        self, newton: Newton, point: Point, tolerance: float, units: Vector
+    ) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8; the last finite point with what is to be said of it."""
         feasibility = self.feasibility or FEASIBLE * np.sqrt(tolerance)
         smallest, stalled = np.inf, 0
@@ -180,7 +184,7 @@ class Ipm(Solver):
             measure = max(
                 point.mu / tolerance,
                 point.infeasibility / max(feasibility, rounding),
-                _undecided(newton, point) / max(np.sqrt(TOUCH * tolerance), rounding),
+                _undecided(newton, point, units) / max(np.sqrt(TOUCH * tolerance), rounding),
             )
             if measure <= 1:
                 return "solved", "", point
@@ -210,9 +214,14 @@ def _about(start: Start, point: Point) -> dict[str, float]:
     }
 
 
-def _undecided(newton: Newton, point: Point) -> float:
-    """max min(y_i, q_ii λ_i): how far from closed and from open a contact may be, mm."""
-    return float(np.minimum(point.y, np.diag(newton.Q) * point.lam).max())
+def _units(problem: Problem) -> Vector:
+    """(m,) max_j |a_ji|: what a displacement of 1 mm is in the gap of contact i."""
+    return np.asarray(abs(problem.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
+
+
+def _undecided(newton: Newton, point: Point, units: Vector) -> float:
+    """max min(y_i, q_ii λ_i) / max_j |a_ji|: how far from closed and from open a contact may be, mm."""
+    return float((np.minimum(point.y, np.diag(newton.Q) * point.lam) / units).max())
 
 
 def _rounding(newton: Newton, lam: Vector) -> float:

@@ -42,7 +42,9 @@ def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vecto
 
     100 cond(K) 2⁻⁵³ max(|x|, |K⁻¹f|), x being what is left of K⁻¹f − K⁻¹Aλ; and besides
     (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and sᵀλ ≤ τ(m + Σλ): the bound that
-    harness/certificate.py derives. Clarabel's τ is a share of the data where that is above 1.
+    harness/certificate.py derives. A λ ≥ −10τ adds s*ᵀ10τ to sᵀλ, for (s* − s)ᵀ(λ* − λ) then is at most
+    sᵀλ − s*ᵀλ; PIQP, which looks at it in a scaling of its own, was seen to leave −3.5τ. Clarabel's τ is a
+    share of the data where that is above 1.
     """
     low, high = eigenvalues(prepared)
     size = max(float(abs(v).max(initial=0.0)) for v in (x, prepared.solve_K(case.f)))
@@ -53,4 +55,6 @@ def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vecto
     if name == "clarabel":
         tau *= max(1.0, float(abs(case.f).max()))
     residual = tau * np.sqrt(prepared.assembly.n / low)
-    return conditioning + float((residual + np.sqrt(tau * (prepared.assembly.m + lam.sum()))) / np.sqrt(low))
+    s = np.maximum(case.g - prepared.assembly.A.T @ x, 0.0)
+    complementarity = tau * (prepared.assembly.m + lam.sum() + 10 * s.sum())
+    return conditioning + float((residual + np.sqrt(complementarity)) / np.sqrt(low))

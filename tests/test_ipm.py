@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from small import make_load, make_prepared, solve_by_nnls
 from test_gi import by_nnls, definite
 
@@ -19,10 +21,11 @@ from solvers.start import algorithm_5
 
 
 class Given:
-    """A problem that is known by its Q alone."""
+    """A problem that is known by its Q alone, its contacts written in mm."""
 
     def __init__(self, Q: np.ndarray) -> None:
         self.Q = Q
+        self.assembly = SimpleNamespace(A=sp.eye_array(len(Q), format="csc"))
 
 
 def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = 1e-14, **options: Any) -> Answer:

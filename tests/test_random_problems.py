@@ -9,7 +9,7 @@ import os
 from itertools import product
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from solving import CASES, IN_HOUSE, allowed, solve
 from test_reference import exact_solution
@@ -66,6 +66,7 @@ def exact(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:
     raise AssertionError("a strictly convex problem has an answer")
 
 
+@example(seed=504, pairs=0, tools=1)
 @examples(80, 7000)
 @given(seed=SEEDS, pairs=st.integers(0, 5), tools=st.integers(0, 3))
 def test_every_solver_finds_the_rational_answer(seed: int, pairs: int, tools: int) -> None:
@@ -92,6 +93,8 @@ def check(prepared: Prepared, case: LoadCase, x: Vector, lam: Vector) -> None:
             assert abs(found - x).max() <= allowed(name, prepared, case, x, lam), (name, form)
 
 
+# A gap written in a sixteenth of a mm: what ipm leaves of it has to be measured as a displacement.
+@example(seed=1655, bits=4, exponents=(0.0, 0.0), closed=0.5, weak=0.125, contact_bits=4, force_bits=4)
 @examples(150, 4000)
 @given(
     seed=SEEDS,
