@@ -88,7 +88,9 @@ class ActiveSetNewton(Solver):
             return None
         Q, nodes, inverse = state.problem.Q, state.problem.assembly.contact_nodes, state.inverse
 
-        def alone(C: Set, p: Vector, tolerance: float) -> Answer:
+        def alone(C: Set | None, p: Vector, tolerance: float) -> Answer:
+            if C is None:
+                C, _ = _first_guess(state, p, tolerance)
             return solve_from(C, ContactSets(Q, p, inverse), tolerance, self.max_sets)
 
         return Together(Q, banded_inverse(Q, nodes), alone)

@@ -35,8 +35,10 @@ SETS = 3  # tried a sweep: M is not worth more
 DOUBT = 1e-5  # of |y_C| before a sweep: signs that it cannot tell
 ENOUGH = 0.1  # of the tolerance: |y_C| that needs no further sweep
 
-#: Solves one case from a contact set: (C, p, tolerance).
-Alone = Callable[[Set, Vector, float], Answer]
+FEW = 1 / 16  # of the contacts
+
+#: Solves one case from a contact set, or None for a guess of its own: (C, p, tolerance).
+Alone = Callable[[Set | None, Vector, float], Answer]
 
 
 @dataclass
@@ -60,7 +62,8 @@ class Case:
 class Together:
     """Q (m, m), M ≈ Q⁻¹. last : the cases solved before, from which the next ones begin.
 
-    alone : for cases that are not settled; for all of them, once that were most of a call's.
+    alone : for cases that are not settled; for all of them, once that were most of a call's, or few contacts
+        are closed: then their own equations are quickly solved.
     """
 
     Q: Matrix
@@ -71,15 +74,16 @@ class Together:
 
     def __call__(self, loads: Sequence[Load], tolerance: float) -> list[Answer]:
         """An answer to each load. Iterations are products with Q, inner iterations sets tried with M."""
-        if not self.of_use:
-            return [self.alone(load.p > 0, load.p, tolerance) for load in loads]
         p = [load.p[self.M.order] for load in loads]
         if not self.last:
             zero = np.zeros(len(self.Q))
             unloaded = Case(zero, zero > 0, Trial(zero, zero, 0.0))
             self.last = self._swept([_from(unloaded, p[0])], tolerance)
+            self.of_use = worth_it(self.last)
+        if not self.of_use:
+            return [self.alone(None, load.p, tolerance) for load in loads]
         self.last = self._swept([_from(nearest(self.last, each), each) for each in p], tolerance)
-        self.of_use = 2 * sum(case.settled for case in self.last) >= len(loads)
+        self.of_use = worth_it(self.last)
         return [self._answer(case, load, tolerance) for case, load in zip(self.last, loads, strict=True)]
 
     def _swept(self, cases: list[Case], tolerance: float) -> list[Case]:
@@ -131,6 +135,12 @@ class _Banded:
 def nearest(cases: Sequence[Case], p: Vector) -> Case:
     """The case whose p is nearest."""
     return min(cases, key=lambda case: float(np.linalg.norm(case.p - p)))
+
+
+def worth_it(cases: Sequence[Case]) -> bool:
+    """Whether sweeps settle such cases, and save something."""
+    closed = np.mean([case.C.mean() for case in cases])
+    return 2 * sum(case.settled for case in cases) >= len(cases) and bool(closed >= FEW)
 
 
 def _from(near: Case, p: Vector) -> Case:

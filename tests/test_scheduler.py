@@ -7,6 +7,7 @@ import json
 import os
 import re
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -133,8 +134,8 @@ def test_versions_that_differ_are_named() -> None:
     assert here["numpy"] in str(fault)
 
 
-@pytest.mark.skipif(DASK, reason="Dask is installed")
-def test_without_dask_it_says_what_to_install() -> None:
+def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not there
     with pytest.raises(InputError, match=r"pip install 'rivetbench\[distributed\]'"), workers("local:2"):
         pass
 

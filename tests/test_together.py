@@ -42,7 +42,7 @@ def grid(nx: int, ny: int, rng: np.random.Generator | None = None) -> np.ndarray
     return nodes if rng is None else nodes[rng.permutation(len(nodes))]
 
 
-def alone(C: Set, p: Vector, tolerance: float) -> Answer:
+def alone(C: Set | None, p: Vector, tolerance: float) -> Answer:
     raise AssertionError("all are settled together")
 
 
@@ -188,9 +188,9 @@ def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
     data, cases, loads = strip_loads(tmp_path, 6)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
     assert (M.order != np.arange(45)).any()
-    starts: list[Set] = []
+    starts: list[Set | None] = []
 
-    def told(C: Set, p: Vector, tolerance: float) -> Answer:
+    def told(C: Set | None, p: Vector, tolerance: float) -> Answer:
         starts.append(C)
         return Answer("solved", np.zeros(45))
 
@@ -202,6 +202,7 @@ def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
     together(loads[1:], TOLERANCE)
     assert len(starts) == 5
     for C, case in zip(starts, cases[1:], strict=True):
+        assert C is not None
         assert ((solve_by_nnls(data, case)[1] > 0) == C).mean() > 0.9
 
 
@@ -222,6 +223,29 @@ def test_an_answer_is_worth_what_its_own_forces_say(tmp_path: Path) -> None:
     y = data.Q @ answer.lam - loads[0].p
     residual = max(-y.min(), abs(y[answer.lam > 0]).max())
     assert answer.details["kkt_residual_mm"] == pytest.approx(residual)
+
+
+def test_few_closed_contacts_are_solved_one_case_after_another(tmp_path: Path) -> None:
+    data, cases, _ = strip_loads(tmp_path, 5)
+    wide = [LoadCase(case.f, case.g + 6.0) for case in cases[1:]]  # one or two of 45 contacts close
+    asked: list[Set | None] = []
+    solver = ActiveSetNewton()
+    together = solver.together(solver.prepare(Problem(data, "dual")))
+    assert together is not None
+    own = together.alone
+
+    def counted(C: Set | None, p: Vector, tolerance: float) -> Answer:
+        asked.append(C)
+        return own(C, p, tolerance)
+
+    together.alone = counted
+    answers = together([Load(c.f, c.g, data.dual_load(c)) for c in wide], TOLERANCE)
+    assert asked == [None] * 4
+    for case, answer in zip(wide, answers, strict=True):
+        x, lam = solve_by_nnls(data, case)
+        assert 1 <= (lam > 0).sum() <= 2
+        assert answer.lam is not None
+        np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-9)
 
 
 def test_newton_has_no_such_way_without_a_factor() -> None:
