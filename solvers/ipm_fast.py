@@ -27,7 +27,7 @@ from .start import NoStart, algorithm_5
 
 THETA = 0.995
 LEAST_GAP = 0.01  # mm, of the start
-RHO = 10.0  # with 0.1 the start is a hundred times as far from the answer, and takes four matrices more
+RHO = 10.0  # with 0.1 the start is up to a hundred times as large, far from the answer
 REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: what is left of y = Qλ − p shrinks by that, or 1 − α, an iteration
 MAX_ITERATIONS = 100
 MAX_SETS = 1000
