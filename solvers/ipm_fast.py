@@ -27,13 +27,13 @@ from .start import NoStart, algorithm_5
 
 THETA = 0.995
 LEAST_GAP = 0.01  # mm, of the start
-RHO = 0.1
+RHO = 10.0  # with 0.1 the start is up to a hundred times as large, far from the answer
 REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: what is left of y = Qλ − p shrinks by that, or 1 − α, an iteration
 MAX_ITERATIONS = 100
 MAX_SETS = 1000
 STALLED = 10
 LIMIT = {"cause": f"{MAX_ITERATIONS} iterations"}
-TOLD = 1e-8  # of the μ at the start: before, a contact that looks closed may only not have moved yet
+TOLD = 1e-4  # of the μ at the start: before, a contact that looks closed may only not have moved yet
 UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 
 
@@ -47,7 +47,7 @@ class _Ready:
 class FastIpm(Solver):
     """Interior point with a finish on the active set.
 
-    When μ = λᵀy/m has fallen to 1e-8 of its start and at most m/4 contacts are undecided, or the
+    When μ = λᵀy/m has fallen to 1e-4 of its start and at most m/4 contacts are undecided, or the
     interior point is as good as it gets, C = {q_ii λ_i > y_i} is where `active_set.solve_from` begins,
     whose status is the answer's. As good as it gets: the natural residual max|min(q_ii λ_i, (Qλ − p)_i)|
     is at most the tolerance, in mm, or has not fallen for 10 iterations. That, too, is the end without
