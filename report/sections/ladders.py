@@ -8,13 +8,12 @@ from typing import Any
 import pandas as pd
 
 from ..blocks import Block, Column, Figure, Section, Table, Text, number, word
-from ..labels import in_order
+from ..labels import IN_HOUSE, in_order
 from ..ladder_map import ladder_map
 from ..numbers import MISSING, counted, power, whole
 from ..outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, holds, with_outcomes
 from ..rows import Results
 
-IN_HOUSE = ("ipm", "gi")
 CONDITION = 1e12  # of K: up to it the in-house solvers are to hold
 
 
