@@ -42,9 +42,9 @@ def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vecto
 
     100 cond(K) 2⁻⁵³ max(|x|, |K⁻¹f|), x being what is left of K⁻¹f − K⁻¹Aλ; and besides
     (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and sᵀλ ≤ τ(m + Σλ): the bound that
-    harness/certificate.py derives. A λ ≥ −10τ adds s*ᵀ10τ to sᵀλ, for (s* − s)ᵀ(λ* − λ) then is at most
-    sᵀλ − s*ᵀλ; PIQP, which looks at it in a scaling of its own, was seen to leave −3.5τ. Clarabel's τ is a
-    share of the data where that is above 1.
+    harness/certificate.py derives. PIQP looks at λ ≥ 0 in a scaling of its own and was seen to leave −3.5τ;
+    a λ ≥ −10τ adds s*ᵀ10τ to sᵀλ, for (s* − s)ᵀ(λ* − λ) then is at most sᵀλ − s*ᵀλ. Clarabel's τ is a share
+    of the data where that is above 1.
     """
     low, high = eigenvalues(prepared)
     size = max(float(abs(v).max(initial=0.0)) for v in (x, prepared.solve_K(case.f)))
@@ -55,6 +55,7 @@ def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vecto
     if name == "clarabel":
         tau *= max(1.0, float(abs(case.f).max()))
     residual = tau * np.sqrt(prepared.assembly.n / low)
-    s = np.maximum(case.g - prepared.assembly.A.T @ x, 0.0)
-    complementarity = tau * (prepared.assembly.m + lam.sum() + 10 * s.sum())
+    complementarity = tau * (prepared.assembly.m + lam.sum())
+    if name == "piqp":
+        complementarity += 10 * tau * np.maximum(case.g - prepared.assembly.A.T @ x, 0.0).sum()
     return conditioning + float((residual + np.sqrt(complementarity)) / np.sqrt(low))
