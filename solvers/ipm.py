@@ -33,8 +33,11 @@ Ordering = Literal["lexicographic", "open_last"]
 
 @dataclass(frozen=True)
 class _Ready:
+    """units : (m,) max_j |a_ji|, what a displacement of 1 mm is in the gap of contact i."""
+
     problem: Problem
     system: NewtonSystem
+    units: Vector
 
 
 class Ipm(Solver):
@@ -118,8 +121,9 @@ class Ipm(Solver):
 
     def prepare(self, data: Problem) -> _Ready | Answer:
         """What is factored of Q once; where that cannot be, the answer that says so."""
+        units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
         try:
-            return _Ready(data, self.make_system(data.Q))
+            return _Ready(data, self.make_system(data.Q), units)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 
@@ -136,14 +140,13 @@ class Ipm(Solver):
             return failed(str(error), iterations=0)
         first = newton.at(start.lam, start.y)  # step 3
         details["start"] = _about(start, first)
-        units = _units(ready.problem)
-        status, cause, point = self._iterate(newton, first, tolerance, units)
+        status, cause, point = self._iterate(newton, first, tolerance, ready.units)
         for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
             if status != "inaccurate":
                 break
             newton.cg_tolerance = min(newton.cg_tolerance, cg_tolerance)
             newton.theta = min(newton.theta, theta)
-            status, cause, point = self._iterate(newton, first, tolerance, units)
+            status, cause, point = self._iterate(newton, first, tolerance, ready.units)
             details["restarts"] = restart
         if newton.unconverged:
             details["cg_unconverged"] = newton.unconverged
@@ -212,11 +215,6 @@ def _about(start: Start, point: Point) -> dict[str, float]:
         "corrections": start.corrections,
         "multiplications": start.multiplications,
     }
-
-
-def _units(problem: Problem) -> Vector:
-    """(m,) max_j |a_ji|: what a displacement of 1 mm is in the gap of contact i."""
-    return np.asarray(abs(problem.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
 
 
 def _undecided(newton: Newton, point: Point, units: Vector) -> float:
