@@ -28,11 +28,12 @@ import threadpoolctl
 from problems.assembly import LoadCase, Prepared, Vector
 from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
-from solvers.base import Answer, Load, Near, Problem, Solver, Status
+from solvers.base import Answer, Load, Problem, Solver, Status
 from solvers.registry import make_solver
 
 from .machine import resident_mib
 from .records import to_line
+from .warm_starts import WarmStarts
 from .yardstick import yardstick
 
 LARGEST_EVENT = 2**16  # bytes; a solver's details beyond it are dropped
@@ -123,7 +124,7 @@ class Run:
         form_s = time.perf_counter() - start
         for array in (load.f, load.g, load.p):
             array.flags.writeable = False
-        near = series.nearest(load)
+        near = series.starts.nearest(load)
 
         self.tell(phase="solve", **({} if series.begun else {"data_mib": resident_mib("VmRSS")}))
         solver = series.solver
@@ -133,7 +134,7 @@ class Run:
             series.begun = True
         set_up = partial(solver.setup, series.state, load, tolerance)
         if near is not None:
-            set_up = partial(solver.update, series.state, series.ready, load, tolerance, near)
+            set_up = partial(solver.update, series.state, series.ready, load, tolerance, near[1])
         series.ready = self.timed("setup_s", set_up)
         answer = self.timed("solve_s", lambda: solver.solve(series.ready, load, tolerance))
         said = checked(answer, data, form)
@@ -144,7 +145,7 @@ class Run:
         self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
         if self.job["yardstick"]:
             self.tell(**yardstick(data.Q))
-        series.keep(load, answer)
+        series.starts.keep(load, answer)
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
@@ -161,18 +162,8 @@ class Series:
         self.solver, self.problem, self.tolerance = solver, problem, tolerance
         self.state: Any = None
         self.ready: Any = None
-        self.nears: list[Near] = []
+        self.starts = WarmStarts(problem)
         self.begun = False
-
-    def nearest(self, load: Load) -> Near | None:
-        """The answer of the nearest overlap p, or None where there is none."""
-        return min(self.nears, key=lambda near: float(np.linalg.norm(near.load.p - load.p)), default=None)
-
-    def keep(self, load: Load, answer: Answer) -> None:
-        if answer.lam is not None:
-            lam = np.asarray(answer.lam, dtype=float)
-            x = answer.x if self.problem.form == "primal" else None
-            self.nears.append(Near(load, lam, self.problem.Q @ lam - load.p, x))
 
 
 def load_cases(scene: Scene, data: Prepared, job: Row) -> Iterator[LoadCase]:

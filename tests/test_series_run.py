@@ -266,7 +266,7 @@ def test_memory_does_not_grow_with_the_cases() -> None:
     job = Job(scene, random_gaps(scene, prepared(scene), 10**9, 0), "gi", "dual", 1e-9, 1e-7, 0, 1)
     desk = Desk(job)
     for _ in desk.solve(range(10**8, 10**8 + 5 * desk_module.NEARS)):
-        assert len(desk.nears) <= desk_module.NEARS
+        assert len(desk.starts.kept) <= desk_module.NEARS
 
 
 @pytest.mark.parametrize("fault", ["raise RuntimeError", "return answers[:-1]", "return [None] * len(loads)"])

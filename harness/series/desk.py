@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,11 +17,12 @@ from problems.assembly import LoadCase, Prepared, Vector
 from problems.load_cases import LoadCases
 from problems.prepare import prepared
 from problems.scene import Scene
-from solvers.base import Answer, Form, Load, Near, Problem, failed
+from solvers.base import Answer, Form, Load, Problem, failed
 from solvers.registry import make_solver
 
 from ..judge import judge
 from ..reference import refined_active_set
+from ..warm_starts import WarmStarts
 from .bound import Bound
 from .vouch import Vouched, vouch
 
@@ -76,10 +76,11 @@ class Desk:
         self.data: Prepared = prepared(job.scene)
         self.bound = Bound.of(self.data)
         self.solver = make_solver(job.solver, job.options, job.plugin)
-        self.state = self.solver.prepare(self.solver.convert(Problem(self.data, job.form)))
+        problem = Problem(self.data, job.form)
+        self.state = self.solver.prepare(self.solver.convert(problem))
         self.together = self.solver.together(self.state)
         self.ready: Any = None
-        self.nears: deque[tuple[int, Near]] = deque(maxlen=NEARS)
+        self.starts = WarmStarts(problem, NEARS)
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
         """The cases, some at a time, each list as soon as it is done."""
@@ -134,14 +135,13 @@ class Desk:
     def _try(self, case: int, load: Load) -> _Tried:
         """Solve one; what the solver raises becomes its status."""
         row = self._begun(case)
-        first = self.ready is None or not self.nears
-        if not first:
-            row["warm_from"], near = self._nearest(load)
+        found = None if self.ready is None else self.starts.nearest(load)
         start = time.perf_counter()
         try:
-            if first:
+            if found is None:
                 self.ready = self.solver.setup(self.state, load, self.job.tolerance)
             else:
+                row["warm_from"], near = found
                 self.ready = self.solver.update(self.state, self.ready, load, self.job.tolerance, near)
             row["setup_s"] = time.perf_counter() - start
             start = time.perf_counter()
@@ -151,10 +151,7 @@ class Desk:
         except Exception as error:
             self.ready = None
             answer = failed(f"{type(error).__name__}: {error}"[:500])
-        if answer.lam is not None:
-            gap = self.data.Q @ answer.lam - load.p
-            x = answer.x if self.job.form == "primal" else None
-            self.nears.append((case, Near(load, answer.lam, gap, x)))
+        self.starts.keep(load, answer, case)
         return _Tried(case, load, row, answer)
 
     def _checked(self, answer: Answer) -> Answer:
@@ -168,10 +165,6 @@ class Desk:
             if np.shape(value) != (size,) or not np.isfinite(value).all():
                 raise ValueError(f"{name} must be ({size},) finite numbers")
         return answer
-
-    def _nearest(self, load: Load) -> tuple[int, Near]:
-        """Of the answers kept, the one with the nearest overlap p."""
-        return min(self.nears, key=lambda kept: float(np.linalg.norm(kept[1].load.p - load.p)))
 
     def _finished(self, tried: list[_Tried]) -> list[Result]:
         """Rows, with what is known of the answers."""
