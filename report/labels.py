@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from .numbers import tidy_power
+from .numbers import counted, tidy_power
 
 #: In-house first, then the libraries; what is not named here follows by name.
 IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
@@ -16,7 +16,7 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
     where several were used, and `label`, the same with the tolerance where there are several.
     """
     variant = cells["variant"].map(lambda name: f" {name}" if name else "")
-    threads = cells["threads"].map(lambda k: f" × {k:.0f} threads")
+    threads = cells["threads"].map(lambda k: f" × {counted(int(k), 'thread')}")
     tolerance = cells["tolerance"].map(lambda value: f" {tidy_power(value)}")
     by_line = cells.groupby(["solver", "form", "variant"], dropna=False)
     threads = threads.where(by_line["threads"].transform("nunique") > 1, "")

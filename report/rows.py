@@ -90,6 +90,11 @@ class Results:
         rows = self.rows[self.rows["scene"].str.startswith(RUNGS) == wanted].reset_index(drop=True)
         return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 
+    def of_threads(self, threads: float) -> Results:
+        """The results with that number of threads, whose lines then are named without it."""
+        rows = self.rows[self.rows["threads"] == threads].reset_index(drop=True)
+        return replace(self, rows=rows, cells=cells_of(rows))
+
     def by_machine(self) -> list[Results]:
         """Results apart for each machine, so that no table or mean can mix two of them."""
         names = self.rows["machine"].unique()

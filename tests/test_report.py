@@ -200,7 +200,7 @@ def test_several_tolerances_and_threads_stand_in_the_label(tmp_path: Path) -> No
         *(
             "a (dual) 1e-6",
             "a (dual) 1e-9",
-            "b (dual) × 1 threads",
+            "b (dual) × 1 thread",
             "b (dual) × 2 threads",
             "c (dual) direct",
         ),

@@ -9,7 +9,7 @@ import pytest
 from synthetic_results import no_answer, row, write_rows
 
 from report.rows import read
-from report.sections import speed
+from report.sections import ingredients, same_method, scaling, speed
 
 LOW, HIGH = "4386/0052", "4386/1074"
 TIMES = {"setup_s": 0.0, "form_s": 0.0}
@@ -62,3 +62,61 @@ def test_without_an_answering_library_there_is_no_ratio_to_it(tmp_path: Path) ->
 
 def test_without_a_yardstick_there_is_no_section(tmp_path: Path) -> None:
     assert speed.section(results(tmp_path, [row(LOW, "newton")])) is None
+
+
+def test_with_preparation_the_ratio_is_to_the_library_that_is_fastest_with_its_own(tmp_path: Path) -> None:
+    rows = [timed(LOW, "newton", 1.0, convert_s=0.0, prepare_s=3.0)]
+    rows += [timed(LOW, "piqp", 10.0, convert_s=0.0, prepare_s=0.0)]
+    rows += [timed(LOW, "proxqp", 8.0, convert_s=1.0, prepare_s=7.0)]
+    cases = speed.load_cases(results(tmp_path, rows)).set_index("solver")
+    assert cases.loc["newton", "to_library"] == pytest.approx(1 / 8)
+    assert cases.loc["newton", "total_to_library"] == pytest.approx(4 / 10)
+
+
+def test_lines_of_several_numbers_of_threads_are_named_without_it(tmp_path: Path) -> None:
+    rows = [timed(LOW, "newton", 1.0, threads=k) for k in (1, 2)]
+    cases = speed.load_cases(results(tmp_path, rows))
+    assert cases["series"].tolist() == ["newton (dual)"] * 2
+
+
+def test_a_code_of_the_same_method_that_ran_out_of_time_bounds_the_ratio(tmp_path: Path) -> None:
+    rows = [timed(LOW, "gi", 2.0, "primal"), timed(HIGH, "gi", 2.0, "primal"), timed(LOW, "gi", 1.0)]
+    rows += [timed(LOW, "quadprog", 40.0, "primal")]
+    rows += [timed(HIGH, "quadprog", 0.0, "primal") | no_answer("time_limit") | {"time_limit_s": 50.0}]
+    section = same_method.section(results(tmp_path, rows))
+    assert section is not None
+    (table,) = section.blocks
+    assert table.data["ratio"].tolist() == pytest.approx([2 / 40, 2 / 50])
+    assert "0.0500" in table.markdown
+    assert "< 0.0400" in table.markdown
+    assert "> 50" in table.markdown
+
+
+def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path: Path) -> None:
+    rows = [timed(LOW, "ipm-fast", 1.0), timed(HIGH, "ipm-fast", 10.0)]
+    rows += [timed(scene, "ipm-fast", s, variant="no finish") for scene, s in ((LOW, 3.0), (HIGH, 20.0))]
+    rows += [timed(LOW, "ipm-fast", 9.0, variant="bad", verdict="outside")]
+    section = ingredients.section(results(tmp_path, rows))
+    assert section is not None
+    data = section.blocks[0].data.set_index("series")
+    line = data.loc["ipm-fast (dual) no finish"]
+    assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
+    assert data.loc["ipm-fast (dual) bad", "within"] == 0
+    assert "2.50 (2.0 to 3.0)" in section.blocks[0].markdown
+
+
+def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: Path) -> None:
+    rows = []
+    for n in (1000, 2000, 4000, 8000):
+        figures = {"cholesky_s": 1e-10 * n**3, "product_s": 1e-9 * n**2}
+        memory = {"data_mib": 100.0, "peak_rss_mib": 100.0 + 1e-5 * n**2}
+        grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
+        rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
+    section = scaling.section(results(tmp_path, rows))
+    assert section is not None
+    data = section.blocks[0].data.set_index("series")
+    assert data.loc["newton (dual)", "load_case_s"] == pytest.approx(1.5)
+    assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
+    assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)
+    assert data.loc["one product Qv", "load_case_s"] == pytest.approx(2.0)
+    assert scaling.section(results(tmp_path / "few", rows[:2])) is None

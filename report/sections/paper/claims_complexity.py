@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...fit import Exponent
 from ...numbers import significant, whole
-from .fit import Exponent
 from .scaling import fitted, keys
 from .selection import method
 from .verdict import Case, Claim, Measured, by_case

@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
+from ...fit import Exponent, exponent
 from ...numbers import as_number
 from ...rows import Results
-from .fit import Exponent, exponent
 from .selection import METHODS, cells_of_paper, method, of_scaling, records, timed
 
 

@@ -1,0 +1,63 @@
+"""What each ingredient of a solver is worth: the solver without it, as a ratio to the whole."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from ..blocks import Column, Section, Table, number, word
+from ..labels import in_order
+from ..numbers import significant, span, whole
+from ..rows import Results
+
+KEYS = ["solver", "form", "scene", "threads"]
+
+
+def section(results: Results) -> Section | None:
+    """Of solvers measured both as they are and as variants, in a run with yardsticks."""
+    cells = results.cells[results.cells["status"] != "unsupported"]
+    if not cells["cholesky_s"].notna().any():
+        return None
+    plain = cells[(cells["variant"] == "") & (cells["verdict"] == "within")]
+    both = cells[cells["variant"] != ""].merge(plain, on=KEYS, suffixes=("", "_plain"))
+    if both.empty:
+        return None
+    both["ratio"] = (both["load_case_s"] / both["load_case_s_plain"]).where(both["verdict"] == "within")
+    lines = [_line(both[both["series"] == series]) for series in in_order(both, "series")]
+    columns = [
+        word("solver (form), variant", "series"),
+        number("scenes", "scenes", whole),
+        number("within", "within", whole),
+        Column("times as long", _spread),
+        number("iterations", "iterations", whole),
+        number("of the whole", "iterations_plain", whole),
+        number("largest error, mm", "displacement_error_mm"),
+    ]
+    caption = (
+        "*One ingredient left out or exchanged*: seconds a load case to those of the solver as it is, on the "
+        "same scene with as many threads; the median over the scenes within the limit, and the least to the "
+        "most. Iterations: medians."
+    )
+    return Section(
+        "What each ingredient is worth", [Table("ingredients", caption, pd.DataFrame(lines), columns)]
+    )
+
+
+def _line(group: pd.DataFrame) -> dict[str, Any]:
+    return {
+        "series": group["series"].iloc[0],
+        "scenes": group["scene"].nunique(),
+        "within": int((group["verdict"] == "within").sum()),
+        "ratio": group["ratio"].median(),
+        "ratio_least": group["ratio"].min(),
+        "ratio_most": group["ratio"].max(),
+        "iterations": group["iterations"].median(),
+        "iterations_plain": group["iterations_plain"].median(),
+        "displacement_error_mm": group["displacement_error_mm"].max(),
+    }
+
+
+def _spread(line: Any) -> str:
+    least, most = (significant(line[f"ratio_{end}"], 2) for end in ("least", "most"))
+    return f"{significant(line['ratio'])} ({span(least, most)})"

@@ -1,0 +1,58 @@
+"""An in-house code beside the libraries' codes of its own kind of method."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from ..blocks import Column, Section, Table, number, word
+from ..numbers import significant, whole
+from ..rows import Results
+from .paper.selection import records, seconds_text, timed
+
+#: Ours, the form, and the other code of a dual active-set method.
+PAIRS = (("gi", "dual", "daqp"), ("gi", "primal", "quadprog"))
+
+
+def section(results: Results) -> Section | None:
+    """In a run with yardsticks, of every scene that both codes were measured on."""
+    if not results.cells["cholesky_s"].notna().any():
+        return None
+    cells = timed(results.cells)
+    cells = cells.assign(text=[seconds_text(cell) for cell in records(cells)])
+    lines = [line for pair in PAIRS for line in _lines(cells, *pair)]
+    if not lines:
+        return None
+    columns = [
+        word("scene", "scene"),
+        number("active", "active", whole),
+        number("threads", "threads", whole),
+        word("this", "series"),
+        word("s", "text"),
+        word("the other", "series_other"),
+        word("s ", "text_other"),
+        Column("ratio", _ratio),
+    ]
+    caption = (
+        "*Goldfarb and Idnani's method beside the libraries' dual active-set codes*: seconds a load case, "
+        "medians of the repeats. Where the other has no answer in time, the ratio is at most what is shown."
+    )
+    return Section(
+        "Against codes of the same method", [Table("same-method", caption, pd.DataFrame(lines), columns)]
+    )
+
+
+def _lines(cells: pd.DataFrame, solver: str, form: str, other: str) -> list[dict[str, Any]]:
+    """A line a scene and number of threads that both were measured on."""
+    keys = ["scene", "threads"]
+    mine = cells[(cells["solver"] == solver) & (cells["form"] == form) & (cells["verdict"] == "within")]
+    theirs = cells[(cells["solver"] == other) & (cells["form"] == form) & cells["at_least"].notna()]
+    both = mine.merge(theirs[[*keys, "series", "text", "at_least", "cut"]], on=keys, suffixes=("", "_other"))
+    return records(
+        both.assign(ratio=both["load_case_s"] / both["at_least_other"]).sort_values(["n", "active"])
+    )
+
+
+def _ratio(line: Any) -> str:
+    return ("< " if line["cut_other"] else "") + significant(line["ratio"])
