@@ -114,6 +114,8 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             entry.pop("time_limit_s", None)
         if change.repeats is not None:
             entry.pop("repeats", None)
+        if change.threads:
+            entry.pop("threads", None)
     changes = {
         "tolerances": list(change.tolerances),
         "repeats": change.repeats,
@@ -195,7 +197,8 @@ def _of_entry(
     tolerances = entry.tolerances or suite.tolerances
     n, _ = read_scene(source).expected_size or (0, 0)
     cases = range(suite.series.cases) if suite.series else (None,)
-    for form, tolerance, threads, case in product(entry.forms or FORMS, tolerances, suite.threads, cases):
+    forms, threads_of_entry = entry.forms or FORMS, entry.threads or suite.threads
+    for form, tolerance, threads, case in product(forms, tolerances, threads_of_entry, cases):
         yield Measurement(
             suite=suite.name,
             scene=scene,

@@ -44,6 +44,7 @@ class SolverEntry(BaseModel):
     tolerances: Annotated[list[PositiveFloat], Some] | None = None
     scenes: Annotated[list[str], Some] | None = None
     repeats: PositiveInt | None = None
+    threads: Annotated[list[PositiveInt], Some] | None = None
     gated: bool = True
     time_limit_s: PositiveFloat | None = None
 

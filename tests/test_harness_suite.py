@@ -79,6 +79,15 @@ def test_an_entry_may_have_repeats_of_its_own(tmp_path: Path) -> None:
     assert {m.repeat for m in expand(once)} == {0}
 
 
+def test_an_entry_may_have_numbers_of_threads_of_its_own(tmp_path: Path) -> None:
+    own = {"name": "ipm", "forms": ["dual"], "threads": [2]}
+    data = {"scenes": ["4386/0107"], "threads": [1, 4], "solver": [{"name": "gi", "forms": ["dual"]}, own]}
+    suite = checked(data, tmp_path / "suite.toml")
+    assert [(m.solver, m.threads) for m in expand(suite)] == [("gi", 1), ("gi", 4), ("ipm", 2)]
+    told = overridden(suite, Overrides(threads=(3,)))
+    assert [(m.solver, m.threads) for m in expand(told)] == [("gi", 3), ("ipm", 3)]
+
+
 def test_what_is_written_beside_the_rows_reads_back_the_same(tmp_path: Path) -> None:
     suite = read_suite(str(tiny.write_suite(tmp_path, TWO, title='a "quoted" title — ü')))
     assert validated(tomllib.loads(to_toml(suite)), tmp_path / "suite.toml") == suite
