@@ -11,7 +11,7 @@ from ..labels import in_order
 from ..numbers import significant, span, whole
 from ..rows import Results
 
-KEYS = ["solver", "form", "scene", "threads"]
+KEYS = ["solver", "form", "scene", "threads", "tolerance"]
 
 
 def section(results: Results) -> Section | None:
