@@ -10,6 +10,7 @@ import pytest
 import scipy.linalg as sla
 import scipy.sparse as sp
 
+from harness import definite
 from harness.certificate import certify
 from harness.definite import smallest_eigenvalue
 from harness.exact_residual import Double
@@ -127,6 +128,19 @@ def test_the_smallest_eigenvalue_is_bounded_from_below(condition: float, seed: i
         for i in range(j + 1, size):
             factor = rows[i][j] / rows[j][j]
             rows[i] = [a - factor * b for a, b in zip(rows[i], rows[j], strict=True)]
+
+
+def test_the_bound_does_not_grow_with_the_number_of_stiff_unknowns() -> None:
+    """n = 1000, n u trace K = 1e-4: above λmin. The eigenvalues are those of a 2 × 2 matrix."""
+    c = 3e-5
+    K = np.kron(np.eye(500), [[1e6, 1e6 - c], [1e6 - c, 1e6]])
+    assert 0.85 * c < smallest_eigenvalue(K, c) <= c
+
+
+def test_the_norm_of_the_factors_is_bounded_from_above() -> None:
+    R = np.asfortranarray(np.triu(np.random.default_rng(3).standard_normal((40, 40))) + 3 * np.eye(40))
+    exact = np.linalg.norm(abs(R).T @ abs(R), 2)
+    assert exact <= definite._norm(R.copy(order="F")) * (1 + 1e-14) <= 2 * exact
 
 
 def test_an_indefinite_matrix_has_no_positive_bound() -> None:
