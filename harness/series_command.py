@@ -81,10 +81,10 @@ def series(
         from problems.scene import read_scene
         from solvers.registry import make_solver, solver_version
 
-        from .describe import code_of
         from .series.desk import Job
         from .series.run import run
         from .series.store import CASES
+        from .solver_code import code_of
 
         random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
         drawn = [name for name, value in random.items() if value is not None]
@@ -123,7 +123,7 @@ def series(
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin)  # type: ignore[arg-type]
         facts = {
             "solver_version": solver_version(solver, plugin),
-            "solver_code": code_of(type(made).__module__),
+            "solver_code": code_of(made),
         }
         code = run(job, facts, out, console, scheduler)
         if (out / CASES).is_file():
