@@ -15,7 +15,8 @@ from typing import Annotated
 import typer
 
 from . import scene_commands, series_command
-from .console import ACCURACY_LOST, Scheduler, option, reported
+from .console import Scheduler, option, reported
+from .exit_codes import DONE, FELL_SHORT
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
@@ -173,8 +174,8 @@ def gate(directory: Directory) -> None:
 
     \b
     Exit codes:
-      0  every gated row is within 1e-7 mm
-      1  accuracy lost: a gated row is outside, has no answer, or was never measured
+      0  every gated row is within 1e-7 mm (on a rung of a ladder, what conditioning allows)
+      1  accuracy lost: a gated row is outside, cannot be judged, has no answer, or was never measured
       2  wrong usage or bad input
       3  nothing could be judged
     """
@@ -228,7 +229,7 @@ def check(
             console.print(f"{name}: {len(findings) or 'no'} faults", style="red" if findings else "green")
             for finding in findings:
                 console.print(f"  {finding}", highlight=False, markup=False)
-        raise typer.Exit(ACCURACY_LOST if faulty else 0)
+        raise typer.Exit(FELL_SHORT if faulty else DONE)
 
 
 def main() -> None:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .exit_codes import INTERRUPTED, WRONG_USAGE
+
 if TYPE_CHECKING:
     from rich.console import Console
 
 WIDTH_OF_A_LOG = 160
-ACCURACY_LOST, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 
 
 def option(metavar: str, help: str, **limits: Any) -> Any:

@@ -19,6 +19,7 @@ from problems.scene import read_scene
 
 from . import records
 from .describe import Description, describe
+from .exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
 from .ground import Ground, ground, record, record_refusal
 from .machine import machine, physical_memory_mib
 from .plan import Measurement, expand
@@ -27,8 +28,6 @@ from .rows import Measured, Order, measured, measured_on_worker, rows_of
 from .scheduler import done_as_completed, workers
 from .show import Display
 from .suite import Suite, to_toml
-
-DONE, NOT_MEASURED, NOTHING_JUDGED = 0, 1, 3
 
 Solvers = dict[tuple[str, str], Description]
 
@@ -64,7 +63,7 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
     missing = len(planned - {row["key"] for row in rows})
     if missing:
         console.print(f"Not measured: {missing}. Run the same command again.", style="red")
-    return NOT_MEASURED if missing else code
+    return FELL_SHORT if missing else code
 
 
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
