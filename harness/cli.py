@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from . import scene_commands, series_command
-from .console import Scheduler, option, reported
+from .console import Plugin, Scheduler, option, reported
 from .exit_codes import DONE, FELL_SHORT
 
 app = typer.Typer(
@@ -34,10 +34,6 @@ class Listed(StrEnum):
     solvers = "solvers"
     scenes = "scenes"
     suites = "suites"
-
-
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")]
-Plugin = Annotated[Path | None, option("FILE", "Python file with a solver of your own.")]
 
 
 @app.callback()
@@ -134,7 +130,9 @@ def run(
 
 
 @app.command()
-def report(directory: Directory) -> None:
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")],
+) -> None:
     """Write DIR/report/report.md anew from the rows.
 
     \b
@@ -163,7 +161,9 @@ def report(directory: Directory) -> None:
 
 
 @app.command()
-def gate(directory: Directory) -> None:
+def gate(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")],
+) -> None:
     """Judge the saved answers anew, and fail where accuracy was lost.
 
     The figures in the rows are not trusted: each answer is compared with the reference of its scene.

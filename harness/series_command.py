@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import Scheduler, option, reported
+from .console import Plugin, SceneName, Scheduler, option, reported
 
 if TYPE_CHECKING:
     from problems.load_cases import LoadCases
@@ -20,9 +20,7 @@ SEED = 0
 
 @app.command()
 def series(
-    scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or own matrices .npz.")
-    ],
+    scene: SceneName,
     out: Annotated[Path, option("DIR", "Where rows, gaps and report go.")],
     cases: Annotated[
         int | None, option("N", "How many cases.  [default: 100 random ones; all of a table]", min=1)
@@ -52,7 +50,7 @@ def series(
         int, option("N", "Compare every N-th case with the certified reference; 0: none.", min=0)
     ] = 100,
     threads: Annotated[int, option("N", "Threads of the linear algebra.", min=1)] = 2,
-    plugin: Annotated[Path | None, option("FILE", "Python file with a solver of your own.")] = None,
+    plugin: Plugin = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
