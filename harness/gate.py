@@ -22,11 +22,11 @@ from .ground import Ground, ground
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
 from .plan import expand
 from .records import Row
+from .show import STYLES
 from .suite import validated
 
 #: What the gate reads of a row: which answer belongs to which scene.
 NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", "limit_mm")
-STYLES = {"within": "green", "cannot_be_judged": "yellow"}
 
 
 @dataclass(frozen=True)
@@ -128,6 +128,6 @@ def table(findings: list[Finding]) -> Table:
     for finding in findings:
         error, verdict = finding.judgement.displacement_error_mm, finding.judgement.verdict
         shown = "–" if error is None else f"{error:.1e}"
-        style = STYLES.get(verdict, "red")
-        made.add_row(finding.key, shown, f"{finding.limit_mm:.0e}", verdict, finding.why, style=style)
+        limit = f"{finding.limit_mm:.0e}"
+        made.add_row(finding.key, shown, limit, verdict, finding.why, style=STYLES[verdict])
     return made

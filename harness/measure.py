@@ -17,13 +17,11 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import psutil
 
 from .plan import Measurement
-
-Row = dict[str, Any]
+from .records import Row
 
 ROOT = Path(__file__).parent.parent
 POLL_S = 0.05
