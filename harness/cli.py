@@ -101,7 +101,7 @@ def run(
                 3 nothing could be judged, 130 interrupted.
     """
     with reported() as console:
-        from .plan import Overrides, overridden
+        from .overrides import Overrides, overridden
         from .records import MEASUREMENTS
         from .run import run as run_suite
         from .suite import read_suite
