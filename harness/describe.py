@@ -32,6 +32,10 @@ class Description:
         return "dual" if "dual" in self.forms else self.forms[0]
 
 
+#: By name and variant.
+Solvers = dict[tuple[str, str], Description]
+
+
 def describe(suite: Suite) -> list[Description]:
     """A description for each of the suite's solver entries. Raises InputError, all faults at once."""
     from .measure import environment
