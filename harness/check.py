@@ -12,7 +12,8 @@ import numpy as np
 from problems.assembly import LoadCase, Vector
 from solvers.base import FORMS, Answer, Form, Near, Problem, Solver
 
-from .inspection import LIMIT_MM, TOLERANCE, Finding, distance, inspect
+from .inspection import TOLERANCE, Finding, distance, inspect
+from .judge import LIMIT_MM
 from .trials import Case, Trial, trials
 
 LOOSE = 1e-1  # a tolerance at which an iterative solver must stop earlier than at TOLERANCE

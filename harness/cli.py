@@ -15,7 +15,8 @@ from typing import Annotated
 import typer
 
 from . import scene_commands, series_command
-from .console import ACCURACY_LOST, Scheduler, option, reported
+from .console import Plugin, Scheduler, option, reported
+from .exit_codes import DONE, FELL_SHORT
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
@@ -33,10 +34,6 @@ class Listed(StrEnum):
     solvers = "solvers"
     scenes = "scenes"
     suites = "suites"
-
-
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")]
-Plugin = Annotated[Path | None, option("FILE", "Python file with a solver of your own.")]
 
 
 @app.callback()
@@ -104,7 +101,7 @@ def run(
                 3 nothing could be judged, 130 interrupted.
     """
     with reported() as console:
-        from .plan import Overrides, overridden
+        from .overrides import Overrides, overridden
         from .records import MEASUREMENTS
         from .run import run as run_suite
         from .suite import read_suite
@@ -133,7 +130,9 @@ def run(
 
 
 @app.command()
-def report(directory: Directory) -> None:
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")],
+) -> None:
     """Write DIR/report/report.md anew from the rows.
 
     \b
@@ -162,7 +161,9 @@ def report(directory: Directory) -> None:
 
 
 @app.command()
-def gate(directory: Directory) -> None:
+def gate(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")],
+) -> None:
     """Judge the saved answers anew, and fail where accuracy was lost.
 
     The figures in the rows are not trusted: each answer is compared with the reference of its scene.
@@ -173,8 +174,8 @@ def gate(directory: Directory) -> None:
 
     \b
     Exit codes:
-      0  every gated row is within 1e-7 mm
-      1  accuracy lost: a gated row is outside, has no answer, or was never measured
+      0  every gated row is within 1e-7 mm (on a rung of a ladder, what conditioning allows)
+      1  accuracy lost: a gated row is outside, cannot be judged, has no answer, or was never measured
       2  wrong usage or bad input
       3  nothing could be judged
     """
@@ -228,7 +229,7 @@ def check(
             console.print(f"{name}: {len(findings) or 'no'} faults", style="red" if findings else "green")
             for finding in findings:
                 console.print(f"  {finding}", highlight=False, markup=False)
-        raise typer.Exit(ACCURACY_LOST if faulty else 0)
+        raise typer.Exit(FELL_SHORT if faulty else DONE)
 
 
 def main() -> None:

@@ -1,25 +1,31 @@
-"""What all commands share: options, and errors that a person can put right as red lines and an exit code."""
+"""What commands share: their arguments, and what a person can put right as red lines and an exit code."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from .exit_codes import INTERRUPTED, WRONG_USAGE
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 WIDTH_OF_A_LOG = 160
-ACCURACY_LOST, WRONG_USAGE, INTERRUPTED = 1, 2, 130
 
 
 def option(metavar: str, help: str, **limits: Any) -> Any:
     return typer.Option(metavar=metavar, help=help, **limits)
 
 
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or own matrices .npz.")
+]
+Plugin = Annotated[Path | None, option("FILE", "Python file with a solver of your own.")]
 Scheduler = Annotated[
     str | None, option("WHERE", "Dask: local:N for N workers here, or a scheduler's address.")
 ]

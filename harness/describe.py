@@ -5,8 +5,6 @@ A library that prints or crashes while it is imported then harms no run, and the
 
 from __future__ import annotations
 
-import hashlib
-import inspect
 import json
 import subprocess
 import sys
@@ -16,6 +14,7 @@ from pathlib import Path
 from problems.errors import Fault, InputError
 from solvers.base import Form
 
+from .solver_code import code_of
 from .suite import Suite
 
 
@@ -31,6 +30,10 @@ class Description:
     def usual_form(self) -> Form:
         """The dual where the solver takes it."""
         return "dual" if "dual" in self.forms else self.forms[0]
+
+
+#: By name and variant.
+Solvers = dict[tuple[str, str], Description]
 
 
 def describe(suite: Suite) -> list[Description]:
@@ -66,25 +69,12 @@ def main() -> None:
     for name, options in question["solvers"]:
         try:
             solver = make_solver(name, options, plugin)
-            code = code_of(type(solver).__module__)
+            code = code_of(solver)
             found.append(asdict(Description(list(solver.forms), solver_version(name, plugin), code)))
         except InputError as error:
             faults += [asdict(fault) for fault in error.faults]
     print()
     print(json.dumps({"found": found, "faults": faults}, default=repr))
-
-
-def code_of(module: str) -> str:
-    """Hash of the sources in `solvers` that a module is made of: its own and those it takes names from."""
-    sources: dict[str, str] = {}
-    todo = [module]
-    while todo:
-        name = todo.pop()
-        if name not in sources and (name == module or name.startswith("solvers.")):
-            sources[name] = inspect.getsource(sys.modules[name])
-            values = list(vars(sys.modules[name]).values())
-            todo += [v.__name__ if inspect.ismodule(v) else str(getattr(v, "__module__", "")) for v in values]
-    return hashlib.sha256("".join(sources[name] for name in sorted(sources)).encode()).hexdigest()[:12]
 
 
 if __name__ == "__main__":

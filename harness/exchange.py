@@ -10,8 +10,6 @@ from rich.console import Console
 
 from problems import formats
 from problems.assembly import LoadCase, Prepared
-from problems.build import load_case as own_load_case
-from problems.build import prepared as own_prepared
 from problems.errors import Fault, InputError
 from problems.matrices import read_matrices
 from problems.prepare import load_case, prepared
@@ -81,11 +79,11 @@ def _checked(out: Path, console: Console) -> None:
     """Definiteness, condition and digits of what was read, on the console."""
     scene = read_scene(str(out))
     try:
-        data = own_prepared(scene)
+        data = prepared(scene)
     except InputError:
         out.unlink()
         raise
-    load = own_load_case(scene, data)
+    load = load_case(scene, data)
     blocks = " + ".join(str(len(K)) for K in data.assembly.blocks)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
     console.print(f"K is symmetric and positive definite, cond(K) = {data.facts['cond_K']:.2e}.")

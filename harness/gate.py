@@ -17,16 +17,16 @@ from problems.errors import Fault, InputError
 from problems.scene import read_toml
 
 from . import records
+from .exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
 from .ground import Ground, ground
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
 from .plan import expand
 from .records import Row
+from .show import STYLES
 from .suite import validated
 
-PASSED, ACCURACY_LOST, NOTHING_JUDGED = 0, 1, 3
 #: What the gate reads of a row: which answer belongs to which scene.
 NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", "limit_mm")
-STYLES = {"within": "green", "cannot_be_judged": "yellow"}
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ def gate(directory: Path, console: Console) -> int:
     """Judge every gated row of DIRECTORY.
 
     Returns 0 where all that the suite gates is within 1e-7 mm (on a rung of a ladder, what conditioning
-    allows), 1 where it is not (a row outside, without
-    an answer, missing, or not to be judged), 3 where no answer at all could be judged. Raises InputError.
+    allows), 1 where it is not (a row outside, without an answer, missing, or not to be judged), 3 where no
+    answer at all could be judged. Raises InputError.
     """
     if not directory.is_dir():
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
@@ -58,11 +58,11 @@ def gate(directory: Path, console: Console) -> int:
         return NOTHING_JUDGED
     if fine < len(findings):
         console.print(f"Accuracy lost: {len(findings) - fine} of {len(findings)} gated rows.", style="red")
-        return ACCURACY_LOST
+        return FELL_SHORT
     wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
     console.print(f"Passed: all {fine} gated rows are within {limits}.", style="green")
-    return PASSED
+    return DONE
 
 
 def gated_rows(path: Path) -> dict[str, Row]:
@@ -128,6 +128,6 @@ def table(findings: list[Finding]) -> Table:
     for finding in findings:
         error, verdict = finding.judgement.displacement_error_mm, finding.judgement.verdict
         shown = "–" if error is None else f"{error:.1e}"
-        style = STYLES.get(verdict, "red")
-        made.add_row(finding.key, shown, f"{finding.limit_mm:.0e}", verdict, finding.why, style=style)
+        limit = f"{finding.limit_mm:.0e}"
+        made.add_row(finding.key, shown, limit, verdict, finding.why, style=STYLES[verdict])
     return made

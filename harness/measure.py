@@ -17,13 +17,12 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import psutil
 
+from .forks import end_children
 from .plan import Measurement
-
-Row = dict[str, Any]
+from .records import Row
 
 ROOT = Path(__file__).parent.parent
 POLL_S = 0.05
@@ -34,7 +33,6 @@ STDERR_TAIL = 2000  # bytes
 CHUNK = 2**16  # bytes
 LAST_WORDS = 64  # chunks read of what a dead worker wrote
 FAMILY_S = 0.5  # between two looks for processes that the worker forked
-LAST_FORKS_S = 10.0  # for killing what forks on
 
 JOB = ("source", "solver", "options", "plugin", "form", "tolerance", "yardstick")
 #: What a worker says once, for all the load cases of a series.
@@ -234,33 +232,3 @@ class Worker:
         for stream in (self.events, self.process.stdin, self.process.stderr):
             if stream is not None:
                 stream.close()
-
-
-def end_children(pid: int) -> None:
-    """Linux: kill the children of a stopped process until none is left, however fast they fork on.
-
-    Orphans come to it too, since it is a subreaper.
-    """
-    deadline = time.monotonic() + LAST_FORKS_S
-    living = True
-    while living and time.monotonic() < deadline:
-        children = _children(pid)
-        for child in reversed(children):  # the youngest first: its parent has no time for another
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.kill(child, signal.SIGKILL)
-        living = any(map(_is_living, children))
-
-
-def _children(pid: int) -> list[int]:
-    try:
-        lists = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
-    except OSError:  # it is gone
-        return []
-    return [int(child) for text in lists for child in text.split()]
-
-
-def _is_living(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    except OSError:
-        return False

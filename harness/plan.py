@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from problems.errors import Fault, InputError
 from problems.scene import read_scene
 from solvers.base import FORMS, Form
 
-from .suite import RandomCases, SolverEntry, Suite, checked, found_scenes
+from .suite import RandomCases, SolverEntry, Suite
 
 
 @dataclass(frozen=True)
@@ -65,78 +64,6 @@ class Measurement:
         words = [self.scene, self.solver, self.form, self.variant, f"{self.tolerance:g}"]
         words += [f"t{self.threads}", f"r{self.repeat}", "" if self.case is None else f"c{self.case}"]
         return re.sub(r"[^\w.+-]+", "-", "_".join(filter(None, words)))
-
-
-@dataclass(frozen=True)
-class Overrides:
-    """What the command line changes in a suite; empty or None leaves it as it is."""
-
-    sizes: tuple[int, ...] = ()
-    scenes: tuple[str, ...] = ()
-    solvers: tuple[str, ...] = ()
-    forms: tuple[Form, ...] = ()
-    tolerances: tuple[float, ...] = ()
-    repeats: int | None = None
-    threads: tuple[int, ...] = ()
-    time_limit_s: float | None = None
-    memory_limit_mib: int | None = None
-    plugin: Path | None = None
-
-
-def overridden(suite: Suite, change: Overrides) -> Suite:
-    """The suite with the command line's changes. Raises InputError, all faults at once.
-
-    --scene takes the place of the suite's scenes; --size keeps those of that size; --solver keeps
-    those entries and adds a plain one for a solver that the suite does not name; --plugin adds its own.
-    """
-    faults: list[Fault] = []
-    data = suite.model_dump(exclude_none=True)
-    if change.scenes:
-        data["scenes"] = found_scenes(list(change.scenes), "--scene", "scene", Path.cwd(), faults)
-    if change.sizes:
-        sizes = dict(_sizes(data["scenes"])) if not faults else {}
-        for size in set(change.sizes) - set(sizes.values()):
-            allowed = ", ".join(map(str, sorted(set(sizes.values()))))
-            faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
-        data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
-    plugin = str(change.plugin.resolve()) if change.plugin else suite.plugin
-    if change.solvers:
-        data["solver"] = [entry for entry in data["solver"] if entry["name"] in change.solvers]
-    named = {entry["name"] for entry in data["solver"]}
-    own = [change.plugin.stem] if change.plugin and not change.solvers else []
-    data["solver"] += [{"name": name} for name in (*change.solvers, *own) if name not in named]
-    for entry in data["solver"]:
-        if change.forms:
-            entry["forms"] = list(change.forms)
-        if change.tolerances:
-            entry.pop("tolerances", None)
-        if change.time_limit_s is not None:
-            entry.pop("time_limit_s", None)
-        if change.repeats is not None:
-            entry.pop("repeats", None)
-        if change.threads:
-            entry.pop("threads", None)
-    changes = {
-        "tolerances": list(change.tolerances),
-        "repeats": change.repeats,
-        "threads": list(change.threads),
-        "time_limit_s": change.time_limit_s,
-        "memory_limit_mib": change.memory_limit_mib,
-        "plugin": plugin,
-    }
-    data |= {key: value for key, value in changes.items() if value not in ([], None)}
-    if change.time_limit_s is not None:
-        data.pop("time_limit_by_size_s", None)
-    if faults:
-        raise InputError(faults)
-    return checked(data, Path("command line"))
-
-
-def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
-    for scene in scenes:
-        size = read_scene(scene).expected_size
-        if size is not None:
-            yield scene, size[0]
 
 
 def expand(suite: Suite) -> list[Measurement]:

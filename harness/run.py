@@ -18,19 +18,18 @@ from problems.errors import Fault, InputError
 from problems.scene import read_scene
 
 from . import records
-from .describe import Description, describe
+from .describe import Description, Solvers, describe
+from .exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
 from .ground import Ground, ground, record, record_refusal
+from .hopeless import out_of_time_before
 from .machine import machine, physical_memory_mib
 from .plan import Measurement, expand
 from .records import Row
+from .resume import resumed
 from .rows import Measured, Order, measured, measured_on_worker, rows_of
 from .scheduler import done_as_completed, workers
 from .show import Display
 from .suite import Suite, to_toml
-
-DONE, NOT_MEASURED, NOTHING_JUDGED = 0, 1, 3
-
-Solvers = dict[tuple[str, str], Description]
 
 
 def run(suite: Suite, directory: Path, console: Console, scheduler: str | None = None) -> int:
@@ -64,7 +63,7 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
     missing = len(planned - {row["key"] for row in rows})
     if missing:
         console.print(f"Not measured: {missing}. Run the same command again.", style="red")
-    return NOT_MEASURED if missing else code
+    return FELL_SHORT if missing else code
 
 
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
@@ -150,71 +149,6 @@ def batches(left: list[Measurement]) -> list[list[Measurement]]:
     for m in left:
         found.setdefault(m.key if m.case is None else m.process, []).append(m)
     return list(found.values())
-
-
-def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
-    """The scenes that show that m would run out of time, or "".
-
-    One is m's own, where the solver ran out of as much time at this tolerance or a looser one. Else they
-    are all those of the next smaller size n' that the same solver, form and settings were measured
-    on, if it ran out of its time T' on each, and the time T that m has is at most (n/n')² T': every
-    solver here works with dense matrices, so its time grows with n² at least. (Not so on the rungs of
-    ladders, where it is not size that makes them hard.)
-    """
-    same = ("solver", "form", "variant", "options", "threads_asked")
-    mine = (m.solver, m.form, m.variant, m.options, m.threads)
-    own = [row for row in rows if tuple(row[name] for name in same) == mine]
-    looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
-    for row in looser:
-        if row["status"] == "time_limit" and m.time_limit_s <= row["time_limit_s"]:
-            return f"{m.scene} at {row['tolerance']:g}"
-    if read_scene(m.source).rung:
-        return ""
-    smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
-    largest = max((row["n"] for row in smaller), default=0)
-    there = [row for row in smaller if row["n"] == largest]
-    growth = (n / largest) ** 2 if largest else 0.0
-    late = [
-        row
-        for row in there
-        if row["status"] == "time_limit" and m.time_limit_s <= growth * row["time_limit_s"]
-    ]
-    return ", ".join(sorted({row["scene"] for row in late})) if len(late) == len(there) else ""
-
-
-def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
-    """The rows that DIRECTORY holds; what a new run of the plan would not repeat is set aside."""
-    path = directory / records.MEASUREMENTS
-    if records.set_torn_aside(path):
-        console.print(f"{path}: the last line was torn; it now stands in {records.TORN}", style="yellow")
-    rows = records.read(path)
-    planned = {m.key: m for m in plan}
-    sources = {m.scene: m.source for m in plan}
-    scene_keys = {name: read_scene(source).key for name, source in sources.items()}
-
-    def is_old(row: Row) -> bool:
-        m = planned.get(row["key"])
-        return m is not None and outdated(row, m, solvers[m.solver, m.variant], scene_keys[m.scene])
-
-    old = [row for row in rows if is_old(row)]
-    if old:
-        for row in old:
-            records.append(directory / records.OUTDATED, row | {"answer": None})
-        rows = [row for row in rows if row not in old]
-        records.rewrite(path, rows)
-        why = "the scene, the solver or the limits have changed since"
-        console.print(f"{len(old)} rows are set aside in {records.OUTDATED}: {why}", style="yellow")
-    return rows
-
-
-def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
-    """Whether a row is of another scene, solver or accuracy, or was ended by a limit that is wider now."""
-    now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated)
-    asked = row.get("limit_asked_mm", row.get("limit_mm"))  # rows once had the one limit alone
-    before = (*(row.get(k) for k in ("scene_key", "solver_version", "solver_code")), asked, row.get("gated"))
-    out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
-    out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
-    return now != before or out_of_time or out_of_memory
 
 
 def refuse_what_cannot_fit(plan: list[Measurement]) -> None:

@@ -7,13 +7,10 @@ from typing import Annotated
 
 import typer
 
-from .console import option, reported
+from .console import SceneName, option, reported
 
 app = typer.Typer(rich_markup_mode=None)
 
-SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or own matrices .npz.")
-]
 SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .console import Scheduler, option, reported
+from .console import Plugin, SceneName, Scheduler, option, reported
 
 if TYPE_CHECKING:
     from problems.load_cases import LoadCases
@@ -20,9 +20,7 @@ SEED = 0
 
 @app.command()
 def series(
-    scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or own matrices .npz.")
-    ],
+    scene: SceneName,
     out: Annotated[Path, option("DIR", "Where rows, gaps and report go.")],
     cases: Annotated[
         int | None, option("N", "How many cases.  [default: 100 random ones; all of a table]", min=1)
@@ -52,7 +50,7 @@ def series(
         int, option("N", "Compare every N-th case with the certified reference; 0: none.", min=0)
     ] = 100,
     threads: Annotated[int, option("N", "Threads of the linear algebra.", min=1)] = 2,
-    plugin: Annotated[Path | None, option("FILE", "Python file with a solver of your own.")] = None,
+    plugin: Plugin = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
@@ -81,10 +79,10 @@ def series(
         from problems.scene import read_scene
         from solvers.registry import make_solver, solver_version
 
-        from .describe import code_of
         from .series.desk import Job
         from .series.run import run
         from .series.store import CASES
+        from .solver_code import code_of
 
         random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
         drawn = [name for name, value in random.items() if value is not None]
@@ -123,7 +121,7 @@ def series(
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin)  # type: ignore[arg-type]
         facts = {
             "solver_version": solver_version(solver, plugin),
-            "solver_code": code_of(type(made).__module__),
+            "solver_code": code_of(made),
         }
         code = run(job, facts, out, console, scheduler)
         if (out / CASES).is_file():

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from .plan import Measurement
-
-Row = dict[str, Any]
+from .records import Row
 
 GROWTH = 2.5  # seconds ~ n^GROWTH, between the n² of a product and the n³ of a factorisation
 SCENE = ("scene", "")  # the step of opening or building one

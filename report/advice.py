@@ -7,7 +7,7 @@ import pandas as pd
 from .labels import in_order
 from .numbers import counted, listed, significant
 from .rows import Results
-from .standings import TIE, geometric_mean, seconds_within
+from .standings import TIE, geometric_mean, preferred, seconds_within
 
 
 def advice(results: Results, n: int) -> str | None:
@@ -32,9 +32,7 @@ def _range(cells: pd.DataFrame) -> str:
 
 def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list[str]:
     scenes = len(complete)
-    means = complete.apply(geometric_mean).sort_values()
-    series = cells.drop_duplicates("label").set_index("label")["series"]
-    means = means[~series[means.index].duplicated().to_numpy()]  # of several tolerances, the fastest
+    means = preferred(complete.apply(geometric_mean), cells)["seconds"]
     best, time = str(means.index[0]), float(means.iloc[0])
     every = {1: "the one scene", 2: "both scenes"}.get(scenes, f"all {scenes} scenes")
     mean = "" if scenes == 1 else " (geometric mean)"

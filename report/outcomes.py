@@ -11,9 +11,6 @@ RIGHT, DOUBTED = "right, called solved", "right, not called solved"
 KNEW, LIED = "wrong, not called solved", "wrong, called solved"
 NONE, UNJUDGED = "no answer", "cannot be judged"
 
-#: From best to worst; the wrong answer that is called solved is the worst that a solver can give.
-OUTCOMES = (RIGHT, DOUBTED, UNJUDGED, NONE, KNEW, LIED)
-
 
 def outcome(row: Mapping[str, Any] | pd.Series[Any]) -> str:
     """Right is within the row's limit."""

@@ -42,6 +42,22 @@ def seconds_within(cells: pd.DataFrame) -> pd.DataFrame:
     return table.reindex(index=cells.drop_duplicates("scene").sort_values("active")["scene"])
 
 
+def preferred(seconds: pd.Series[float], cells: pd.DataFrame) -> pd.DataFrame:
+    """A line a series with the setting to use, the fastest first: `label` (the index), `series`,
+    `tolerance` and `seconds`.
+
+    It is the tightest tolerance of those that are as fast as the series' fastest: what costs nothing
+    is not given away.
+
+    seconds : by label, of the settings that come into question.
+    """
+    known = cells.drop_duplicates("label").set_index("label")[["series", "tolerance"]].loc[seconds.index]
+    known = known.assign(seconds=seconds)
+    as_fast = known["seconds"] <= TIE * known.groupby("series")["seconds"].transform("min")
+    tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("series")
+    return tightest.sort_values("seconds")
+
+
 def compare(results: Results, n: int) -> Comparison:
     seconds = seconds_within(results.of_size(n))
     compared = seconds.loc[:, seconds.notna().sum() * 2 > len(seconds)]

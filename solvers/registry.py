@@ -32,8 +32,8 @@ SOLVERS = {
     "piqp": "solvers.with_piqp:Piqp",
 }
 
-#: Where the distribution that is installed has another name than the solver.
 IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
+#: Where the distribution that is installed has another name than the solver.
 DISTRIBUTIONS = dict.fromkeys(IN_HOUSE, "rivetbench") | {"proxqp": "proxsuite", "highs": "highspy"}
 
 

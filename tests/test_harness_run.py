@@ -117,19 +117,20 @@ def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
     assert json.loads(again[3])["key"] == json.loads(lines[3])["key"]
 
 
-def test_rows_of_another_scene_or_limit_are_set_aside(copy: Path, folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["scene_key", "solver_version", "solver_code"])
+def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path, name: str) -> None:
     suite = read_suite(str(folder / "small.toml"))
     solver = suite.solver[1].model_copy(update={"tolerances": [1e-6]})
     suite = suite.model_copy(update={"solver": [solver]})
     rows = rows_of(copy)
     for row in rows:
-        row["scene_key"] = "of an older scene" if row["tolerance"] == 1e-6 else row["scene_key"]
+        row[name] = "an older one" if row["tolerance"] == 1e-6 else row[name]
     records.rewrite(copy / records.MEASUREMENTS, rows)
     code, text = said_by(run, suite, copy)
     assert code == 0
     assert "1 rows are set aside" in text
     (aside,) = records.read(copy / records.OUTDATED)
-    assert (aside["scene_key"], aside["answer"]) == ("of an older scene", None)
+    assert (aside[name], aside["answer"]) == ("an older one", None)
     assert len(rows_of(copy)) == 4
 
 

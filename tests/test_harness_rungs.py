@@ -11,7 +11,8 @@ from rich.console import Console
 
 from harness import records
 from harness.gate import gate
-from harness.plan import Overrides, expand, overridden
+from harness.overrides import Overrides, overridden
+from harness.plan import expand
 from harness.run import run
 from harness.suite import Suite, read_suite
 from problems.errors import InputError

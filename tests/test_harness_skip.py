@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from harness.hopeless import out_of_time_before
 from harness.plan import expand
-from harness.run import out_of_time_before
 from harness.suite import checked
 
 

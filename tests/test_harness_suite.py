@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import tiny
 
-from harness.plan import Measurement, Overrides, expand, overridden
+from harness.overrides import Overrides, overridden
+from harness.plan import Measurement, expand
 from harness.run import refuse_what_cannot_fit
 from harness.suite import Suite, checked, read_suite, suite_names, to_toml, validated
 from problems.errors import InputError

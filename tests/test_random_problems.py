@@ -1,6 +1,6 @@
 """Every solver on random small problems whose answer is exact: rational, chosen, or proven.
 
-RIVETBENCH_LONG=1 takes thousands of them instead of a few dozen.
+RIVETBENCH_LONG=1 takes thousands of them instead of a few hundred.
 """
 
 from __future__ import annotations

@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from problems.errors import InputError
+from report import labels
 from solvers.plugin import load_plugin
-from solvers.registry import SOLVERS, make_solver, solver_names, solver_version
+from solvers.registry import IN_HOUSE, SOLVERS, make_solver, solver_names, solver_version
 from solvers.with_osqp import Osqp
 
 NAMES = solver_names()
@@ -20,6 +21,12 @@ def test_registry_names_in_house_libraries_and_what_qpsolvers_finds() -> None:
     assert NAMES[: len(SOLVERS)] == list(SOLVERS)
     assert {"quadprog", "daqp"} <= set(NAMES)
     assert len(NAMES) == len(set(NAMES))
+
+
+def test_the_report_counts_the_same_solvers_as_in_house() -> None:
+    """It reads results alone, so it has the names a second time."""
+    assert labels.IN_HOUSE == IN_HOUSE
+    assert set(SOLVERS) == {*IN_HOUSE, *LIBRARIES} <= {*labels.ORDER}
 
 
 @pytest.mark.parametrize("name", LIBRARIES)

@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from synthetic_results import no_answer, row, write_rows
 
 from report import style
+from report.advice import advice
 from report.blocks import Figure, Section, Table, Text
 from report.build import write
 from report.checks import planned_measurements
@@ -289,6 +290,21 @@ def test_the_recommendation_follows_the_times(tmp_path: Path) -> None:
     found = advised(results(tmp_path / "c", coarse))
     assert found.loc[1e-3, "use"] == "late (dual)"
     assert found.loc[1e-9, "use"] == "nothing reaches it"
+
+
+@pytest.mark.parametrize(("seconds", "tolerance"), [(0.9, "1e-10"), (1.14, "1e-10"), (1.16, "1e-4")])
+def test_of_tolerances_as_fast_the_tightest_is_advised(
+    tmp_path: Path, seconds: float, tolerance: str
+) -> None:
+    """At 1e-4 a takes 1 s, at 1e-7 1.5 s, at 1e-10 `seconds`; all reach 1e-10 mm. b is another solver."""
+    prices = {4: 1.0, 7: 1.5, 10: seconds}
+    rows = [answer(s, "a", k, t, 1e-10) for s in (LOW, HIGH) for k, t in prices.items()]
+    rows += [answer(s, "b", k, 1.145, 1e-10) for s in (LOW, HIGH) for k in (5, 8, 11)]
+    found = results(tmp_path, rows)
+    line = advised(found).loc[1e-9]
+    assert line[["use", "tolerance"]].tolist() == ["a (dual)", float(tolerance)]
+    assert line["seconds"] == pytest.approx(prices[int(tolerance[3:])])
+    assert f"use **a (dual) {tolerance}**" in (advice(found, 4386) or "")
 
 
 def test_ties_are_named(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from ..blocks import Section, Table, number, word
 from ..numbers import listed, power, significant, tidy_power, whole
 from ..precision import ACCURACIES, judged, settings, swept
 from ..rows import Results
-from ..standings import TIE
+from ..standings import TIE, preferred
 
 
 def section(results: Results) -> Section | None:
@@ -27,8 +27,9 @@ def section(results: Results) -> Section | None:
         word(f"as fast, to within {TIE - 1:.0%}", "ties"),
     ]
     caption = (
-        "*The fastest settings whose error was small enough on every scene of the size*; seconds are the "
-        "geometric mean over the scenes, without what is paid once an assembly."
+        "*The fastest settings whose error was small enough on every scene of the size*, of a solver's "
+        "tolerances that are as fast the tightest; seconds are the geometric mean over the scenes, without "
+        "what is paid once an assembly."
     )
     table = Table("recommendation", caption, pd.DataFrame(lines), columns)
     return Section("Which settings for which accuracy", [table])
@@ -44,9 +45,7 @@ def recommended(cells: pd.DataFrame, accuracy: float) -> dict[str, Any]:
     seconds = settings(cells, accuracy)
     if seconds.empty:
         return line
-    known = cells.drop_duplicates("label").set_index("label").loc[seconds.index].assign(seconds=seconds)
-    known = known.drop_duplicates("series")  # of several tolerances, the fastest
-    best, *others = known.to_dict("records")
+    best, *others = preferred(seconds, cells).to_dict("records")
     ties = [_tie(other) for other in others if other["seconds"] <= TIE * best["seconds"]]
     line |= {"use": best["series"], "tolerance": best["tolerance"], "seconds": best["seconds"]}
     return line | {"ties": listed(ties) if ties else ""}

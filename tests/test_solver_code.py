@@ -1,0 +1,93 @@
+"""The hash of a solver's code: what it does counts, what is said of it does not, nor do other solvers."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from harness.solver_code import PACKAGE, code_of, hash_of
+from solvers.registry import IN_HOUSE, SOLVERS, make_solver
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(PACKAGE, tmp_path / "solvers", ignore=shutil.ignore_patterns("__pycache__")))
+
+
+def change(file: Path, old: str, new: str) -> None:
+    text = file.read_text("utf-8")
+    assert text.count(old) == 1, f"{file.name} has {text.count(old)} of {old!r}"
+    file.write_text(text.replace(old, new), "utf-8")
+
+
+def hashes(package: Path) -> dict[str, str]:
+    files = {name: place.partition(":")[0].partition(".")[2] for name, place in SOLVERS.items()}
+    return {name: hash_of(package / f"{file}.py", package) for name, file in files.items()}
+
+
+def changed(package: Path, before: dict[str, str]) -> set[str]:
+    return {name for name, now in hashes(package).items() if now != before[name]}
+
+
+def test_a_copy_elsewhere_has_the_same_hash(package: Path) -> None:
+    assert hashes(package)["newton"] == code_of(make_solver("newton", {}))
+    assert len(set(hashes(package).values())) == len(SOLVERS)
+
+
+def test_words_and_layout_do_not_count(package: Path) -> None:
+    before = hashes(package)
+    for file in package.glob("*.py"):
+        text = file.read_text("utf-8")
+        file.write_text(f'{text}\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n')
+    added = hashes(package)
+    assert changed(package, before) == set(SOLVERS)  # a function is code
+    for file in package.glob("*.py"):
+        change(file, '\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n', (
+            '\n# another comment\ndef _unused() -> None:  # more\n    """Other\n    words."""\n'
+        ))  # fmt: skip
+    change(package / "base.py", '"""No answer, and why."""', '"""There is none, for this cause."""')
+    change(package / "base.py", '"""What a solver is:', '"""What is meant by a solver:')
+    assert changed(package, added) == set()
+
+
+def test_a_constant_two_imports_down_counts_for_those_who_use_it(package: Path) -> None:
+    before = hashes(package)
+    # newton → active_set → kkt; gi and ipm-fast end on the same way; ipm and the libraries do not
+    change(package / "kkt.py", "EPS = float(np.finfo(float).eps)", "EPS = 2 * float(np.finfo(float).eps)")
+    assert changed(package, before) == {"newton", "gi", "ipm-fast"}
+
+
+def test_what_all_are_made_of_counts_for_all(package: Path) -> None:
+    before = hashes(package)
+    change(package / "base.py", 'Answer("failed", None,', 'Answer("inaccurate", None,')
+    assert changed(package, before) == set(SOLVERS)
+
+
+def test_a_library_does_not_depend_on_the_solvers_of_the_house(package: Path) -> None:
+    before = hashes(package)
+    (package / "with_osqp.py").write_text("OTHER = 1\n")
+    (package / "newton.py").write_text("OTHER = 1\n")
+    assert changed(package, before) == {"osqp", "newton"}
+    (package / "adapter.py").write_text("OTHER = 1\n")
+    assert changed(package, before) == {*SOLVERS} - {*IN_HOUSE} | {"newton"}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from solvers.kkt import EPS",
+        "from solvers import kkt",
+        "import solvers.kkt as k",
+        "def solve():\n    from solvers.kkt import EPS",
+    ],
+)
+def test_a_plugin_depends_on_what_it_imports(package: Path, tmp_path: Path, line: str) -> None:
+    mine, alone = tmp_path / "mine.py", tmp_path / "alone.py"
+    mine.write_text(f"import numpy as np\nfrom solvers.base import Solver\n{line}\n")
+    alone.write_text("import numpy as np\nfrom solvers.base import Solver\n")
+    before = [hash_of(file, package) for file in (mine, alone)]
+    (package / "kkt.py").write_text("EPS = 0.0\n")
+    after = [hash_of(file, package) for file in (mine, alone)]
+    assert [a == b for a, b in zip(after, before, strict=True)] == [False, True]
