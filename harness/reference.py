@@ -61,7 +61,7 @@ def made_reference(made: Made, prepared: Prepared) -> Reference:
 def reference(scene_key: str, prepared: Prepared, load: LoadCase) -> Reference:
     """The reference of a scene, from the cache if it was computed before."""
     built = prepared.facts.get("seconds")
-    key = cache.digest("reference", 3, scene_key, built, load.f.tobytes(), load.g.tobytes())
+    key = cache.digest("reference", 4, scene_key, built, load.f.tobytes(), load.g.tobytes())
     found = cache.load(key)
     if found is None:
         made = refined_active_set(prepared, load)
@@ -77,7 +77,7 @@ def proven_lambda_min(prepared: Prepared) -> float:
     """κ ≤ λmin(K), from the cache if it was proven before for this assembly."""
     facts, blocks = prepared.facts, prepared.assembly.blocks
     measured = facts.get("lambda_min"), facts.get("seconds")
-    key = cache.digest("lambda_min", 1, *measured, [float(np.trace(K)) for K in blocks])
+    key = cache.digest("lambda_min", 2, *measured, [float(np.trace(K)) for K in blocks])
     found = cache.load(key) if None not in measured else None
     if found is not None:
         return float(found[1]["kappa"])
