@@ -20,9 +20,7 @@ def side_by_side(cases: Sequence[LoadCase]) -> LoadCase:
 def loads_of(cases: Sequence[LoadCase], prepared: Prepared) -> list[Load]:
     """The cases with p = AᵀK⁻¹f − g, read-only; K⁻¹f once where they share their f."""
     p = prepared.dual_load(side_by_side(cases)).T
-    loads = [
-        Load(case.f, case.g, np.ascontiguousarray(mine)) for case, mine in zip(cases, p, strict=True)
-    ]
+    loads = [Load(case.f, case.g, np.ascontiguousarray(mine)) for case, mine in zip(cases, p, strict=True)]
     for load in loads:
         for array in (load.f, load.g, load.p):
             array.flags.writeable = False

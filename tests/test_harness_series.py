@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import tiny
 from rich.console import Console
@@ -25,6 +26,7 @@ from problems.errors import InputError
 from problems.prepare import prepared
 from problems.random_gaps import random_gaps
 from problems.scene import read_scene
+from report.sections.series import compared
 
 SUITE = """
 scenes = ["strip.toml"]
@@ -43,7 +45,9 @@ name = "piqp"
 forms = ["primal"]
 tolerances = [1e-11]
 """
-TOGETHER = SUITE.partition("[[solver]]")[0] + """
+TOGETHER = (
+    SUITE.partition("[[solver]]")[0]
+    + """
 [[solver]]
 name = "newton"
 tolerances = [1e-11]
@@ -58,12 +62,16 @@ name = "faulty"
 variant = "together"
 together = 2
 """
-FAULTY = SUITE.partition("[[solver]]")[0] + """
+)
+FAULTY = (
+    SUITE.partition("[[solver]]")[0]
+    + """
 [[solver]]
 name = "faulty"
 time_limit_s = 2
 options = { fault = "third", how = "FAULT" }
 """
+)
 THIRD = """
     seen = 0
 
@@ -77,7 +85,7 @@ THIRD = """
 def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("series")
     write_strip(folder)
-    with_how = ("fault=\"none\"):", "fault=\"none\", how=\"none\"):\n        self.how = how")
+    with_how = ('fault="none"):', 'fault="none", how="none"):\n        self.how = how')
     (folder / "faulty.py").write_text(tiny.FAULTY.replace(*with_how) + THIRD)
     (folder / "two.toml").write_text(SUITE)
     (folder / "together.toml").write_text(TOGETHER)
@@ -230,8 +238,49 @@ def test_repeats_of_a_series_stay_together(tmp_path: Path) -> None:
 
 def test_the_table_of_the_report() -> None:
     made("two.toml", "reported")
-    from report.build import write
+    from report.build import write as report
 
-    text = write(Path("reported")).read_text()
+    text = report(Path("reported")).read_text()
     assert "## Series of load cases" in text
     assert len(re.findall(r"\| +4 of 4 \|", text)) == 2
+    assert "PIQP `update`" in text
+    assert "OSQP" not in text.partition("## Series")[2].partition("##")[0]
+    assert "How stable" not in text  # cases are no repeats
+
+
+def test_a_report_without_a_library_and_with_cases_that_failed() -> None:
+    made("together.toml", "alone")
+    from report.build import write as report
+
+    text = report(Path("alone")).read_text()
+    assert "*Together* is given many" in text
+    assert re.search(r"newton \(dual\) together +\| +4 of 4 \| .* – \|", text)
+    assert re.search(r"faulty \(dual\) together +\| +0 of 4 \| +– \|", text)
+
+
+def test_ratios_are_to_the_fastest_librarys_next_case() -> None:
+    """By hand: with one thread PIQP's median is 4 s, with two ProxQP's is 2 s; Clarabel is never within."""
+    seconds = {
+        ("piqp", 1): [9, 3, 4, 5],
+        ("proxqp", 1): [1, 6, 6, 6],  # a first case is no next one
+        ("clarabel", 1): [1, 1, 1, 1],
+        ("newton", 1): [9, 0.5, 1, 3],
+        ("piqp", 2): [9, 3, 3, 3],
+        ("proxqp", 2): [9, 1, 2, 9],
+        ("newton", 2): [9, 0.5, 0.5, 0.5],
+    }
+    lines = [
+        {
+            **{"machine": "a", "scene": "s", "solver": solver, "form": "dual", "variant": ""},
+            **{"tolerance": 1e-9, "threads": threads, "case": k, "warm": float(k > 0)},
+            "verdict": "outside" if solver == "clarabel" else "within",
+            **{"setup_s": np.nan, "solve_s": 0.75 * times[k], "form_s": 0.25 * times[k]},
+        }
+        for (solver, threads), times in seconds.items()
+        for k in range(4)
+    ]
+    found = compared(pd.DataFrame(lines)).set_index(["solver", "threads"])["to_library"]
+    np.testing.assert_allclose(found["newton", 1], [np.nan, 0.125, 0.25, 0.75])
+    np.testing.assert_allclose(found["newton", 2], [np.nan, 0.25, 0.25, 0.25])
+    np.testing.assert_allclose(found["proxqp", 2], [np.nan, 0.5, 1.0, 4.5])
+    assert found["clarabel", 1].isna().all()
