@@ -44,6 +44,7 @@ class Measurement:
     yardstick: bool = False
     series: RandomCases | None = None
     case: int | None = None
+    together: int | None = None
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -55,6 +56,7 @@ class Measurement:
         """Identity of the measurement, the same in every run: '4386/0107 ipm dual tol=1e-09 …'."""
         words = [self.scene, self.solver, self.form, *([self.variant] if self.variant else [])]
         words += [f"tol={self.tolerance:g}", f"threads={self.threads}", f"repeat={self.repeat}"]
+        words += [] if self.together is None else [f"together={self.together}"]
         words += [] if self.case is None else [f"case={self.case}"]
         return " ".join(words + ([json.dumps(self.options, sort_keys=True)] if self.options else []))
 
@@ -123,9 +125,12 @@ def _of_entry(
 ) -> Iterator[Measurement]:
     tolerances = entry.tolerances or suite.tolerances
     n, _ = read_scene(source).expected_size or (0, 0)
-    cases = range(suite.series.cases) if suite.series else (None,)
-    forms, threads_of_entry = entry.forms or FORMS, entry.threads or suite.threads
-    for form, tolerance, threads, case in product(forms, tolerances, threads_of_entry, cases):
+    threads_asked = entry.threads or suite.threads
+    series = suite.series
+    if series is not None and entry.cases is not None:
+        series = series.model_copy(update={"cases": entry.cases})
+    cases = range(series.cases) if series else (None,)
+    for form, tolerance, threads, case in product(entry.forms or FORMS, tolerances, threads_asked, cases):
         yield Measurement(
             suite=suite.name,
             scene=scene,
@@ -143,8 +148,9 @@ def _of_entry(
             gated=entry.gated,
             plugin=suite.plugin,
             yardstick=suite.yardstick,
-            series=suite.series,
+            series=series,
             case=case,
+            together=entry.together,
         )
 
 

@@ -40,10 +40,15 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
 
 
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
-    """Whether a row is of another scene, solver or accuracy, or was ended by a limit that is wider now."""
-    now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated)
+    """Whether a row is of another scene, random field, solver or accuracy, or was ended by a limit that is
+    wider now.
+    """
+    law = m.series.model_dump(exclude={"cases"}) if m.series else {}
+    now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated, law)
     asked = row.get("limit_asked_mm", row.get("limit_mm"))  # rows once had the one limit alone
-    before = (*(row.get(k) for k in ("scene_key", "solver_version", "solver_code")), asked, row.get("gated"))
+    drawn = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
+    solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
+    before = (*solved, asked, row.get("gated"), drawn)
     out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
     return now != before or out_of_time or out_of_memory

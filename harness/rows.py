@@ -28,6 +28,8 @@ TOLD = (
     *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details"),
     *("cholesky_s", "product_s", "stderr", "answer"),
 )
+#: The same of a case of a series: how many were solved at once, and whether others were before.
+TOLD_OF_SERIES = ("together", "warm")
 CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
 
 
@@ -104,6 +106,9 @@ def one_row(
     limit_mm, judgement = base.limit_mm(m.limit_mm), Judgement("no_answer", base.reference.bound_mm)
     if told.get("answer"):
         judgement = base.judge_file(answer, limit_mm)
+    of_series: Row = {"case": m.case, "series": series, **{name: told.get(name) for name in TOLD_OF_SERIES}}
+    if m.case is None:
+        of_series = {}
     told = {name: told.get(name) for name in TOLD}
     known = [told[name] for name in CLOCKS if told[name] is not None]
     return {
@@ -115,7 +120,7 @@ def one_row(
         **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated")},
         "limit_mm": limit_mm,
         "limit_asked_mm": m.limit_mm,
-        **({} if m.case is None else {"case": m.case, "series": series}),
+        **of_series,
         "threads_asked": m.threads,
         **told,
         **asdict(judgement),

@@ -32,7 +32,8 @@ Some = Field(min_length=1)
 class SolverEntry(BaseModel):
     """One [[solver]]: how it is called, and what it is measured on.
 
-    Without `forms` it is the dual, or the primal of a solver that takes that only.
+    Without `forms` it is the dual, or the primal of a solver that takes that only. `threads` and `cases` go
+    before the suite's. together : of a series so many load cases at once, by the solver's `together`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -45,6 +46,8 @@ class SolverEntry(BaseModel):
     scenes: Annotated[list[str], Some] | None = None
     repeats: PositiveInt | None = None
     threads: Annotated[list[PositiveInt], Some] | None = None
+    cases: PositiveInt | None = None
+    together: PositiveInt | None = None
     gated: bool = True
     time_limit_s: PositiveFloat | None = None
 
@@ -132,7 +135,7 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
     except ValidationError as error:
         faults += validation_faults(path, Suite, error)
     else:
-        faults += _twice(suite, path)
+        faults += [*_twice(suite, path), *_of_no_series(suite, path)]
     if faults:
         raise InputError(faults)
     return suite
@@ -174,11 +177,20 @@ def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
 
 def _twice(suite: Suite, path: Path) -> Iterator[Fault]:
     """Entries that a table could not tell apart."""
-    options: dict[tuple[str, str], dict[str, Any]] = {}
+    above: dict[tuple[str, str], tuple[object, bool]] = {}
     for k, entry in enumerate(suite.solver):
-        if options.setdefault((entry.name, entry.variant), entry.options) != entry.options:
-            allowed = f"{entry.name} stands above with other options under this variant; name another"
+        way = entry.options, entry.together is not None
+        if above.setdefault((entry.name, entry.variant), way) != way:
+            what = "options" if above[entry.name, entry.variant][0] != entry.options else "`together`"
+            allowed = f"{entry.name} stands above with other {what} under this variant; name another"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
+
+
+def _of_no_series(suite: Suite, path: Path) -> Iterator[Fault]:
+    for k, entry in enumerate(suite.solver):
+        for key in ("cases", "together"):
+            if suite.series is None and (value := getattr(entry, key)) is not None:
+                yield Fault(str(path), f"solver.{k}.{key}", value, "is for a suite with [series]")
 
 
 def to_toml(suite: Suite) -> str:

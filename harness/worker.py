@@ -3,8 +3,8 @@
 `python -m harness.worker`, with a job as the first line of stdin; events go back as JSON lines on the
 file descriptor that the job names. Every event is a piece of the row: the driver merges them, so that
 what is known of a killed worker is kept. An event with `phase` (start, solve, save) starts the clock of
-another limit, the one with `status` ends the measurement, or the case of a series that is due; after the
-last one the worker waits to be ended.
+another limit, the one with `status` ends the measurement, or the case of a series that is due, and with
+`ended` those after it too; then the worker waits to be ended.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar
 
 import numpy as np
 import threadpoolctl
@@ -28,9 +28,11 @@ import threadpoolctl
 from problems.assembly import LoadCase, Prepared, Vector
 from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
-from solvers.base import Answer, Load, Problem, Solver, Status
+from solvers.base import Answer, Problem, Solver, Together
 from solvers.registry import make_solver
 
+from .answers import Refused, checked, save
+from .loads import loads_of, recovered
 from .machine import resident_mib
 from .records import to_line
 from .warm_starts import WarmStarts
@@ -43,8 +45,8 @@ Row = dict[str, Any]
 T = TypeVar("T")
 
 
-class Refused(Exception):
-    """The answer cannot be taken; the text says why."""
+class Unsupported(Exception):
+    """The solver does not take the job; the text says what it takes."""
 
 
 def main() -> None:
@@ -53,14 +55,19 @@ def main() -> None:
     faulthandler.enable()
     run = Run(job)
     try:
-        end = run.measured()
+        for end in run.ends():
+            run.tell(**end)
+        end = {}
     except MemoryError as error:
         end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
     except Refused as error:
         end = {"status": "failed", "message": str(error)}
+    except Unsupported as error:
+        end = {"status": "unsupported", "message": str(error)}
     except BaseException as error:
         end = {"status": "failed", "message": f"{type(error).__name__}: {error}"[:2000]}
-    run.tell(**{"answer": None, **end})
+    if end:
+        run.tell(**end, answer=None, ended=True)
     sys.stdin.read()
     os._exit(0)
 
@@ -99,60 +106,106 @@ class Run:
         with self.lap(name):
             return call()
 
-    def measured(self) -> Row:
-        """Solve the job's load cases. How the last one ended is returned; of the others it is told here."""
+    def ends(self) -> Iterator[Row]:
+        """Solve the job's load cases; how each ended."""
         job = self.job
         solver = make_solver(job["solver"], job["options"], Path(job["plugin"]) if job["plugin"] else None)
         if job["form"] not in solver.forms:
-            return {"status": "unsupported", "message": f"takes {' and '.join(solver.forms)} only"}
+            raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.lap("load_s"):
             scene = read_scene(job["source"])
             data = prepared(scene)
             cases = list(load_cases(scene, data, job))
             touch(data, job["form"])
         series = Series(solver, Problem(data, job["form"]), job["tolerance"])
-        *others, last = zip(cases, job["answers"], strict=True)
-        for case, answer in others:
-            self.tell(**self.solved(series, case, Path(answer)))
-        return self.solved(series, last[0], Path(last[1]))
+        files, at_once = list(map(Path, job["answers"])), job["together"]
+        if at_once is None:
+            for case, file in zip(cases, files, strict=True):
+                yield self.solved(series, case, file)
+            return
+        for start in range(0, len(cases), at_once):
+            some = slice(start, start + at_once)
+            yield from self.solved_together(series, cases[some], files[some])
 
     def solved(self, series: Series, case: LoadCase, answer_file: Path) -> Row:
         """Solve one load case and save its answer; how that ended."""
         data, form, tolerance = series.problem.prepared, series.problem.form, series.tolerance
         start = time.perf_counter()
-        load = Load(case.f, case.g, data.dual_load(case))
+        (load,) = loads_of([case], data)
         form_s = time.perf_counter() - start
-        for array in (load.f, load.g, load.p):
-            array.flags.writeable = False
         near = series.starts.nearest(load)
 
-        self.tell(phase="solve", **({} if series.begun else {"data_mib": resident_mib("VmRSS")}))
+        self.begin(series)
         solver = series.solver
-        if not series.begun:
-            converted = self.timed("convert_s", lambda: solver.convert(series.problem))
-            series.state = self.timed("prepare_s", lambda: solver.prepare(converted))
-            series.begun = True
         set_up = partial(solver.setup, series.state, load, tolerance)
         if near is not None:
             set_up = partial(solver.update, series.state, series.ready, load, tolerance, near[1])
         series.ready = self.timed("setup_s", set_up)
         answer = self.timed("solve_s", lambda: solver.solve(series.ready, load, tolerance))
         said = checked(answer, data, form)
-        x, lam = answer.x, answer.lam
-        if form == "dual" and lam is not None:
+        x = answer.x
+        if form == "dual" and answer.lam is not None:
             with self.lap("form_s", form_s):
-                x = data.recover(np.asarray(lam, dtype=float), case)
+                x = data.recover(np.asarray(answer.lam, dtype=float), case)
+        end = self.saved(answer, x, answer_file, data, said | {"warm": near is not None})
+        series.starts.keep(load, answer)
+        return end
+
+    def solved_together(
+        self, series: Series, cases: Sequence[LoadCase], answer_files: Sequence[Path]
+    ) -> Iterator[Row]:
+        """The same for load cases solved at once; each has an equal share of the seconds."""
+        data, form, tolerance = series.problem.prepared, series.problem.form, series.tolerance
+        start = time.perf_counter()
+        loads = loads_of(cases, data)
+        form_s = time.perf_counter() - start
+
+        warm = series.begun
+        self.begin(series)
+        if series.together is None:
+            raise Unsupported("takes one load case at a time")
+        start = time.perf_counter()
+        answers = series.together(loads, tolerance)
+        solve_s = time.perf_counter() - start
+        if len(answers) != len(loads):
+            raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
+        said = [checked(answer, data, form) for answer in answers]
+        found = [answer.x for answer in answers]
+        if form == "dual":
+            start = time.perf_counter()
+            found = recovered([answer.lam for answer in answers], cases, data)
+            form_s += time.perf_counter() - start
+        k = len(cases)
+        shares: Row = {"together": k, "warm": warm, "solve_s": solve_s / k, "form_s": form_s / k}
+        for answer, x, file, facts in zip(answers, found, answer_files, said, strict=True):
+            yield self.saved(answer, x, file, data, facts | shares)
+
+    def begin(self, series: Series) -> None:
+        """The clock of the solver starts; before the first load case it converts and prepares."""
+        if series.begun:
+            self.tell(phase="solve")
+            return
+        self.tell(phase="solve", data_mib=resident_mib("VmRSS"))
+        solver = series.solver
+        converted = self.timed("convert_s", lambda: solver.convert(series.problem))
+        with self.lap("prepare_s"):
+            series.state = solver.prepare(converted)
+            if self.job["together"] is not None:
+                series.together = solver.together(series.state)
+        series.begun = True
+
+    def saved(self, answer: Answer, x: Vector | None, file: Path, data: Prepared, said: Row) -> Row:
+        """Tell what the solver said, and save its answer; how the case ended."""
         self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
         if self.job["yardstick"]:
             self.tell(**yardstick(data.Q))
-        series.starts.keep(load, answer)
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
-            save(answer_file, x, lam, data.assembly.m)
+            save(file, x, answer.lam, data.assembly.m)
         except OSError as error:
-            return {"status": "failed", "cannot_save": f"{answer_file}: {error}"}
-        return {"status": answer.status, "answer": f"answers/{answer_file.name}"}
+            return {"status": "failed", "answer": None, "cannot_save": f"{file}: {error}"}
+        return {"status": answer.status, "answer": f"answers/{file.name}"}
 
 
 class Series:
@@ -162,6 +215,7 @@ class Series:
         self.solver, self.problem, self.tolerance = solver, problem, tolerance
         self.state: Any = None
         self.ready: Any = None
+        self.together: Together | None = None
         self.starts = WarmStarts(problem)
         self.begun = False
 
@@ -183,39 +237,6 @@ def touch(data: Prepared, form: str) -> None:
     arrays = [*data.assembly.blocks, *data.factors, *([data.Q] if form == "dual" else [])]
     for array in arrays:
         array.ravel(order="K")[:: PAGE // array.itemsize].sum()
-
-
-def checked(answer: Answer, data: Prepared, form: str) -> Row:
-    """The solver's own figures; Refused where what it returned is no answer."""
-    if not isinstance(answer, Answer):
-        raise Refused(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
-    if answer.status not in get_args(Status):
-        raise Refused(f"status {answer.status!r}; allowed: {', '.join(get_args(Status))}")
-    if answer.status == "solved" and (answer.lam if form == "dual" else answer.x) is None:
-        raise Refused(f"says solved, and gives no {'lam' if form == 'dual' else 'x'}")
-    for name, value, size in (("lam", answer.lam, data.assembly.m), ("x", answer.x, data.assembly.n)):
-        if value is None:
-            continue
-        if np.shape(value) != (size,):
-            raise Refused(f"{name} has shape {np.shape(value)}; wanted ({size},)")
-        if not np.isfinite(np.asarray(value, dtype=float)).all():
-            raise Refused(f"{name} has NaN or infinity")
-    return {
-        "iterations": answer.iterations,
-        "inner_iterations": answer.inner_iterations,
-        "solver_reported_s": answer.reported_s,
-        "details": answer.details,
-    }
-
-
-def save(path: Path, x: Vector, lam: Vector | None, m: int) -> None:
-    """x (n,) in mm and lam (m,) in N, NaN where the solver gives none; the file appears whole."""
-    new = path.with_name(path.name + ".new")
-    with new.open("wb") as file:
-        np.savez(file, x=x, lam=np.full(m, np.nan) if lam is None else lam)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
 
 
 def threads_in_effect() -> Row:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from typing import Any
 
 MISSING = "–"
 
@@ -68,6 +70,17 @@ def listed(words: list[str]) -> str:
 def span(least: str, most: str) -> str:
     """'3 to 8', or '3' where both are the same."""
     return least if least == most else f"{least} to {most}"
+
+
+def spread(name: str) -> Callable[[Mapping[str, Any]], str]:
+    """Of a row, '0.12 (0.1 to 0.2)': its value of that name, and those that end in _least and _most."""
+
+    def text(row: Mapping[str, Any]) -> str:
+        middle = significant(row[name])
+        least, most = (significant(row[f"{name}_{end}"], 2) for end in ("least", "most"))
+        return middle if middle == MISSING else f"{middle} ({span(least, most)})"
+
+    return text
 
 
 def counted(number: int, word: str) -> str:

@@ -28,7 +28,7 @@ NUMBERS = (
     *("solver_reported_s", "displacement_error_mm", "limit_mm", "reference_bound_mm", "contact_mismatch"),
     *("min_gap_mm", "primal_residual", "dual_residual", "duality_gap", "peak_rss_mib"),
     *("threads_asked", "load_s", "overhead_s", "time_limit_s", "memory_limit_mib", "data_mib"),
-    *("limit_asked_mm", "backward_error", "cholesky_s", "product_s"),
+    *("limit_asked_mm", "backward_error", "cholesky_s", "product_s", "together", "warm"),
 )
 TEXTS = (
     *("key", "suite", "scene", "solver", "form", "variant", "status", "verdict", "machine"),

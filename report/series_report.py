@@ -13,7 +13,7 @@ from . import style
 from .blocks import Block, Column, Figure, Section, Table, Text, number
 from .build import save_block, template
 from .maps import draw
-from .numbers import listed, significant, tidy_power
+from .numbers import counted, listed, significant, tidy_power
 from .series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
 
 MAPPED = (0.5, 0.95, 0.99)
@@ -48,7 +48,7 @@ def _summary(series: Series) -> str:
     lines = [
         f"{facts['title']}. {sum(series.counts.values())} of {facts['cases']} cases solved with "
         f"`{identity['solver']}` ({identity['form']} form, tolerance {tidy_power(identity['tolerance'])}, "
-        f"{facts['threads']} threads) on {facts['machine']}: {counts}."
+        f"{counted(facts['threads'], 'thread')}) on {facts['machine']}: {counts}."
     ]
     if len(cases):
         bound = significant(cases["bound_mm"].max())
@@ -56,8 +56,8 @@ def _summary(series: Series) -> str:
         checked = cases["displacement_error_mm"].dropna()
         if len(checked):
             lines.append(
-                f"{len(checked)} of them were compared with the certified reference: at most "
-                f"{significant(checked.max())} mm off."
+                f"Of {counted(len(checked), 'case')} compared with the certified reference the largest error "
+                f"is {significant(checked.max())} mm."
             )
         seconds = sum(float(cases[name].sum()) for name in STEPS)
         told = {name: text for name, text in STEPS.items() if cases[name].notna().any()}
@@ -113,7 +113,7 @@ def _maps(name: str, caption: str, series: Series, shown: list[tuple[str, np.nda
     assert series.nodes is not None
     width, height = np.ptp(series.nodes, axis=0)
     strip = max(7.6 * height / (width or 1.0), 0.5)
-    drawing = style.figure(len(shown) * (min(strip, 4.0) + 0.42) + 0.5)
+    drawing = style.figure(len(shown) * (min(strip, 4.0) + 0.36) + 0.36)
     panels: list[Axes] = list(drawing.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
     low, high = min(float(v.min()) for _, v in shown), max(float(v.max()) for _, v in shown)
     norm = Normalize(min(0.0, low), high if high > 0 else 1.0)
@@ -132,15 +132,15 @@ def _exceedance(series: Series, target: Path) -> Figure:
     drawing = style.figure(3.2)
     axes: Axes = drawing.subplots()
     names = (
-        ("share_of_cases", "cases whose largest gap is above t"),
-        ("share_of_contacts", "contacts with a gap above t, mean"),
+        ("share_of_cases", "cases, by their\nlargest gap"),
+        ("share_of_contacts", "contacts, mean\nof the cases"),
     )
     for (name, label), (colour, line) in zip(names, LOOKS, strict=False):
         shown = curve[curve[name] > 0]
         axes.plot(shown["gap_mm"], 100 * shown[name], line, color=colour, label=label)
-    axes.set(yscale="log", xlabel="gap t, mm", ylabel="share, %", xlim=(0, None))
+    axes.set(yscale="log", xlabel="gap t, mm", ylabel="share with more than t, %", xlim=(0, None))
     style.plain_log(axes.yaxis)
-    axes.legend()
+    drawing.legend(loc="outside right upper")
     caption = (
         "*Exceedance: how often more than a gap t is left.* The lowest value that the cases can show is "
         f"{significant(100 / len(series.cases))} % of them."
@@ -159,7 +159,7 @@ def _convergence(series: Series, target: Path) -> Figure:
         axes.fill_between(lines["cases"], lines["low_mm"], lines["high_mm"], color=colour, alpha=0.15, lw=0)
     axes.set(xscale="log", xlabel="number of cases", ylabel="largest gap of a case, mm")
     style.plain_log(axes.xaxis)
-    axes.legend()
+    drawing.legend(loc="outside right upper")
     caption = (
         "*Are there enough cases? Quantiles of a case's largest gap over the first N cases.* Shaded: the "
         "distribution-free 95 % interval between order statistics, where N is large enough for one."
@@ -184,6 +184,6 @@ def _swept(series: Series, key: str, target: Path) -> Figure:
             found.index, found[f"{figure}_min"], found[f"{figure}_max"], color=colour, alpha=0.15, lw=0
         )
     axes.set(xlabel=key, ylabel="gap that is left, mm")
-    axes.legend()
+    drawing.legend(loc="outside right upper")
     caption = f"*The largest and the mean gap of a case over {key}.* Shaded: the range over the other keys."
     return Figure(name, caption, drawing)

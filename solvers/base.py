@@ -89,6 +89,10 @@ def failed(cause: str, iterations: int | None = None) -> Answer:
     return Answer("failed", None, iterations=iterations, details={"cause": cause})
 
 
+#: Takes many load cases of one assembly at once, and a tolerance: an answer to each load, in their order.
+Together = Callable[[Sequence[Load], float], list[Answer]]
+
+
 @dataclass(frozen=True)
 class Near:
     """The answer of the solved load case that is nearest to the one to come.
@@ -125,10 +129,10 @@ class Solver(ABC):
         """
         return self.setup(state, load, tolerance)
 
-    def together(self, state: Any) -> Callable[[Sequence[Load], float], list[Answer]] | None:
-        """Takes many load cases of the assembly at once, and a tolerance; None where there is no such way.
+    def together(self, state: Any) -> Together | None:
+        """What takes many load cases of the assembly at once; None where there is no such way.
 
-        state : from `prepare`. An answer to each load, in their order.
+        state : from `prepare`.
         """
         return None
 

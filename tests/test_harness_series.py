@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import tiny
 from rich.console import Console
@@ -20,9 +22,11 @@ from harness.gate import gate
 from harness.plan import expand
 from harness.run import batches, run
 from harness.suite import read_suite, to_toml, validated
+from problems.errors import InputError
 from problems.prepare import prepared
 from problems.random_gaps import random_gaps
 from problems.scene import read_scene
+from report.sections.series import compared
 
 SUITE = """
 scenes = ["strip.toml"]
@@ -41,17 +45,39 @@ name = "piqp"
 forms = ["primal"]
 tolerances = [1e-11]
 """
-LEAVES = SUITE.replace(
-    'name = "piqp"\nforms = ["primal"]', 'name = "faulty"\noptions = { fault = "third_leaves" }'
+TOGETHER = (
+    SUITE.partition("[[solver]]")[0]
+    + """
+[[solver]]
+name = "newton"
+tolerances = [1e-11]
+cases = 2
+[[solver]]
+name = "newton"
+variant = "together"
+together = 3
+tolerances = [1e-11]
+[[solver]]
+name = "faulty"
+variant = "together"
+together = 2
+"""
+)
+FAULTY = (
+    SUITE.partition("[[solver]]")[0]
+    + """
+[[solver]]
+name = "faulty"
+time_limit_s = 2
+options = { fault = "third", how = "FAULT" }
+"""
 )
 THIRD = """
     seen = 0
 
-    def third_leaves(self, lam):
+    def third(self, lam):
         self.seen += 1
-        if self.seen == 3:
-            os._exit(7)
-        return Answer("solved", lam)
+        return getattr(self, self.how)(lam) if self.seen == 3 else Answer("solved", lam)
 """
 
 
@@ -59,12 +85,20 @@ THIRD = """
 def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("series")
     write_strip(folder)
-    (folder / "faulty.py").write_text(tiny.FAULTY + THIRD)
+    with_how = ('fault="none"):', 'fault="none", how="none"):\n        self.how = how')
+    (folder / "faulty.py").write_text(tiny.FAULTY.replace(*with_how) + THIRD)
     (folder / "two.toml").write_text(SUITE)
-    (folder / "leaves.toml").write_text(LEAVES)
+    (folder / "together.toml").write_text(TOGETHER)
+    for fault in ("leave", "sleep", "out_of_memory", "system_exit"):
+        (folder / f"{fault}.toml").write_text(FAULTY.replace("FAULT", fault))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         yield
+
+
+def write(name: str, text: str) -> str:
+    Path(name).write_text(text)
+    return name
 
 
 def made(suite: str, out: str) -> tuple[str, list[dict[str, Any]]]:
@@ -117,13 +151,77 @@ def test_a_spoilt_answer_of_a_case_is_seen_by_the_gate() -> None:
     assert gate(Path("spoilt"), Console(file=StringIO())) == 1
 
 
-def test_a_case_that_ends_the_process_leaves_those_before_it() -> None:
-    _, rows = made("leaves.toml", "leaves")
-    mine = [row for row in rows if row["solver"] == "faulty"]
-    assert [row["status"] for row in mine] == ["solved", "solved", "crashed", "crashed"]
-    assert "exit code 7" in mine[2]["message"]
-    assert "not run" in mine[3]["message"]
-    assert "case=2" in mine[3]["message"]
+@pytest.mark.parametrize(
+    ("fault", "status", "why"),
+    [
+        ("leave", "crashed", "exit code 7"),
+        ("sleep", "time_limit", "more than 2 s"),
+        ("out_of_memory", "memory_limit", "as numpy does"),
+        ("system_exit", "failed", "enough"),
+    ],
+)
+def test_a_case_that_ends_the_process_leaves_those_before_it(fault: str, status: str, why: str) -> None:
+    """And costs those after it nothing: a solver out of time waits for one limit, not for theirs."""
+    start = time.monotonic()
+    _, rows = made(f"{fault}.toml", fault)
+    assert time.monotonic() - start < 15
+    assert [row["status"] for row in rows] == ["solved", "solved", status, status]
+    assert why in rows[2]["message"]
+    assert "not run" in rows[3]["message"]
+    assert "case=2" in rows[3]["message"]
+
+
+def test_cases_solved_together_share_the_seconds() -> None:
+    """A row a case, each judged for itself; the second call begins with what the first has found."""
+    _, rows = made("together.toml", "together")
+    alone, together, faulty = rows[:2], rows[2:6], rows[6:]
+    assert [(row["case"], row["warm"], row["together"]) for row in alone] == [
+        (0, False, None),
+        (1, True, None),
+    ]
+    assert [(row["case"], row["warm"], row["together"]) for row in together] == [
+        *((k, False, 3) for k in range(3)),
+        (3, True, 1),
+    ]
+    assert {row["verdict"] for row in alone + together} == {"within"}
+    assert len({row["key"] for row in rows}) == len(rows)
+    for name in ("solve_s", "form_s"):
+        assert len({row[name] for row in together[:3]}) == 1
+        assert len({row[name] for row in together}) == 2
+    assert len({row["prepare_s"] for row in together}) == 1
+    scene = read_scene("strip.toml")
+    data = prepared(scene)
+    cases = random_gaps(scene, data, 4, 9)
+    for row in together:
+        case = cases.load(row["case"], data)
+        x, lam = solve_by_nnls(data, case)
+        with np.load(Path("together") / row["answer"]) as saved:
+            np.testing.assert_allclose(saved["x"], x, atol=1e-8)
+            np.testing.assert_allclose(saved["lam"], lam, atol=1e-4)
+    assert {row["status"] for row in faulty} == {"unsupported"}
+    assert faulty[0]["message"] == "takes one load case at a time"
+
+
+def test_other_gaps_are_another_series() -> None:
+    """More cases are added; rows of another random field are set aside."""
+    made("two.toml", "changed")
+    text, rows = made(write("more.toml", SUITE.replace("cases = 4", "cases = 5")), "changed")
+    assert "10 measurements, 8 of them already" in text
+    assert len(rows) == 10
+    text, rows = made(write("wide.toml", SUITE.replace("seed = 9", "seed = 9\nsd = 0.3")), "changed")
+    assert "8 rows are set aside" in text
+    assert [row["series"]["sd"] for row in rows].count(0.3) == 8
+
+
+def test_what_is_for_a_series_is_refused_elsewhere_and_two_ways_need_two_names() -> None:
+    without = TOGETHER.replace("[series]\ncases = 4\nseed = 9\n", "").replace('variant = "together"\n', "")
+    with pytest.raises(InputError) as caught:
+        read_suite(write("without.toml", without))
+    faults = {fault.key: fault.allowed for fault in caught.value.faults}
+    assert {key for key, why in faults.items() if "with [series]" in why} == {
+        *("solver.0.cases", "solver.1.together", "solver.2.together")
+    }
+    assert "other `together`" in faults["solver.1.variant"]
 
 
 def test_repeats_of_a_series_stay_together(tmp_path: Path) -> None:
@@ -140,8 +238,49 @@ def test_repeats_of_a_series_stay_together(tmp_path: Path) -> None:
 
 def test_the_table_of_the_report() -> None:
     made("two.toml", "reported")
-    from report.build import write
+    from report.build import write as report
 
-    text = write(Path("reported")).read_text()
+    text = report(Path("reported")).read_text()
     assert "## Series of load cases" in text
     assert len(re.findall(r"\| +4 of 4 \|", text)) == 2
+    assert "PIQP `update`" in text
+    assert "OSQP" not in text.partition("## Series")[2].partition("##")[0]
+    assert "How stable" not in text  # cases are no repeats
+
+
+def test_a_report_without_a_library_and_with_cases_that_failed() -> None:
+    made("together.toml", "alone")
+    from report.build import write as report
+
+    text = report(Path("alone")).read_text()
+    assert "*Together* is given many" in text
+    assert re.search(r"newton \(dual\) together +\| +4 of 4 \| .* – \|", text)
+    assert re.search(r"faulty \(dual\) together +\| +0 of 4 \| +– \|", text)
+
+
+def test_ratios_are_to_the_fastest_librarys_next_case() -> None:
+    """By hand: with one thread PIQP's median is 4 s, with two ProxQP's is 2 s; Clarabel is never within."""
+    seconds = {
+        ("piqp", 1): [9, 3, 4, 5],
+        ("proxqp", 1): [1, 6, 6, 6],  # a first case is no next one
+        ("clarabel", 1): [1, 1, 1, 1],
+        ("newton", 1): [9, 0.5, 1, 3],
+        ("piqp", 2): [9, 3, 3, 3],
+        ("proxqp", 2): [9, 1, 2, 9],
+        ("newton", 2): [9, 0.5, 0.5, 0.5],
+    }
+    lines = [
+        {
+            **{"machine": "a", "scene": "s", "solver": solver, "form": "dual", "variant": ""},
+            **{"tolerance": 1e-9, "threads": threads, "case": k, "warm": float(k > 0)},
+            "verdict": "outside" if solver == "clarabel" else "within",
+            **{"setup_s": np.nan, "solve_s": 0.75 * times[k], "form_s": 0.25 * times[k]},
+        }
+        for (solver, threads), times in seconds.items()
+        for k in range(4)
+    ]
+    found = compared(pd.DataFrame(lines)).set_index(["solver", "threads"])["to_library"]
+    np.testing.assert_allclose(found["newton", 1], [np.nan, 0.125, 0.25, 0.75])
+    np.testing.assert_allclose(found["newton", 2], [np.nan, 0.25, 0.25, 0.25])
+    np.testing.assert_allclose(found["proxqp", 2], [np.nan, 0.5, 1.0, 4.5])
+    assert found["clarabel", 1].isna().all()

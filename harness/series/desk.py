@@ -21,6 +21,7 @@ from solvers.base import Answer, Form, Load, Problem, failed
 from solvers.registry import make_solver
 
 from ..judge import judge
+from ..loads import loads_of
 from ..reference import refined_active_set
 from ..warm_starts import WarmStarts
 from .bound import Bound
@@ -99,19 +100,8 @@ class Desk:
                 yield self._finished(tried)
 
     def _loads(self, numbers: Sequence[int]) -> list[tuple[int, Load]]:
-        """f, g and p = AᵀK⁻¹f − g of the cases, K⁻¹f once where they share their f."""
         cases = [self.job.cases.load(k, self.data) for k in numbers]
-        shared = all(case.f is cases[0].f for case in cases)
-        f = cases[0].f[:, None] if shared else np.column_stack([case.f for case in cases])
-        p = self.data.assembly.A.T @ self.data.solve_K(f) - np.column_stack([case.g for case in cases])
-        loads = [
-            Load(case.f, case.g, np.ascontiguousarray(column))
-            for case, column in zip(cases, p.T, strict=True)
-        ]
-        for load in loads:
-            for array in (load.f, load.g, load.p):
-                array.flags.writeable = False
-        return list(zip(numbers, loads, strict=True))
+        return list(zip(numbers, loads_of(cases, self.data), strict=True))
 
     def _try_together(self, loads: list[tuple[int, Load]]) -> list[_Tried]:
         """Solve them all at once; where that raises, one after another, so that it is known which does."""

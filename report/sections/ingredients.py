@@ -8,7 +8,7 @@ import pandas as pd
 
 from ..blocks import Column, Section, Table, number, word
 from ..labels import in_order
-from ..numbers import significant, span, whole
+from ..numbers import spread, whole
 from ..rows import Results
 
 KEYS = ["solver", "form", "scene", "threads", "tolerance"]
@@ -29,7 +29,7 @@ def section(results: Results) -> Section | None:
         word("solver (form), variant", "series"),
         number("scenes", "scenes", whole),
         number("within", "within", whole),
-        Column("times as long", _spread),
+        Column("times as long", spread("ratio")),
         number("iterations", "iterations", whole),
         number("of the whole", "iterations_plain", whole),
         number("largest error, mm", "displacement_error_mm"),
@@ -56,8 +56,3 @@ def _line(group: pd.DataFrame) -> dict[str, Any]:
         "iterations_plain": group["iterations_plain"].median(),
         "displacement_error_mm": group["displacement_error_mm"].max(),
     }
-
-
-def _spread(line: Any) -> str:
-    least, most = (significant(line[f"ratio_{end}"], 2) for end in ("least", "most"))
-    return f"{significant(line['ratio'])} ({span(least, most)})"

@@ -1,59 +1,100 @@
-"""Series: load cases a second and their errors, solver by solver."""
+"""Series: load cases a second and their errors, solver by solver, and as ratios to the fastest library."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import pandas as pd
 
-from ..blocks import Column, Section, Table, number, word
-from ..labels import named
-from ..numbers import power, whole
+from ..blocks import Column, Section, Table, Text, number, word
+from ..labels import IN_HOUSE, named
+from ..numbers import power, spread, whole
 from ..rows import ANSWERED, CELL, Results
 
 CASE = ["setup_s", "solve_s", "form_s"]
+ROUND = ["scene", "threads"]
+
+#: What each library has for the next load case on the same matrices.
+REPEATED = {
+    "piqp": "PIQP `update` of the vectors, no warm start",
+    "proxqp": "ProxQP `update` and a warm start (the dual form's from the case before, for it takes no "
+    "multipliers of bounds)",
+    "clarabel": "Clarabel `update` of the vectors, no warm start",
+    "osqp": "OSQP `update` and `warm_start` from the nearest case",
+}
 
 
 def section(results: Results) -> Section | None:
     rows = results.rows[results.rows["case"].notna()]
     if rows.empty:
         return None
+    rows = compared(rows)
     lines = pd.DataFrame([_line(group) for _, group in rows.groupby(CELL, dropna=False, sort=False)])
-    lines = named(lines).sort_values(["n", "scene", "rate"], ascending=[True, True, False])
+    lines = pd.concat([named(of_round) for _, of_round in lines.groupby(ROUND)])
+    lines = lines.sort_values(["n", "scene", "threads", "case_s"])
     columns = [
         word("scene", "scene"),
-        word("solver", "label"),
+        number("n", "n", whole),
+        number("threads", "threads", whole),
+        word("solver (form)", "label"),
         Column("within", lambda row: f"{row['within']} of {row['cases']}"),
+        number("s a case", "case_s"),
         number("cases/s", "rate"),
-        number("first case, s", "first_s"),
-        number("a later one, s", "later_s"),
+        number("first, s", "first_s"),
         number("once, s", "once_s"),
-        number("iterations, first", "first_iterations", whole),
-        number("later", "later_iterations", whole),
         number("largest error, mm", "error_mm", power),
+        Column("to the fastest library", spread("to_library")),
     ]
     caption = (
-        "*Series: load cases on one assembly, one after another in one process.* *Cases/s* and *a later one* "
-        "are of the cases after the first, which the solver takes in its own repeated-solve mode: their "
-        "median time for update, solve and the dual form's p and x. *Once*: convert and prepare."
+        "*Series: load cases on one assembly, in one process.* *A case*: update, solve and the dual form's p "
+        "and x, the median of the cases after the first (solved together, after the first so many). "
+        "*First*: with nothing solved before. *Once*: convert and prepare. *To the fastest library*: the "
+        "seconds of these cases as a ratio to the median of the library that is the fastest on the scene, "
+        "with as many threads; their median, and in brackets the least to the most. Only answers within the "
+        "limit count."
     )
-    return Section("Series of load cases", [Table("series", caption, lines, columns)])
+    return Section("Series of load cases", [Text(_ways(rows)), Table("series", caption, lines, columns)])
 
 
-def _line(group: pd.DataFrame) -> dict[str, object]:
-    group = group.sort_values("case")
+def compared(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of series with `case_s`, the seconds of a case; `later_s` the same where a case was solved before
+    and the answer is within the limit; `to_library`, later_s as a ratio to the fastest library's median.
+    """
+    rows = rows.assign(case_s=rows[CASE].sum(axis=1))
+    rows["later_s"] = rows["case_s"].where((rows["verdict"] == "within") & (rows["warm"] == 1))
+    libraries = rows[~rows["solver"].isin(IN_HOUSE)].groupby(CELL, dropna=False)["later_s"].median()
+    fastest = libraries.groupby(ROUND).min().rename("library_s")
+    rows = rows.join(fastest, on=ROUND)
+    return rows.assign(to_library=rows["later_s"] / rows["library_s"])
+
+
+def _line(group: pd.DataFrame) -> dict[str, Any]:
     answered = group[group["verdict"].isin(ANSWERED)]
-    seconds = answered[CASE].sum(axis=1)
-    later = answered["case"] > group["case"].min()
-    later_s = float(seconds[later].median())
-    first = group.iloc[0]
-    return {
-        **{name: first[name] for name in (*CELL, "n")},
-        "cases": len(group),
-        "within": int((group["verdict"] == "within").sum()),
-        "rate": 1 / later_s if later_s > 0 else None,
-        "first_s": float(seconds[~later].median()),
-        "later_s": later_s,
-        "once_s": float(first[["convert_s", "prepare_s"]].sum()),
-        "first_iterations": answered.loc[~later, "iterations"].median(),
+    first, later = answered["warm"] == 0, answered["warm"] == 1
+    case_s = float(group["later_s"].median())
+    line: dict[str, Any] = {name: group[name].iloc[0] for name in (*CELL, "n")}
+    line |= {"cases": len(group), "within": int((group["verdict"] == "within").sum())}
+    line |= {"case_s": case_s, "rate": 1 / case_s if case_s > 0 else None}
+    line |= {
+        "first_s": answered.loc[first, "case_s"].median(),
+        "once_s": float(group[["convert_s", "prepare_s"]].max().sum()),
+        "first_iterations": answered.loc[first, "iterations"].median(),
         "later_iterations": answered.loc[later, "iterations"].median(),
+        "together": group["together"].max(),
         "error_mm": answered["displacement_error_mm"].max(),
     }
+    line |= {"to_library": group["to_library"].median(), "to_library_least": group["to_library"].min()}
+    return line | {"to_library_most": group["to_library"].max()}
+
+
+def _ways(rows: pd.DataFrame) -> str:
+    """How the solvers come from one case to the next."""
+    seen = [way for solver, way in REPEATED.items() if (rows["solver"] == solver).any()]
+    words = "Each solver takes one load case after another, by its own way from one to the next"
+    words += f": {'; '.join(seen)}." if seen else "."
+    if rows["together"].notna().any():
+        words += (
+            " *Together* is given many load cases at once, and their seconds are shared equally among them; "
+            "the others have each one before the next is given."
+        )
+    return words

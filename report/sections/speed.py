@@ -10,7 +10,7 @@ import pandas as pd
 from .. import style
 from ..blocks import Block, Column, Figure, Section, Table, number, word
 from ..labels import IN_HOUSE, in_order
-from ..numbers import MISSING, significant, span, whole
+from ..numbers import significant, span, spread, whole
 from ..rows import Results
 from ..shown import styles_of
 
@@ -75,20 +75,11 @@ def _ratios(cases: pd.DataFrame) -> Table:
         word("solver (form)", "series"),
         number("scenes", "scenes", whole),
         number("runs", "runs", whole),
-        Column("load case, to the fastest library", _spread("to_library")),
-        Column("with preparation, to the fastest library", _spread("total_to_library")),
-        Column("load case, to one Cholesky of Q", _spread("to_cholesky")),
+        Column("load case, to the fastest library", spread("to_library")),
+        Column("with preparation, to the fastest library", spread("total_to_library")),
+        Column("load case, to one Cholesky of Q", spread("to_cholesky")),
     ]
     return Table("speed-ratios", caption, pd.DataFrame(lines), columns)
-
-
-def _spread(name: str) -> Callable[[Mapping[str, Any]], str]:
-    def text(line: Mapping[str, Any]) -> str:
-        middle = significant(line[name])
-        least, most = (significant(line[f"{name}_{end}"], 2) for end in ("least", "most"))
-        return middle if middle == MISSING else f"{middle} ({span(least, most)})"
-
-    return text
 
 
 def _yardsticks(rows: pd.DataFrame) -> Table:

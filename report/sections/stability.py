@@ -39,7 +39,7 @@ def spreads(results: Results) -> pd.DataFrame:
     """A line a cell with answers: of the seconds a load case of its repeats, median, least, most, `spread`
     = (most − least) / median, and `why` they may spread.
     """
-    rows = named(results.rows)
+    rows = named(results.rows[results.rows["case"].isna()])  # the cases of a series are no repeats
     rows = rows[rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()]
     rows = rows.assign(seconds=rows[["setup_s", "solve_s", "form_s"]].sum(axis=1))
     lines = [_line(runs) for _, runs in rows.groupby(CELL, dropna=False, sort=False)]
