@@ -64,6 +64,12 @@ def test_without_a_yardstick_there_is_no_section(tmp_path: Path) -> None:
     assert speed.section(results(tmp_path, [row(LOW, "newton")])) is None
 
 
+def test_where_no_answer_is_within_the_limit_the_yardsticks_stand_alone(tmp_path: Path) -> None:
+    section = speed.section(results(tmp_path, [timed(LOW, "newton", 1.0, verdict="cannot_be_judged")]))
+    assert section is not None
+    assert [block.name for block in section.blocks] == ["speed-yardsticks"]
+
+
 def test_with_preparation_the_ratio_is_to_the_library_that_is_fastest_with_its_own(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0, convert_s=0.0, prepare_s=3.0)]
     rows += [timed(LOW, "piqp", 10.0, convert_s=0.0, prepare_s=0.0)]

@@ -22,7 +22,9 @@ def section(results: Results) -> Section | None:
     if not results.rows["cholesky_s"].notna().any():
         return None
     cases = load_cases(results)
-    blocks: list[Block] = [_ratios(cases), _yardsticks(results.rows), _figure(results, cases)]
+    blocks: list[Block] = [_yardsticks(results.rows)]
+    if len(cases):
+        blocks = [_ratios(cases), *blocks, _figure(results, cases)]
     return Section("Speed, as ratios", blocks)
 
 
