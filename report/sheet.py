@@ -18,6 +18,7 @@ from .maps import Array
 # inches
 LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.2, 0.35, 0.5
 BESIDE, BELOW = 0.5, 0.4  # between maps: below one there is the next one's title
+NAME_LEFT, NAME_BELOW = 0.6, 0.27  # of an axis, from the map
 LOWEST, TALLEST = 0.4, 5.5  # a row, which holds "y, mm"; a map
 LETTER = 0.09  # of a title, at most on average
 ENTRY, LINE = 1.7, 0.22  # of a legend
@@ -69,7 +70,9 @@ def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int) 
         row, column = divmod(k, columns)
         axes = placed(LEFT + column * across, tall - top - row * down - height, width, height)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, mm", ylabel="y, mm")
-        axes.set_title(title, y=1.0)  # a given y spares a search for it
+        axes.set_title(title, y=1.0)  # given places spare a search for them
+        axes.xaxis.set_label_coords(0.5, -NAME_BELOW / height)
+        axes.yaxis.set_label_coords(-NAME_LEFT / width, 0.5)
         axes.grid(visible=False)
         axes.spines[:].set_visible(True)
         first, last = column == 0, k + columns >= len(titles)

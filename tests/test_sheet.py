@@ -62,11 +62,11 @@ def texts_of(figure: Figure) -> list[Text]:
     ("width", "height", "parts", "kinds", "name"),
     [
         (4000.0, 400.0, 2, 1, "wing"),
-        (4000.0, 80.0, 2, 3, "thin"),
+        (4000.0, 160.0, 2, 3, "thin"),
         (20.0, 160.0, 2, 3, "strip"),
         (100.0, 1600.0, 3, 3, "a part with a rather long name"),
         (1000.0, 1000.0, 3, 0, "plate"),
-        (1e-3, 1e-3, 5, 2, "small"),
+        (12.0, 9.0, 5, 2, "small"),
     ],
 )
 def test_nothing_is_cut_off_or_covered(
