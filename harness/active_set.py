@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from problems.assembly import Matrix, Vector
 
 ROUNDING = 10  # times the rounding that is seen
+FEW = 100  # contacts
 FULL_EXCHANGES = 3  # without a new smallest count of infeasibilities, before single pivots begin
 
 
@@ -25,9 +26,28 @@ def contact_set(Q: Matrix, p: Vector, start: NDArray[np.bool_] | None = None) ->
     exchanged until there is one: in exact arithmetic this cannot cycle. Values within rounding of zero
     are taken as zero: rounding is what the equations leave over in y_S, and what that moves λ_S.
     Should rounding still lead in circles, the first set met again is returned for others to check.
+
+    start : the first S, by default from half of the contacts.
     """
+    return _pivoted(Q, p, _first_set(Q, p) if start is None else start)[0]
+
+
+def _first_set(Q: Matrix, p: Vector) -> NDArray[np.bool_]:
+    """What is closed where only every other contact is kept, and what then overlaps; of few contacts p > 0.
+
+    The forces of the half come from its own half: small factors replace most of those of many rows.
+    """
+    if len(p) <= FEW or not (p > 0).any():
+        return p > 0
+    half = np.ascontiguousarray(Q[::2, ::2]), p[::2]
+    lam = np.zeros(len(p))
+    lam[::2] = _pivoted(*half, _first_set(*half))[1]
+    return (lam > 0) | (Q @ lam < p)
+
+
+def _pivoted(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Vector]:
+    """The closed contacts and λ, from a first set S."""
     m = len(p)
-    S = p > 0 if start is None else start.copy()
     fewest, chances = m + 1, FULL_EXCHANGES
     met: set[bytes] = set()
     while True:
@@ -35,14 +55,14 @@ def contact_set(Q: Matrix, p: Vector, start: NDArray[np.bool_] | None = None) ->
         wrong = np.where(S, lam < -ROUNDING * lam_rounding, y < -ROUNDING * y_rounding)
         count = int(wrong.sum())
         if count == 0:
-            return S
+            return S, lam
         if count < fewest:
             fewest, chances = count, FULL_EXCHANGES
             met.clear()
         elif chances:
             chances -= 1
         elif S.tobytes() in met:
-            return S
+            return S, lam
         else:
             met.add(S.tobytes())
             last = np.flatnonzero(wrong)[-1]
@@ -57,7 +77,8 @@ def _solve_on(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vecto
     rows = np.flatnonzero(S)
     if not rows.size:
         return lam, -p, 0.0, 0.0
-    factor = sla.cho_factor(Q[np.ix_(rows, rows)], overwrite_a=True, check_finite=False)
+    block = Q[np.ix_(rows, rows)].T  # symmetric, and so it is stored as LAPACK takes it, without a copy
+    factor = sla.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
     lam[rows] = sla.cho_solve(factor, p[rows], check_finite=False)
     y = Q @ lam - p
     left_over = y[rows]

@@ -111,7 +111,8 @@ def _refine(prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]) -> tu
     assembly = prepared.assembly
     rows = np.flatnonzero(active)
     A_C = assembly.A[:, rows]
-    factor = sla.cho_factor(prepared.Q[np.ix_(rows, rows)], overwrite_a=True) if rows.size else None
+    block = prepared.Q[np.ix_(rows, rows)].T  # symmetric, stored as LAPACK takes it
+    factor = sla.cho_factor(block, lower=True, overwrite_a=True) if rows.size else None
     x = Double(np.zeros(assembly.n), np.zeros(assembly.n))
     lam = Double(np.zeros(assembly.m), np.zeros(assembly.m))
     force, gap = load.f, load.g  # the residuals at zero

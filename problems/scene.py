@@ -12,7 +12,7 @@ or, for a user's own matrices, `[matrices]` with K, A, f, g (Matrix Market) or p
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -22,27 +22,18 @@ import numpy as np
 from pydantic import ValidationError
 
 from .cache import digest
-from .effect import EXCLUDED, Effect, Pair, StiffnessEffect, effect_class, effect_kinds, unknown_part
+from .effect import Effect, Pair, StiffnessEffect
+from .effect_tables import EffectTable
 from .errors import Fault, InputError
 from .joint import Joint, Table
 from .ladder import PREFIX, Made, Rung, make_rung, rung_names
-from .validation import unknown, validation_faults
+from .validation import UNITS, unknown, validation_faults
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE / "scenes"
 ASSEMBLIES = HERE / "assemblies"
 KEYS = ("title", "assembly", "joint", "effect", "matrices")
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
-
-Tables = list[tuple[Path, int, dict[str, Any]]]  # the tables of effects: file, place in it, content
-
-#: Units of what joints and stiffeners are described by; an effect names those of its own parameters.
-UNITS = {
-    **dict.fromkeys(["length", "width", "thickness", "points", "lines", "pitch", "start", "stop"], "mm"),
-    **dict.fromkeys(["I", "J"], "mm⁴"),
-    **dict.fromkeys(["young", "value"], "N/mm²"),
-    "stiffness_per_point": "N/mm",
-}
 
 
 @dataclass(frozen=True)
@@ -155,21 +146,24 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
         return _matrices_scene(name, title, path, data)
     faults: list[Fault] = []
     joint_path, joint_data = _joint_table(path, data, faults)
-    effects = _effect_tables(joint_path, joint_data, faults) if joint_path != path else []
-    effects += _effect_tables(path, data, faults)
+    tables = _effect_tables(joint_path, joint_data, faults) if joint_path != path else []
+    tables += _effect_tables(path, data, faults)
     faults += [Fault(str(path), key, value, unknown("key", key, KEYS)) for key, value in data.items()]
 
-    read = [_effect(where, k, table, faults) for where, k, table in effects]
-    found = tuple(effect for effect in read if effect is not None)
-    joint = _joint(joint_path, joint_data, found, faults)
+    for table in tables:
+        faults += table.read()
+    effects = tuple(table.effect for table in tables if table.effect is not None)
+    joint = _joint(joint_path, joint_data, effects, faults)
     if joint is not None:
-        faults += _misfits(joint, effects, read)
-        faults += _conflicts(joint, effects, read)
-        if len(found) == len(read):
-            faults += _floating(joint_path, joint, found)
+        for table in tables:
+            faults += table.misfits(joint)
+        for k, table in enumerate(tables):
+            faults += table.conflicts(tables[:k] + tables[k + 1 :], joint)
+        if len(effects) == len(tables):
+            faults += _floating(joint_path, joint, effects)
     if faults or joint is None:
         raise InputError(faults)
-    return Scene(name, title, joint, found)
+    return Scene(name, title, joint, effects)
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:
@@ -212,51 +206,12 @@ def _with_contacts(joint: Joint, effects: tuple[Effect, ...]) -> Joint:
     return joint.model_copy(update={"contacts": (*joint.pairs, *dict.fromkeys(new))}) if new else joint
 
 
-def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> Tables:
+def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> list[EffectTable]:
     tables = data.pop("effect", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         faults.append(Fault(str(where), "effect", tables, "tables [[effect]]"))
         return []
-    return [(where, k, table) for k, table in enumerate(tables)]
-
-
-def _effect(where: Path, index: int, table: dict[str, Any], faults: list[Fault]) -> Effect | None:
-    kind = table.get("kind")
-    if kind not in effect_kinds():
-        allowed = unknown("effect", kind, effect_kinds())
-        for excluded in get_close_matches(str(kind).lower(), EXCLUDED, 1, 0.75):
-            allowed = f"the model excludes {excluded} ({EXCLUDED[excluded]}); {allowed}"
-        faults.append(Fault(str(where), f"effect[{index}].kind", kind, allowed))
-        return None
-    effect = effect_class(kind)
-    try:
-        return effect.model_validate(table, context={"folder": where.parent})
-    except ValidationError as error:
-        key = f"effect[{index}] ({kind})"
-        faults += validation_faults(where, effect, error, key, UNITS | effect.units)
-        return None
-
-
-def _misfits(joint: Joint, tables: Tables, effects: Sequence[Effect | None]) -> Iterator[Fault]:
-    """What of each effect does not fit the joint."""
-    for (where, k, table), effect in zip(tables, effects, strict=True):
-        found: Iterator[tuple[str, object, str]] = iter(())
-        if effect is not None:
-            found = effect.faults(joint)
-        elif isinstance(part := table.get("part"), str):
-            found = unknown_part(part, joint)
-        for key, value, allowed in found:
-            yield Fault(str(where), f"effect[{k}] ({table['kind']}).{key}", value, allowed)
-
-
-def _conflicts(joint: Joint, tables: Tables, effects: Sequence[Effect | None]) -> Iterator[Fault]:
-    """What of each effect contradicts the others."""
-    for position, ((where, k, _), effect) in enumerate(zip(tables, effects, strict=True)):
-        if effect is None:
-            continue
-        others = [other for other in (*effects[:position], *effects[position + 1 :]) if other is not None]
-        for key, value, allowed in effect.conflicts(others, joint):
-            yield Fault(str(where), f"effect[{k}] ({effect.kind}).{key}", value, allowed)
+    return [EffectTable(where, k, table) for k, table in enumerate(tables)]
 
 
 def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...]) -> Iterator[Fault]:

@@ -10,8 +10,15 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from .errors import Fault, InputError
+from .errors import Fault
 
+#: Units of what joints and stiffeners are described by; an effect names those of its own parameters.
+UNITS = {
+    **dict.fromkeys(["length", "width", "thickness", "points", "lines", "pitch", "start", "stop"], "mm"),
+    **dict.fromkeys(["I", "J"], "mm⁴"),
+    **dict.fromkeys(["young", "value"], "N/mm²"),
+    "stiffness_per_point": "N/mm",
+}
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -28,9 +35,6 @@ def validation_faults(
         depth = len(item["loc"])
         if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
             continue  # it follows from a fault inside it
-        if isinstance(cause := item.get("ctx", {}).get("error"), InputError):
-            yield from cause.faults  # of a file that the table names
-            continue
         key = ".".join(filter(None, [prefix, *map(str, item["loc"])]))
         value = None if item["type"] == "missing" else item["input"]
         unit = next((units[str(part)] for part in reversed(item["loc"]) if part in units), None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -16,17 +16,17 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
+from matplotlib.patches import Rectangle
 
 from . import style
 from .maps import Array, draw, grid_of, outline
 from .numbers import significant
+from .sheet import Sheet, sheet
 from .vtu import write_vtu
 
 #: Marks of what stands on the junction, by the kind of the effect.
 MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
-STRIP, TALLEST = 7.4, 5.5  # inches: the width of a map over the whole page, the largest height of one
-MARGIN = 0.12  # inches
+THINNEST = 0.02  # a map's shorter side over its longer one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps below one another, all side by side
 
 Columns = dict[str, list[Any]]
@@ -44,7 +44,7 @@ def write(directory: Path) -> Path:
     figures = _figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
-            _save(drawing, directory / f"{name}.png")
+            drawing.savefig(directory / f"{name}.png", dpi=style.DPI)
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
@@ -60,22 +60,6 @@ def write(directory: Path) -> Path:
         template.render(record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu), "utf-8"
     )
     return path
-
-
-def _save(drawing: Figure, path: Path) -> None:
-    """Lay out once and draw once; savefig by itself would draw twice.
-
-    Titles overhang narrow maps, which "tight" takes in. Elsewhere the layout is at most a little off, where
-    the maps' proportions leave it no room: a margin is enough.
-    """
-    width, height = drawing.get_size_inches()
-    bounds: Bbox | Literal["tight"] = "tight"
-    if (engine := drawing.get_layout_engine()) and width >= style.WIDTH:
-        drawing.set_dpi(style.DPI)
-        engine.execute(drawing)
-        drawing.set_layout_engine(None)
-        bounds = Bbox([[-MARGIN, -MARGIN], [width + MARGIN, height + MARGIN]])
-    drawing.savefig(path, dpi=style.DPI, bbox_inches=bounds)
 
 
 def _nodes(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
@@ -146,73 +130,65 @@ def _figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figu
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     """Both gaps of each pair on one scale, that of their square roots; the closed contacts outlined."""
     before, after = arrays["gap_before"], arrays["gap_after"]
-    pairs = record["pairs"]
-    drawing, panels = _panels(arrays["contact_nodes"], 2 * len(pairs), after_each_other=2)
+    titles = [f"gap {when}: {_name(pair)}" for pair in record["pairs"] for when in ("before", "after")]
+    maps = _sheet(arrays["contact_nodes"], titles, 2, len(record["marks"]))
     norm = PowerNorm(0.5, 0.0, max(float(before.max()), float(after.max()), 0.0) or 1.0)
-    for k, pair in enumerate(pairs):
+    for k, pair in enumerate(record["pairs"]):
         own = slice(pair["start"], pair["stop"])
         nodes = arrays["contact_nodes"][own]
-        for axes, values, when in ((panels[2 * k], before, "before"), (panels[2 * k + 1], after, "after")):
+        for axes, values in zip(maps.axes[2 * k : 2 * k + 2], (before, after), strict=True):
             drawn = draw(axes, nodes, values[own], norm, "viridis")
-            axes.set_title(f"gap {when}: {_name(pair)}")
             _mark(axes, record["marks"])
-        _outline(panels[2 * k + 1], nodes, arrays["lam"][own] > 0, "white")
-    drawing.colorbar(drawn, ax=panels, label="gap, mm", pad=0.015, fraction=0.05)
-    return _labelled(drawing, panels)
+        _outline(axes, nodes, arrays["lam"][own] > 0, "white")
+    return maps.finished(drawn, "gap, mm")
 
 
 def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     """The forces on a scale of their square roots, so that small ones show."""
     pairs, lam = record["pairs"], np.nan_to_num(arrays["lam"])
-    drawing, panels = _panels(arrays["contact_nodes"], len(pairs))
+    titles = [f"contact forces: {_name(pair)}" for pair in pairs]
+    maps = _sheet(arrays["contact_nodes"], titles, len(pairs), len(record["marks"]))
     norm = PowerNorm(0.5, 0.0, float(lam.max(initial=0.0)) or 1.0)
-    for axes, pair in zip(panels, pairs, strict=True):
+    for axes, pair in zip(maps.axes, pairs, strict=True):
         own = slice(pair["start"], pair["stop"])
         nodes, closed = arrays["contact_nodes"][own], lam[own] > 0
         drawn = draw(axes, nodes, np.where(closed, lam[own], np.nan), norm, "magma_r")
-        axes.set_title(f"contact forces: {_name(pair)}")
         _outline(axes, nodes, closed, "#444444")
         _mark(axes, record["marks"])
-    drawing.colorbar(drawn, ax=panels, label="force, N", pad=0.015, fraction=0.05)
-    return _labelled(drawing, panels)
+    return maps.finished(drawn, "force, N")
 
 
 def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     """All parts on one scale, each inside its outline; a thick edge is clamped."""
     parts = record["parts"]
-    corners = [(x, y) for part in parts for x in part["outline"][:2] for y in part["outline"][2:]]
-    drawing, panels = _panels(np.array(corners), len(parts))
+    corners = np.array([(x, y) for part in parts for x in part["outline"][:2] for y in part["outline"][2:]])
+    supports = any(part["supports"] for part in parts)
+    titles = [f"displacement of {part['name']}" for part in parts]
+    maps = _sheet(corners, titles, len(parts), len(record["marks"]) + supports)
     norm = Normalize(float(arrays["x"].min()), float(arrays["x"].max()))
-    for axes, part in zip(panels, parts, strict=True):
+    for axes, part in zip(maps.axes, parts, strict=True):
+        west, east, south, north = part["outline"]
+        axes.spines[:].set_visible(False)
+        edge: dict[str, Any] = {"clip_on": False, "edgecolor": "#666666", "facecolor": "#F0F0F0"}
+        axes.add_patch(Rectangle((west, south), east - west, north - south, **edge))
         own = slice(part["start"], part["stop"])
         drawn = draw(axes, arrays["nodes"][own], arrays["x"][own], norm, "cividis")
-        axes.set_title(f"displacement of {part['name']}")
-        west, east, south, north = part["outline"]
-        axes.plot(
-            [west, east, east, west, west], [south, south, north, north, south], color="#666666", lw=0.8
-        )
-        for edge, y in (("south", south), ("north", north)):
-            if edge in part["clamped"]:
+        for side, y in (("south", south), ("north", north)):
+            if side in part["clamped"]:
                 axes.plot([west, east], [y, y], color="#222222", lw=3.0, clip_on=False)
         _mark(axes, record["marks"] | ({"supports": part["supports"]} if part["supports"] else {}))
-    drawing.colorbar(drawn, ax=panels, label="displacement, mm", pad=0.015, fraction=0.05)
-    return _labelled(drawing, panels)
+    return maps.finished(drawn, "displacement, mm")
 
 
-def _panels(nodes: Array, count: int, after_each_other: int = 1) -> tuple[Figure, list[Axes]]:
-    """Maps of one size: below one another where the junction is a strip, else side by side."""
-    width, height = np.ptp(nodes, axis=0)
-    ratio = float(height / width) if width else 1.0
-    columns = 1 if ratio < NARROW else count if ratio > UPRIGHT else min(count, max(2, after_each_other))
-    rows = -(-count // columns)
-    tall = min(STRIP / columns * ratio, TALLEST)
-    drawing = style.figure(rows * (max(tall, 0.5) + 0.45) + 0.6)
-    panels = list(drawing.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel())
-    if ratio > UPRIGHT:
-        drawing.set_figwidth(1.0 + columns * (TALLEST / ratio + 2.0))
-    for spare in panels[count:]:
-        spare.remove()
-    return drawing, panels[:count]
+def _sheet(nodes: Array, titles: list[str], beside: int, marks: int) -> Sheet:
+    """Maps of what holds the nodes: below one another where that is a strip, all side by side where it stands
+    upright, else `beside` and at most three."""
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    thin = THINNEST * (high - low).max() or 1.0
+    size, middle = np.maximum(high - low, thin), (low + high) / 2
+    ratio = size[1] / size[0]
+    columns = 1 if ratio < NARROW else len(titles) if ratio > UPRIGHT else min(beside, 3)
+    return sheet(middle - size / 2, middle + size / 2, titles, columns, marks)
 
 
 def _outline(axes: Axes, nodes: Array, closed: Any, colour: str) -> None:
@@ -221,26 +197,11 @@ def _outline(axes: Axes, nodes: Array, closed: Any, colour: str) -> None:
 
 
 def _mark(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
+    """Rings on a white rim, which stands out from any colour; what is inside them shows."""
     for kind, points in marks.items():
-        axes.plot(
-            *np.array(points).T,
-            MARKS.get(kind, "x"),
-            markersize=4.5,
-            markerfacecolor="none",
-            markeredgecolor=style.VERMILLION,
-            label=kind.replace("_", " "),
-            clip_on=False,
-        )
-
-
-def _labelled(drawing: Figure, panels: list[Axes]) -> Figure:
-    panels[-1].set_xlabel("x, mm")
-    for axes in panels:
-        axes.label_outer()
-    found = [axes.get_legend_handles_labels() for axes in panels]
-    named = {
-        label: handle for handles, labels in found for handle, label in zip(handles, labels, strict=True)
-    }
-    if named:
-        drawing.legend(named.values(), named.keys(), loc="outside lower left", ncols=len(named))
-    return drawing
+        x, y = np.array(points).T
+        ring: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "none", "clip_on": False}
+        shape = MARKS.get(kind, "x")
+        axes.plot(x, y, shape, markeredgecolor="#FFFFFF90", markeredgewidth=1.6, **ring)
+        label = kind.replace("_", " ")
+        axes.plot(x, y, shape, markeredgecolor=style.VERMILLION, markeredgewidth=1.0, label=label, **ring)

@@ -194,6 +194,50 @@ def test_every_bad_row_of_a_file_is_named_by_its_line(tmp_path: Path) -> None:
     assert found[-1].key == "effect[1] (shims).thickness"
 
 
+def test_all_that_is_wrong_with_a_file_and_its_table_is_said_at_once(tmp_path: Path) -> None:
+    """Bad rows hide neither the places of the good ones, each named by its line, nor other parameters."""
+    rows = ["hole,x,y", "1,10,10", "2,ten,10", "", "3,101,10", "4,10,-1", "5,90", "6,50,25"]
+    (tmp_path / "holes.csv").write_text("\n".join(rows) + "\n")
+    table = 'kind = "{}"\n{} = -1\nfile = "holes.csv"'
+    good = 'kind = "fasteners"\npreload = 1\nbetween = ["b", "a"]\nfile = "holes.csv"'
+    found = faults(tmp_path, table.format("clamps", "clamping_force"), good)
+    file, scene = str(tmp_path / "holes.csv"), str(tmp_path / "scene.toml")
+    unreadable = [(file, "line 3", "2,ten,10"), (file, "line 7", "5,90")]
+    assert [(fault.where, fault.key, fault.value) for fault in found] == [
+        (scene, "effect[0] (clamps).clamping_force", -1),
+        *unreadable,
+        *unreadable,
+        (scene, "effect[1] (fasteners).between", ["b", "a"]),
+        (file, "line 5", [101.0, 10.0]),
+        (file, "line 6", [10.0, -1.0]),
+    ]
+    assert all("0 … 100 × 0 … 50 mm" in fault.allowed for fault in found[-2:])
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys"),
+    [
+        ("0,0,1\n9,9,1\n18,18,1\n", ["effect[0] (measured_gap).points"]),
+        ("0,0,1\n9,9,1\n18,18,1\n9,0,x\n", ["line 5"]),  # the fourth point may be off the line
+        ("0,0,1\n9,9,1\n9,0,x\n", ["line 4"]),  # the third may be there
+        ("0,0,1\n9,0,1\n9,9,2\n9,0,3\n9,0,x\n", ["line 6", "line 3"]),  # twice, whatever the fifth is
+    ],
+)
+def test_what_may_follow_from_a_bad_row_is_not_said(tmp_path: Path, rows: str, keys: list[str]) -> None:
+    (tmp_path / "gaps.csv").write_text("x,y,gap\n" + rows)
+    assert [fault.key for fault in faults(tmp_path, GAPS)] == keys
+
+
+def test_a_file_that_is_missing_does_not_hide_other_parameters(tmp_path: Path) -> None:
+    missing, preload = faults(tmp_path, 'kind = "fasteners"\nfile = "holes.csv"\npreload = 0')
+    assert (missing.key, preload.key) == ("effect[0] (fasteners).preload", "file")
+
+
+def test_an_effect_without_a_kind_may_name_an_unknown_part(tmp_path: Path) -> None:
+    found = faults(tmp_path, 'part = "c"')
+    assert [fault.key for fault in found] == ["effect[0].kind", "effect[0].part"]
+
+
 @pytest.mark.parametrize(
     ("content", "key"),
     [

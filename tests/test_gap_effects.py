@@ -140,5 +140,6 @@ def test_positions_from_a_file_are_those_of_the_list(tmp_path: Path) -> None:
     (tmp_path / "rivets.csv").write_text("hole,x,y\n1,100,30\n\n2, 250.5 ,90\n")
     data = {"kind": "fasteners", "preload": 7.0}
     listed = Fasteners.model_validate(data | {"points": [[100, 30], [250.5, 90]]})
-    read = Fasteners.model_validate(data | {"file": "rivets.csv"}, context={"folder": tmp_path})
+    context = {"folder": tmp_path, "files": []}
+    read = Fasteners.model_validate(data | {"file": "rivets.csv"}, context=context)
     assert read == listed

@@ -214,7 +214,10 @@ def test_active_set_equals_enumeration(
 ) -> None:
     Q, p = problem
     first = np.array([start >> i & 1 == 1 for i in range(len(p))])
-    for active in (contact_set(Q, p), contact_set(Q, p, first)):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("harness.active_set.FEW", 1)
+        from_halves = contact_set(Q, p)
+    for active in (contact_set(Q, p), contact_set(Q, p, first), from_halves):
         C = np.flatnonzero(active)
         lam = np.zeros(len(p))
         lam[C] = np.linalg.solve(Q[np.ix_(C, C)], p[C])

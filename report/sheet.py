@@ -1,0 +1,85 @@
+"""A sheet of maps of one region, each in true proportions, with one colour bar.
+
+All its sizes are known beforehand. A layout engine would find them by drawing every label several times,
+which takes longer than the picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+
+from . import style
+from .maps import Array
+
+# inches
+LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.2, 0.35, 0.5
+BESIDE, BELOW = 0.5, 0.4  # between maps: below one there is the next one's title
+NAME_LEFT, NAME_BELOW = 0.6, 0.27  # of an axis, from the map
+LOWEST, TALLEST = 0.4, 5.5  # a row, which holds "y, mm"; a map
+LETTER = 0.09  # of a title, at most on average
+ENTRY, LINE = 1.7, 0.22  # of a legend
+BAR, FROM_MAPS, SHORTEST = 0.18, 0.25, 1.0  # a colour bar: its width, its distance, its least height
+
+
+@dataclass(frozen=True)
+class Sheet:
+    figure: Figure
+    axes: list[Axes]
+    bar: Axes
+    legend_columns: int
+
+    def finished(self, drawn: ScalarMappable, label: str) -> Figure:
+        """The sheet with the colour bar of what was drawn, and a legend of the labelled marks."""
+        self.figure.colorbar(drawn, cax=self.bar, label=label)
+        found = [axes.get_legend_handles_labels() for axes in self.axes]
+        named = {text: mark for marks, texts in found for mark, text in zip(marks, texts, strict=True)}
+        if named:
+            self.figure.legend(named.values(), named.keys(), loc="lower left", ncols=self.legend_columns)
+        return self.figure
+
+
+def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int) -> Sheet:
+    """An empty map of one region for each title, row by row; the outer ones have numbers at their axes.
+
+    low, high : the region's corners (x, y), mm. marks : so many kinds go into the legend.
+    """
+    rows = -(-len(titles) // columns)
+    ratio = (high[1] - low[1]) / (high[0] - low[0])
+    room = (style.WIDTH - LEFT - RIGHT - (columns - 1) * BESIDE) / columns
+    width = min(room, TALLEST / ratio)
+    height = width * ratio
+    over = LETTER * max(map(len, titles))  # a title may be wider than its map
+    across, down = max(width + BESIDE, over), max(height, LOWEST) + BELOW  # from a map to the next
+    wide = LEFT + (columns - 1) * across + max(width + RIGHT, over)
+    long = (rows - 1) * down + height
+    bar = max(long, SHORTEST)
+    top = TOP + (bar - long) / 2  # the maps in the middle of the bar
+    legend_columns = max(int(wide / ENTRY), 1)
+    tall = TOP + bar + BOTTOM + -(-marks // legend_columns) * LINE
+    figure = Figure(figsize=(wide, tall))
+
+    def placed(left: float, bottom: float, width: float, height: float) -> Axes:
+        return figure.add_axes((left / wide, bottom / tall, width / wide, height / tall))
+
+    maps = []
+    for k, title in enumerate(titles):
+        row, column = divmod(k, columns)
+        axes = placed(LEFT + column * across, tall - top - row * down - height, width, height)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, mm", ylabel="y, mm")
+        axes.set_title(title, y=1.0)  # given places spare a search for them
+        axes.xaxis.set_label_coords(0.5, -NAME_BELOW / height)
+        axes.yaxis.set_label_coords(-NAME_LEFT / width, 0.5)
+        axes.grid(visible=False)
+        axes.spines[:].set_visible(True)
+        first, last = column == 0, k + columns >= len(titles)
+        axes.tick_params(left=first, labelleft=first, bottom=last, labelbottom=last)
+        axes.yaxis.label.set_visible(first)
+        axes.xaxis.label.set_visible(last)
+        maps.append(axes)
+    right = LEFT + (columns - 1) * across + width
+    beside = placed(right + FROM_MAPS, tall - TOP - bar, BAR, bar)
+    return Sheet(figure, maps, beside, legend_columns)
