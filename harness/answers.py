@@ -1,25 +1,25 @@
-"""What a solver hands over in a measurement: whether it can be taken for an answer, and its file."""
+"""What a solver hands over: whether it can be taken for an answer, its figures, and its file."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
 from problems.assembly import Prepared, Vector
 from solvers.base import Answer, Status
 
-Row = dict[str, Any]
+from .records import Row
 
 
 class Refused(Exception):
     """The answer cannot be taken; the text says why."""
 
 
-def checked(answer: Answer, data: Prepared, form: str) -> Row:
-    """The solver's own figures; Refused where what it returned is no answer."""
+def checked(answer: Answer, data: Prepared, form: str) -> Answer:
+    """The answer; Refused where what the solver returned is none."""
     if not isinstance(answer, Answer):
         raise Refused(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
     if answer.status not in get_args(Status):
@@ -33,6 +33,11 @@ def checked(answer: Answer, data: Prepared, form: str) -> Row:
             raise Refused(f"{name} has shape {np.shape(value)}; wanted ({size},)")
         if not np.isfinite(np.asarray(value, dtype=float)).all():
             raise Refused(f"{name} has NaN or infinity")
+    return answer
+
+
+def figures(answer: Answer) -> Row:
+    """What the solver says of it, for the row."""
     return {
         "iterations": answer.iterations,
         "inner_iterations": answer.inner_iterations,

@@ -23,6 +23,8 @@ from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene
 from solvers.base import Form, Load, Problem, Solver
 
+from .answers import Refused, checked
+from .exit_codes import DONE, FELL_SHORT
 from .few_digits import said_of_digits
 from .judge import LIMIT_MM, judge
 from .ledger import Entry, ledger, not_called_for
@@ -31,7 +33,6 @@ from .records import replace_text, to_line
 from .reference import Reference, reference
 from .validate import refuse_what_cannot_fit
 
-SOLVED, NOT_SOLVED = 0, 1
 ACTIVE_SET = "active set (block principal pivoting), refined"
 LINEAR = "linear solve with the Cholesky factors of K"
 
@@ -122,7 +123,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
         written = write(out)
     _show(record, entries, known, console)
     console.print(f"{time.perf_counter() - begun:.1f} s in all. Answer: {written}")
-    return SOLVED if record["verdict"] == "within" else NOT_SOLVED
+    return DONE if record["verdict"] == "within" else FELL_SHORT
 
 
 def _solver(name: str) -> Solver:
@@ -137,7 +138,10 @@ def _answer(
     """x (n,), λ (m,) or NaN where there is none, and what the solver says. Raises InputError without an x."""
     form: Form = "dual" if "dual" in solver.forms else "primal"
     state = solver.prepare(solver.convert(Problem(data, form)))
-    answer = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
+    try:
+        answer = checked(solver.solve(solver.setup(state, load, tolerance), load, tolerance), data, form)
+    except Refused as error:
+        raise InputError.one("--solver", name, str(error), "gave no answer; try another solver") from error
     lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
     x = answer.x
     if form == "dual" and answer.lam is not None:

@@ -31,17 +31,16 @@ from problems.scene import Scene, read_scene
 from solvers.base import Answer, Problem, Solver, Together
 from solvers.registry import make_solver
 
-from .answers import Refused, checked, save
+from .answers import Refused, checked, figures, save
 from .loads import loads_of, recovered
 from .machine import resident_mib
-from .records import to_line
+from .records import Row, to_line
 from .warm_starts import WarmStarts
 from .yardstick import yardstick
 
 LARGEST_EVENT = 2**16  # bytes; a solver's details beyond it are dropped
 PAGE = 4096
 
-Row = dict[str, Any]
 T = TypeVar("T")
 
 
@@ -142,7 +141,7 @@ class Run:
             set_up = partial(solver.update, series.state, series.ready, load, tolerance, near[1])
         series.ready = self.timed("setup_s", set_up)
         answer = self.timed("solve_s", lambda: solver.solve(series.ready, load, tolerance))
-        said = checked(answer, data, form)
+        said = figures(checked(answer, data, form))
         x = answer.x
         if form == "dual" and answer.lam is not None:
             with self.lap("form_s", form_s):
@@ -169,7 +168,7 @@ class Run:
         solve_s = time.perf_counter() - start
         if len(answers) != len(loads):
             raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
-        said = [checked(answer, data, form) for answer in answers]
+        said = [figures(checked(answer, data, form)) for answer in answers]
         found = [answer.x for answer in answers]
         if form == "dual":
             start = time.perf_counter()

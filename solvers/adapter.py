@@ -1,8 +1,9 @@
 """What the adapters of the libraries share: matrices in a library's format, options, the answer.
 
 Every adapter states a form as min ½zᵀPz + qᵀz with rows ≤ bounds (primal: P = K, q = −f, rows Aᵀ ≤ g)
-or z ≥ 0 (dual: P = Q, q = −p). Relative tolerances are 0 and the absolute ones are the tolerance asked
-for, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the duality gap.
+or z ≥ 0 (dual: P = Q, q = −p). Relative tolerances are 0 where a library has them apart, and the absolute
+ones are the tolerance asked for, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p,
+N·mm for the duality gap.
 """
 
 from __future__ import annotations

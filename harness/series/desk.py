@@ -20,14 +20,15 @@ from problems.scene import Scene
 from solvers.base import Answer, Form, Load, Problem, failed
 from solvers.registry import make_solver
 
+from ..answers import checked
 from ..judge import judge
 from ..loads import loads_of
+from ..records import Row
 from ..reference import refined_active_set
 from ..warm_starts import WarmStarts
 from .bound import Bound
 from .vouch import Vouched, vouch
 
-Row = dict[str, Any]
 Gaps = NDArray[np.float32]
 
 BLOCK = 64  # cases that share a pass over K and Q
@@ -110,7 +111,7 @@ class Desk:
         try:
             answers = self.together([load for _, load in loads], self.job.tolerance)
             tried = [
-                _Tried(case, load, self._begun(case), self._checked(answer))
+                _Tried(case, load, self._begun(case), checked(answer, self.data, self.job.form))
                 for (case, load), answer in zip(loads, answers, strict=True)
             ]
         except Exception:
@@ -137,24 +138,12 @@ class Desk:
             start = time.perf_counter()
             answer = self.solver.solve(self.ready, load, self.job.tolerance)
             row["solve_s"] = time.perf_counter() - start
-            answer = self._checked(answer)
+            answer = checked(answer, self.data, self.job.form)
         except Exception as error:
             self.ready = None
             answer = failed(f"{type(error).__name__}: {error}"[:500])
         self.starts.keep(load, answer, case)
         return _Tried(case, load, row, answer)
-
-    def _checked(self, answer: Answer) -> Answer:
-        """The answer with arrays of numbers in the right shape. Raises ValueError."""
-        if answer.lam is None:
-            return answer
-        wanted = [("lam", answer.lam, self.data.assembly.m)]
-        if self.job.form == "primal":
-            wanted.append(("x", np.asarray(answer.x, dtype=float), self.data.assembly.n))
-        for name, value, size in wanted:
-            if np.shape(value) != (size,) or not np.isfinite(value).all():
-                raise ValueError(f"{name} must be ({size},) finite numbers")
-        return answer
 
     def _finished(self, tried: list[_Tried]) -> list[Result]:
         """Rows, with what is known of the answers."""
@@ -186,7 +175,8 @@ class Desk:
                 tried[places[case]] = replace(old, answer=replace(better.answer, iterations=count))
 
     def _vouched(self, tried: list[_Tried]) -> dict[int, Vouched]:
-        answered = [each for each in tried if each.answer.lam is not None]
+        needed = ("lam", "x") if self.job.form == "primal" else ("lam",)
+        answered = [each for each in tried if all(getattr(each.answer, v) is not None for v in needed)]
         if not answered:
             return {}
         lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]

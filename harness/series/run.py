@@ -18,13 +18,13 @@ from problems.effect import ForceEffect
 from problems.prepare import prepared
 
 from .. import records
+from ..exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
 from ..machine import installed_version, machine
 from ..scheduler import done_as_completed, workers
 from . import store
 from .desk import BLOCK, Desk, Job, Result
 from .on_worker import solve_on_worker
 
-DONE, ACCURACY_LOST, NOTHING_JUDGED = 0, 1, 3
 VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
 
 
@@ -187,7 +187,7 @@ def summary(tally: Tally, asked: int, console: Console) -> int:
     missing = asked - sum(tally.counts.values())
     if missing:
         console.print(f"Not solved: {missing}. Run the same command again.", style="red")
-        return ACCURACY_LOST
+        return FELL_SHORT
     if not tally.counts["within"] + tally.counts["outside"]:
         return NOTHING_JUDGED
-    return ACCURACY_LOST if tally.counts["outside"] + tally.counts["no_answer"] else DONE
+    return FELL_SHORT if tally.counts["outside"] + tally.counts["no_answer"] else DONE
