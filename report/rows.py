@@ -95,6 +95,11 @@ class Results:
         rows = self.rows[self.rows["threads"] == threads].reset_index(drop=True)
         return replace(self, rows=rows, cells=cells_of(rows))
 
+    def cells_by_threads(self) -> pd.DataFrame:
+        """All cells, each line named without its number of threads: for tables with a column that says it."""
+        counts = sorted(self.rows["threads"].dropna().unique())
+        return pd.concat([self.of_threads(count).cells for count in counts], ignore_index=True)
+
     def by_machine(self) -> list[Results]:
         """Results apart for each machine, so that no table or mean can mix two of them."""
         names = self.rows["machine"].unique()

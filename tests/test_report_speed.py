@@ -87,12 +87,14 @@ def test_lines_of_several_numbers_of_threads_are_named_without_it(tmp_path: Path
 
 def test_a_code_of_the_same_method_that_ran_out_of_time_bounds_the_ratio(tmp_path: Path) -> None:
     rows = [timed(LOW, "gi", 2.0, "primal"), timed(HIGH, "gi", 2.0, "primal"), timed(LOW, "gi", 1.0)]
+    rows += [timed(LOW, "gi", 3.0, "primal", threads=1)]
     rows += [timed(LOW, "quadprog", 40.0, "primal")]
     rows += [timed(HIGH, "quadprog", 0.0, "primal") | no_answer("time_limit") | {"time_limit_s": 50.0}]
     section = same_method.section(results(tmp_path, rows))
     assert section is not None
     (table,) = section.blocks
     assert table.data["ratio"].tolist() == pytest.approx([2 / 40, 2 / 50])
+    assert table.data["series"].tolist() == ["gi (primal)"] * 2
     assert "0.0500" in table.markdown
     assert "< 0.0400" in table.markdown
     assert "> 50" in table.markdown
@@ -109,6 +111,19 @@ def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path:
     assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
     assert data.loc["ipm-fast (dual) bad", "within"] == 0
     assert "2.50 (2.0 to 3.0)" in section.blocks[0].markdown
+
+
+def test_variants_that_are_not_drawn_stand_in_the_tables_alone(tmp_path: Path) -> None:
+    scenes = [f"4386/{k:04d}" for k in (52, 107, 418)]
+    rows = [timed(scene, solver, 1.0) for scene in scenes for solver in ("ipm-fast", "piqp")]
+    rows += [timed(scenes[0], "ipm-fast", 2.0, variant=f"without {k}") for k in "abc"]
+    section = speed.section(results(tmp_path, rows))
+    assert section is not None
+    table, _, figure = section.blocks
+    assert table.data["series"].str.contains("without").sum() == 3
+    legend = [text.get_text() for text in figure.drawing.legends[0].get_texts()]
+    assert legend == ["ipm-fast (dual)", "piqp (dual)"]
+    assert "Not drawn: 3 variants of ipm-fast" in figure.caption
 
 
 def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: Path) -> None:

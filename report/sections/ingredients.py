@@ -16,9 +16,10 @@ KEYS = ["solver", "form", "scene", "threads", "tolerance"]
 
 def section(results: Results) -> Section | None:
     """Of solvers measured both as they are and as variants, in a run with yardsticks."""
-    cells = results.cells[results.cells["status"] != "unsupported"]
-    if not cells["cholesky_s"].notna().any():
+    if not results.rows["cholesky_s"].notna().any():
         return None
+    cells = results.cells_by_threads()
+    cells = cells[cells["status"] != "unsupported"]
     plain = cells[(cells["variant"] == "") & (cells["verdict"] == "within")]
     both = cells[cells["variant"] != ""].merge(plain, on=KEYS, suffixes=("", "_plain"))
     if both.empty:

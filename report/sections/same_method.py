@@ -19,7 +19,7 @@ def section(results: Results) -> Section | None:
     """In a run with yardsticks, of every scene that both codes were measured on."""
     if not results.cells["cholesky_s"].notna().any():
         return None
-    cells = timed(results.cells)
+    cells = timed(results.cells_by_threads())
     cells = cells.assign(text=[seconds_text(cell) for cell in records(cells)])
     lines = [line for pair in PAIRS for line in _lines(cells, *pair)]
     if not lines:

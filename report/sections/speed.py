@@ -12,7 +12,7 @@ from ..blocks import Block, Column, Figure, Section, Table, number, word
 from ..labels import IN_HOUSE, in_order
 from ..numbers import significant, span, spread, whole
 from ..rows import Results
-from ..shown import styles_of
+from ..shown import drawn, left_out, styles_of
 
 PANEL = 3.0  # inches
 ROUND = ["scene", "threads", "repeat"]
@@ -37,9 +37,8 @@ def load_cases(results: Results) -> pd.DataFrame:
     to_library, total_to_library : to the fastest library of the same round of the repeats, in either form
     """
     rows = results.rows
-    named = [results.of_threads(k).cells for k in sorted(rows["threads"].dropna().unique())]
     keys = ["scene", "solver", "form", "variant", "tolerance", "threads"]
-    names = pd.concat(named)[[*keys, "series"]]
+    names = results.cells_by_threads()[[*keys, "series"]]
     cases = rows[rows["verdict"] == "within"].merge(names, on=keys)
     cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
     cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
@@ -123,7 +122,8 @@ def _figure(results: Results, cases: pd.DataFrame) -> Figure:
     results, cases = results.of_threads(most), cases[cases["threads"] == most]
     sizes = sorted(cases["n"].unique())
     drawing = style.figure(PANEL * len(sizes) + 0.3)
-    styles = styles_of(results, results.cells[results.cells["series"].isin(cases["series"])])
+    shown = drawn(results)
+    styles = styles_of(results, shown[shown["series"].isin(cases["series"])])
     for axes, n in zip(drawing.subplots(len(sizes), 1, squeeze=False)[:, 0], sizes, strict=True):
         of_size = cases[cases["n"] == n]
         for series, look in styles.items():
@@ -145,6 +145,6 @@ def _figure(results: Results, cases: pd.DataFrame) -> Figure:
     caption = (
         "*Seconds a load case in units of one Cholesky factorisation of Q* of the same process, against the "
         "active contacts; answers within the limit only, medians of the repeats, at the largest number of "
-        "threads."
+        f"threads.{left_out(results)}"
     )
     return Figure("speed", caption, drawing)
