@@ -54,8 +54,10 @@ def planned_measurements(suite: dict[str, Any]) -> int:
         tolerances = solver.get("tolerances", suite.get("tolerances", [None]))
         what = [(solver.get("name"), solver.get("variant", ""))]
         repeats = range(solver.get("repeats", suite.get("repeats", 1)))
-        threads = suite.get("threads", [None])
-        planned |= {*product(what, scenes, solver.get("forms", [None]), tolerances, threads, repeats)}
+        threads = solver.get("threads", suite.get("threads", [None]))
+        cases = range(solver.get("cases", suite.get("series", {}).get("cases", 1)))
+        forms = solver.get("forms", [None])
+        planned |= {*product(what, scenes, forms, tolerances, threads, repeats, cases)}
     return len(planned)
 
 

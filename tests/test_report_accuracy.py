@@ -350,3 +350,11 @@ def test_what_two_entries_of_a_suite_ask_for_is_planned_once() -> None:
     again = {"name": "a", "forms": ["dual"], "tolerances": [1e-5], "scenes": ["4386/*"], "repeats": 3}
     suite = {"scenes": [LOW, "6112/0600"], "threads": [2], "solver": [one, again]}
     assert planned_measurements(suite) == 2 * 3 + 2
+
+
+def test_an_entry_with_its_own_threads_or_cases_plans_no_more_than_those() -> None:
+    own = {"name": "a", "forms": ["dual"], "threads": [2], "cases": 3}
+    rest = {"name": "b", "forms": ["dual"]}
+    suite = {"scenes": [LOW], "tolerances": [1e-9], "threads": [1, 2], "solver": [own, rest]}
+    assert planned_measurements(suite | {"series": {"cases": 5}}) == 3 + 2 * 5
+    assert planned_measurements(suite | {"solver": [rest]}) == 2
