@@ -9,7 +9,7 @@ import pandas as pd
 from ..blocks import Column, Section, Table, number, word
 from ..numbers import significant, whole
 from ..rows import Results
-from .paper.selection import records, seconds_text, timed
+from ..timed import records, seconds_text, timed
 
 #: Ours, the form, and the other code of a dual active-set method.
 PAIRS = (("gi", "dual", "daqp"), ("gi", "primal", "quadprog"))

@@ -14,7 +14,7 @@ from ..labels import in_order
 from ..numbers import MISSING, whole
 from ..rows import Results
 from ..shown import styles_of
-from .paper.selection import records, seconds_text
+from ..timed import records, seconds_text
 
 FEWEST = 3  # sizes
 #: What grows, and its unit.

@@ -9,9 +9,10 @@ import pandas as pd
 
 from ...numbers import counted, power, significant
 from ...standings import geometric_mean
+from ...timed import records, timed
 from .claims_linear import is_faster, pairs
 from .crossings import BETTER, below, sizes, worst
-from .selection import method, records, timed
+from .selection import method
 from .verdict import Case, Claim, Measured, Verdict, by_case, decided
 
 RIVALS = ("GI primal", "GI dual")

@@ -8,8 +8,9 @@ from dataclasses import replace
 import pandas as pd
 
 from ...numbers import significant
+from ...timed import timed
 from .crossings import at_share, sizes
-from .selection import method, timed
+from .selection import method
 from .verdict import Case, Claim, Measured, by_case
 
 RIVALS = ("GI primal", "GI dual")

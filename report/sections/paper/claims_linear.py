@@ -9,8 +9,9 @@ import pandas as pd
 
 from ...numbers import significant
 from ...standings import TIE
+from ...timed import records, timed
 from .cg import SYSTEMS, counts
-from .selection import ipm, records, timed
+from .selection import ipm
 from .targets import LATE, ORDERINGS, RATIO, largest_late, ratios
 from .verdict import Case, Claim, Measured, by_case
 

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 
 from ...numbers import as_number, power, significant, span, tidy_power, whole
 from ...standings import TIE
+from ...timed import records
 from .claims_linear import pairs
-from .selection import figures_of, ipm, records
+from .selection import figures_of, ipm
 from .table2 import RIVALS, STARTS, loads, no_more
 from .verdict import (
     CONFIRMED,

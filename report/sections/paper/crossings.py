@@ -9,7 +9,8 @@ from itertools import pairwise
 import pandas as pd
 
 from ...numbers import counted, significant
-from .selection import METHODS, method, records, timed
+from ...timed import records, timed
+from .selection import METHODS, method
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,11 @@ from ...blocks import Block, Column, Figure, Section, Table, number, word
 from ...labels import in_order
 from ...numbers import whole
 from ...rows import Results
+from ...timed import records, seconds_text
 from .. import times
 from .crossings import BETTER, below, compared, sizes, worst
 from .looks import LOOKS
-from .selection import METHODS, cells_of_paper, is_paper, method, of_problems, records, seconds_text
+from .selection import METHODS, cells_of_paper, is_paper, method, of_problems
 
 FIGURE = {4386: "5", 6112: "6", 11308: "7"}
 PAIRS = (

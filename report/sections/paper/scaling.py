@@ -10,7 +10,8 @@ import pandas as pd
 from ...fit import Exponent, exponent
 from ...numbers import as_number
 from ...rows import Results
-from .selection import METHODS, cells_of_paper, method, of_scaling, records, timed
+from ...timed import records, timed
+from .selection import METHODS, cells_of_paper, method, of_scaling
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...numbers import MISSING, significant
-from ...rows import ANSWERED, Results
+from ...rows import Results
+from ...timed import records
 
 SUITE = "paper"
 SCALING = "scaling/"  # scenes of one joint at several sizes; all others belong to the paper's problems
@@ -88,27 +88,6 @@ def of_problems(cells: pd.DataFrame) -> pd.DataFrame:
     return cells[~cells["scene"].str.startswith(SCALING)]
 
 
-def timed(cells: pd.DataFrame) -> pd.DataFrame:
-    """With `at_least`: seconds a load case where the answer is within the limit; for a run that the time
-    limit or an iteration limit ended, what it had taken by then; else missing. `cut`: it is only that
-    lower bound.
-    """
-    within = cells["verdict"] == "within"
-    late = (cells["status"] == "time_limit") & ~within
-    spent = (cells["status"] == "iteration_limit") & ~within
-    at_least = cells["load_case_s"].where(within | spent, cells["time_limit_s"].where(late))
-    return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
-
-
-def seconds_text(cell: Mapping[str, Any]) -> str:
-    """The seconds a load case, or for a run without an answer within the limit, why there is none."""
-    if cell["verdict"] == "within":
-        return significant(cell["load_case_s"])
-    if cell["verdict"] in ANSWERED:
-        return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
-    if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
-        return f"> {cell['time_limit_s']:.4g}"
-    return str(cell["status"]).replace("_", " ") or MISSING
 
 
 def figures_of(cell: Mapping[str, Any] | None, name: str) -> dict[str, Any]:
@@ -116,10 +95,6 @@ def figures_of(cell: Mapping[str, Any] | None, name: str) -> dict[str, Any]:
     found = cell["details"].get(name) if cell is not None else None
     return found if isinstance(found, dict) else {}
 
-
-def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """The lines of a frame as dictionaries."""
-    return frame.to_dict("records")  # type: ignore[return-value]
 
 
 def first(cells: pd.DataFrame) -> dict[str, Any] | None:

@@ -13,8 +13,9 @@ from ...blocks import Block, Column, Figure, Section, Table, Text, number, word
 from ...numbers import MISSING, listed, significant, tidy_power, whole
 from ...printed import TABLE_1
 from ...rows import Results
+from ...timed import records, seconds_text
 from .cg import SYSTEMS, Counts, counts, system_name
-from .selection import asked, cells_of_paper, first, ipm, is_paper, of_problems, records, seconds_text
+from .selection import asked, cells_of_paper, first, ipm, is_paper, of_problems
 from .targets import late_target, ratio_target
 
 PRINTED_N = 4386

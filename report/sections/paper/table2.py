@@ -11,7 +11,8 @@ from ...blocks import Column, Section, Table, Text, number, word
 from ...numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
 from ...printed import TABLE_2
 from ...rows import ANSWERED, Results
-from .selection import cells_of_paper, figures_of, first, ipm, is_paper, records, seconds_text
+from ...timed import records, seconds_text
+from .selection import cells_of_paper, figures_of, first, ipm, is_paper
 
 STARTS = {"stp1": "STP1", "stp2": "STP2", "algorithm_5": "Algorithm 5", "mehrotra": "Mehrotra"}
 RIVALS = ("stp1", "stp2")

@@ -12,9 +12,10 @@ from ... import style
 from ...blocks import Block, Column, Figure, Section, Table, number, word
 from ...numbers import MISSING, whole
 from ...rows import Results
+from ...timed import records, seconds_text
 from .looks import LOOKS
 from .scaling import QUANTITIES, fitted, measured
-from .selection import METHODS, is_paper, records, seconds_text
+from .selection import METHODS, is_paper
 
 PANELS = (
     ("preparation_s", "data preparation, s"),

@@ -10,7 +10,8 @@ from ...blocks import Section, Table, number
 from ...numbers import as_number, signed, whole
 from ...printed import TABLE_4
 from ...rows import Results
-from .selection import SCALING, is_paper, records
+from ...timed import records
+from .selection import SCALING, is_paper
 
 
 def section(results: Results) -> Section | None:

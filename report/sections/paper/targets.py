@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from ...timed import records
 from .cg import SYSTEMS, Counts, counts
-from .selection import first, ipm, records
+from .selection import first, ipm
 
 RATIO = 20  # V needs at most one CG iteration for so many of V = I, summed over a solve
 LATE = 40  # CG iterations of a system in the second half of a solve, at most
