@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from .assembly import Assembly, LoadCase, Matrix, Prepared, Vector
 from .condense import NotPositiveDefinite
 from .effect import ForceEffect, GapEffect
 from .errors import InputError
+from .fingerprint import fingerprint
 from .joint import Joint, Part
 from .matrices import read_matrices
 from .scene import Scene
@@ -62,8 +64,7 @@ def cache_key(scene: Scene) -> str:
     """The hash of what made the matrices: the scene's data and the code that builds from it."""
     effects = [inspect.getmodule(type(effect)) for effect in scene.stiffness_effects]
     modules = [assembly, condense, hermite, joint, matrices, plate, inspect.getmodule(prepared), *effects]
-    sources = [inspect.getsource(module) for module in modules if module]
-    return cache.digest(scene.assembly_key, sources)
+    return cache.digest(scene.assembly_key, fingerprint(Path(inspect.getfile(m)) for m in modules if m))
 
 
 def _build(scene: Scene, progress: Progress) -> tuple[dict[str, Matrix], dict[str, Any]]:

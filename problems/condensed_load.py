@@ -6,6 +6,7 @@ j are the deflections of the junction nodes, i the part's other free unknowns, a
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +16,7 @@ from . import cache
 from .assembly import Vector
 from .build import cache_key
 from .effect import PartLoadEffect, PartModel
+from .fingerprint import fingerprint
 from .joint import Joint, Part
 from .line_loads import line_loads
 from .scene import Scene, plain
@@ -27,8 +29,8 @@ def condensed_load(effect: PartLoadEffect, scene: Scene, joint: Joint) -> Vector
     motions that the junction imposes goes to f_j, and its work on the others does not move the junction.
     """
     modules = [inspect.getmodule(made) for made in (effect.load, PartModel, condensed_load, line_loads)]
-    sources = [inspect.getsource(module) for module in modules if module]
-    key = cache.digest("condensed load", cache_key(scene), plain(effect), sources)
+    code = fingerprint(Path(inspect.getfile(module)) for module in modules if module)
+    key = cache.digest("condensed load", cache_key(scene), plain(effect), code)
     found = cache.load(key)
     if found is None:
         (part,) = (part for part in joint.part if part.name == effect.part)

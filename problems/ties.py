@@ -5,9 +5,8 @@ The parts that springs join become one block. What the parts cost to condense is
 
 from __future__ import annotations
 
-import inspect
-import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +22,7 @@ from .build import (
     indefinite,
     schur,
 )
+from .fingerprint import fingerprint
 from .scene import Scene
 
 
@@ -31,8 +31,8 @@ def tied(base: Prepared, scene: Scene, T: sp.csc_array, k: Vector, progress: Pro
 
     From the cache where it stands there. Raises InputError where cond(K) becomes larger than 1e14.
     """
-    source = inspect.getsource(sys.modules[__name__])
-    key = cache.digest("ties", cache_key(scene), T.indices.tolist(), T.data.tolist(), k.tolist(), source)
+    code = fingerprint([Path(__file__)])
+    key = cache.digest("ties", cache_key(scene), T.indices.tolist(), T.data.tolist(), k.tolist(), code)
     found = cache.load(key)
     if found is None:
         with cache.lock(key):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import inspect
+import ast
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 import pytest
 from joints import make_joint, make_scene
 
-from problems import build, cache
+from problems import build, cache, fingerprint
 from problems.effects.supports import Supports
 from problems.errors import InputError
+from problems.fingerprint import ROOT
 
 ARRAYS = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
@@ -162,12 +164,16 @@ def test_a_truncated_part_of_a_scene_stops_the_run(root: Path) -> None:
 def test_a_change_of_the_code_that_builds_changes_the_key(
     module: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source, key = inspect.getsource, build.cache_key(SCENE)
+    parse, key = ast.parse, build.cache_key(SCENE)
+    edited = (ROOT / "problems" / module.replace(".", "/")).with_suffix(".py").read_bytes()
+    monkeypatch.setattr(fingerprint, "_read", fingerprint._read.__wrapped__)
 
-    def edited(made: Any) -> str:
-        return source(made) + ("# edited" if made.__name__ == f"problems.{module}" else "")
+    def with_more(text: str) -> Callable[[bytes], ast.Module]:
+        return lambda code: parse(code + text.encode() if code == edited else code)
 
-    monkeypatch.setattr(inspect, "getsource", edited)
+    monkeypatch.setattr(ast, "parse", with_more("\n# words\n"))
+    assert build.cache_key(SCENE) == key
+    monkeypatch.setattr(ast, "parse", with_more("\nMORE = 1\n"))
     assert build.cache_key(SCENE) != key
 
 
