@@ -14,14 +14,20 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from . import assembly, cache, condense, hermite, joint, matrices, plate
-from .assembly import Assembly, LoadCase, Matrix, Prepared, Vector
-from .condense import NotPositiveDefinite
-from .effect import ForceEffect, GapEffect
+from problems.condensation import condense
+from problems.condensation.condense import NotPositiveDefinite
+from problems.fem import hermite, plate
+from problems.forms import assembly
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Prepared, Vector
+from problems.input import user_matrices as matrices
+from problems.input.user_matrices import read_matrices
+from problems.model import joint
+from problems.model.effect import ForceEffect, GapEffect
+from problems.model.joint import Joint, Part
+from problems.storage import cache
+from problems.storage.fingerprint import fingerprint
+
 from .errors import InputError
-from .fingerprint import fingerprint
-from .joint import Joint, Part
-from .matrices import read_matrices
 from .scene import Scene
 
 Progress = Callable[[str, float], None]
@@ -197,6 +203,7 @@ def extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
     if n < 50:
         values = np.linalg.eigvalsh(K)
         return float(values[0]), float(values[-1])
+
     def solve(b: Vector) -> Vector:
         return sla.cho_solve((U, False), b, check_finite=False)
 

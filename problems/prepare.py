@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from problems.forms.assembly import LoadCase, Prepared
+from problems.model.effect import PartLoadEffect, TieEffect
+
 from . import build
-from .assembly import LoadCase, Prepared
-from .effect import PartLoadEffect, TieEffect
 from .scene import Scene
 
 
@@ -24,7 +25,7 @@ def prepared(scene: Scene, progress: build.Progress = lambda text, fraction: Non
     ties = [effect for effect in scene.effects if isinstance(effect, TieEffect)]
     if scene.joint is None or not ties:
         return base
-    from .ties import tied
+    from problems.condensation.springs import tied
 
     springs = [effect.springs(scene.joint) for effect in ties]
     T = sp.csc_array(sp.hstack([T for T, _ in springs]))
@@ -37,7 +38,7 @@ def load_case(scene: Scene, prepared: Prepared) -> LoadCase:
     beyond = [effect for effect in scene.effects if isinstance(effect, PartLoadEffect)]
     if scene.joint is None or not beyond:
         return load
-    from .condensed_load import condensed_load
+    from problems.condensation.condensed_load import condensed_load
 
     f = load.f
     for effect in beyond:

@@ -21,13 +21,14 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from .cache import digest
-from .effect import Effect, Pair, StiffnessEffect
-from .effect_tables import EffectTable
+from problems.input.validation import UNITS, unknown, validation_faults
+from problems.manufactured.ladder import PREFIX, Made, Rung, make_rung, rung_names
+from problems.model.effect import Effect, Pair, StiffnessEffect
+from problems.model.effect_tables import EffectTable
+from problems.model.joint import Joint, Table
+from problems.storage.cache import digest
+
 from .errors import Fault, InputError
-from .joint import Joint, Table
-from .ladder import PREFIX, Made, Rung, make_rung, rung_names
-from .validation import UNITS, unknown, validation_faults
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE / "scenes"

@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
-from problems.assembly import Assembly, Matrix, Prepared, Vector
+from problems.forms.assembly import Assembly, Matrix, Prepared, Vector
 
 Form = Literal["primal", "dual"]
 FORMS: tuple[Form, Form] = ("primal", "dual")

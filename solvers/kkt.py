@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.assembly import Matrix, Vector
+from problems.forms.assembly import Matrix, Vector
 
 from .base import Status
 

@@ -22,14 +22,14 @@ from .plugin import load_plugin
 
 #: name → module:class, imported when asked for.
 SOLVERS = {
-    "ipm": "solvers.ipm:Ipm",
-    "gi": "solvers.gi:GoldfarbIdnani",
-    "newton": "solvers.newton:ActiveSetNewton",
-    "ipm-fast": "solvers.ipm_fast:FastIpm",
-    "osqp": "solvers.with_osqp:Osqp",
-    "clarabel": "solvers.with_clarabel:Clarabel",
-    "proxqp": "solvers.with_proxqp:ProxQp",
-    "piqp": "solvers.with_piqp:Piqp",
+    "ipm": "solvers.methods.ipm:Ipm",
+    "gi": "solvers.methods.gi:GoldfarbIdnani",
+    "newton": "solvers.methods.newton:ActiveSetNewton",
+    "ipm-fast": "solvers.methods.ipm_fast:FastIpm",
+    "osqp": "solvers.libraries.osqp:Osqp",
+    "clarabel": "solvers.libraries.clarabel:Clarabel",
+    "proxqp": "solvers.libraries.proxqp:ProxQp",
+    "piqp": "solvers.libraries.piqp:Piqp",
 }
 
 IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
@@ -89,7 +89,7 @@ def _factory(name: str, plugin: Path | None) -> Callable[..., Solver]:
         except ImportError as error:
             raise InputError.one("solvers", "name", name, f"cannot be imported here ({error})") from error
     if name in _found_by_qpsolvers():
-        from .with_qpsolvers import QpSolvers
+        from solvers.libraries.qpsolvers import QpSolvers
 
         def by_name() -> Solver:
             return QpSolvers(name)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.effect import Effect
-from problems.joint import Joint
+from problems.model.effect import Effect
+from problems.model.joint import Joint
 from problems.scene import Scene
 
 

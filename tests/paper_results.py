@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from synthetic_results import COND, GRIDS, no_answer, row, write_rows
 
-from report.rows import Results, read
+from report.results.reader import Results, read
 
 LOADS = {
     4386: (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592),
@@ -122,9 +122,7 @@ def write_paper(directory: Path, rows: Rows, *, name: str = "paper", files: bool
 
 def changed(rows: Rows, chosen: Callable[[Row], bool], **figures: Any) -> Rows:
     """The rows, with `figures` in those that are chosen; callables are applied to the row."""
-    return [
-        r | {k: v(r) if callable(v) else v for k, v in figures.items()} if chosen(r) else r for r in rows
-    ]
+    return [r | {k: v(r) if callable(v) else v for k, v in figures.items()} if chosen(r) else r for r in rows]
 
 
 def results(directory: Path, rows: Rows) -> Results:

@@ -10,8 +10,8 @@ import scipy.linalg as sla
 import scipy.optimize
 import scipy.sparse as sp
 
-from harness.trials import contact_rows, prepared_from, stiffness
-from problems.assembly import LoadCase, Prepared, Vector
+from harness.conformance.trials import contact_rows, prepared_from, stiffness
+from problems.forms.assembly import LoadCase, Prepared, Vector
 from solvers.base import Load
 
 

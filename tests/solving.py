@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.assembly import LoadCase, Prepared, Vector
+from problems.forms.assembly import LoadCase, Prepared, Vector
 from solvers.base import Answer, Form, Load, Problem
 from solvers.registry import make_solver, solver_names
 
@@ -42,9 +42,9 @@ def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vecto
 
     100 cond(K) 2⁻⁵³ max(|x|, |K⁻¹f|), x being what is left of K⁻¹f − K⁻¹Aλ; and besides
     (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and sᵀλ ≤ τ(m + Σλ): the bound that
-    harness/certificate.py derives. PIQP looks at λ ≥ 0 in a scaling of its own and was seen to leave −3.5τ;
-    a λ ≥ −10τ adds s*ᵀ10τ to sᵀλ, for (s* − s)ᵀ(λ* − λ) then is at most sᵀλ − s*ᵀλ. Clarabel's τ is a share
-    of the data where that is above 1.
+    harness/verification/certificate.py derives. PIQP looks at λ ≥ 0 in a scaling of its own and was seen
+    to leave −3.5τ; a λ ≥ −10τ adds s*ᵀ10τ to sᵀλ, for (s* − s)ᵀ(λ* − λ) then is at most sᵀλ − s*ᵀλ.
+    Clarabel's τ is a share of the data where that is above 1.
     """
     low, high = eigenvalues(prepared)
     size = max(float(abs(v).max(initial=0.0)) for v in (x, prepared.solve_K(case.f)))

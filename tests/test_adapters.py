@@ -12,16 +12,16 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
-from harness.check import run
-from solvers.adapter import Converted, answer, dense, upper_triangle
+from harness.conformance.check import run
 from solvers.base import FORMS, Form, Problem
+from solvers.libraries.adapter import Converted, answer, dense, upper_triangle
+from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
+from solvers.libraries.clarabel import Clarabel
+from solvers.libraries.osqp import Osqp
+from solvers.libraries.piqp import Piqp
+from solvers.libraries.proxqp import ProxQp
+from solvers.libraries.qpsolvers import TOLERANCE, QpSolvers
 from solvers.registry import make_solver, solver_names
-from solvers.with_clarabel import STATUS as CLARABEL_STATUS
-from solvers.with_clarabel import Clarabel
-from solvers.with_osqp import Osqp
-from solvers.with_piqp import Piqp
-from solvers.with_proxqp import ProxQp
-from solvers.with_qpsolvers import TOLERANCE, QpSolvers
 
 NAMES = solver_names()
 LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from joints import make_joint, make_scene
 
-from problems import build, cache, fingerprint
+from problems import build
 from problems.effects.supports import Supports
 from problems.errors import InputError
-from problems.fingerprint import ROOT
+from problems.storage import cache, fingerprint
+from problems.storage.fingerprint import ROOT
 
 ARRAYS = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
@@ -159,7 +160,11 @@ def test_a_truncated_part_of_a_scene_stops_the_run(root: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["hermite", "plate", "condense", "joint", "matrices", "assembly", "build", "effects.supports"]
+    "module",
+    [
+        *("fem.hermite", "fem.plate", "condensation.condense", "model.joint", "input.user_matrices"),
+        *("forms.assembly", "build", "effects.supports"),
+    ],
 )
 def test_a_change_of_the_code_that_builds_changes_the_key(
     module: str, monkeypatch: pytest.MonkeyPatch

@@ -10,12 +10,12 @@ import pytest
 import scipy.linalg as sla
 import scipy.sparse as sp
 
-from harness import definite
-from harness.certificate import certify
-from harness.definite import smallest_eigenvalue
-from harness.exact_residual import Double
-from harness.reference import refined_active_set
-from problems.assembly import Assembly, LoadCase, Prepared
+from harness.verification import definite
+from harness.verification.certificate import certify
+from harness.verification.definite import smallest_eigenvalue
+from harness.verification.exact_residual import Double
+from harness.verification.reference import refined_active_set
+from problems.forms.assembly import Assembly, LoadCase, Prepared
 
 GROUPS, EACH = 40, 75  # random problems in all: their product
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from small import make_prepared
 
-from harness.check import run
-from harness.trials import known_case, trials
-from problems.assembly import LoadCase
+from harness.conformance.check import run
+from harness.conformance.trials import known_case, trials
+from problems.forms.assembly import LoadCase
 from solvers.base import Answer, Form, Load, Near, Problem, Solver
 from solvers.registry import make_solver
 

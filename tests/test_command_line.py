@@ -8,7 +8,7 @@ from pathlib import Path
 
 SHOW = """
 import sys
-from harness.cli import main
+from harness.cli.app import main
 try:
     main()
 finally:

@@ -11,11 +11,9 @@ from joints import dof, make_joint, make_scene
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from harness.active_set import contact_set
-from problems.assembly import LoadCase, Prepared
+from harness.verification.principal_pivoting import contact_set
 from problems.build import load_case, prepared
-from problems.condense import NotPositiveDefinite, condense
-from problems.effect import StiffnessEffect
+from problems.condensation.condense import NotPositiveDefinite, condense
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
@@ -23,6 +21,8 @@ from problems.effects.ribs import Ribs
 from problems.effects.stringers import Stringers
 from problems.effects.supports import Supports
 from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Prepared
+from problems.model.effect import StiffnessEffect
 from problems.scene import Scene
 
 SHORT, LONG = {"length": 90.0, "elements": 2}, {"length": 250.0, "elements": 4}

@@ -13,11 +13,11 @@ from matplotlib.image import imread
 from pydantic_core import PydanticUndefined
 from rich.console import Console
 
-from harness.solve import solve
+from harness.scene.solve import solve
 from problems import effects
-from problems.effect import Effect, effect_class, effect_kinds
 from problems.errors import InputError
 from problems.formats import WRITERS
+from problems.model.effect import Effect, effect_class, effect_kinds
 from problems.prepare import load_case, prepared
 from problems.scene import SCENES, read_scene
 

@@ -153,7 +153,7 @@ def test_everything_wrong_in_a_file_is_said_in_one_go(tmp_path: Path) -> None:
 
 
 def test_a_wrong_assembly_does_not_hide_the_effects(tmp_path: Path) -> None:
-    found = faults(tmp_path, 'kind = "pressure"\npart = "a"\nvalue = nan', joint='[title]\n')
+    found = faults(tmp_path, 'kind = "pressure"\npart = "a"\nvalue = nan', joint="[title]\n")
     assert [fault.key for fault in found] == ["joint", "effect[0] (pressure).value"]
     path = tmp_path / "scene.toml"
     path.write_text('assembly = "wing"\n[[effect]]\nkind = "pressure"\npart = "a"\nvalue = nan\n')

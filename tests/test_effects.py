@@ -17,7 +17,7 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
-from problems.joint import Joint
+from problems.model.joint import Joint
 
 ROOT = Path(__file__).parents[1]
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}

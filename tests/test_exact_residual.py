@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from harness.exact_residual import Double, Enclosed, forces, gaps, two_product, two_sum
-from problems.assembly import Assembly
+from harness.verification.exact_residual import Double, Enclosed, forces, gaps, two_product, two_sum
+from problems.forms.assembly import Assembly
 
 
 def exactly(v: np.ndarray) -> list[Fraction]:

@@ -20,10 +20,11 @@ import pytest
 import tiny
 from rich.console import Console
 
-from harness import measure, records
-from harness import rows as rows_module
-from harness.run import run
-from harness.suite import read_suite
+from harness.measurement import process as measure
+from harness.measurement import row as rows_module
+from harness.measurement.run import run
+from harness.planning.suite import read_suite
+from harness.results import records
 
 ROOT = Path(__file__).parent.parent
 
@@ -140,7 +141,8 @@ def test_a_worker_that_something_else_kills_is_a_row(folder: Path) -> None:
     out = folder / "worker" / "out"
     going = subprocess.Popen(command(suite, out), cwd=ROOT, stdout=subprocess.DEVNULL)
     driver = psutil.Process(going.pid)
-    worker = wait_for(lambda: [c for c in driver.children() if "harness.worker" in " ".join(c.cmdline())])[0]
+    name = "harness.measurement.worker"
+    worker = wait_for(lambda: [c for c in driver.children() if name in " ".join(c.cmdline())])[0]
     worker.send_signal(signal.SIGKILL)
     assert going.wait(60) == 3  # nothing could be judged
     assert [row["status"] for row in rows_of(out)] == ["crashed", "iteration_limit"]

@@ -17,14 +17,14 @@ from scipy.io import FortranFile
 from small import make_load, make_prepared, solve_by_nnls
 from typer.testing import CliRunner
 
-from harness.cli import app
-from harness.exchange import export, import_, matrices
-from harness.solve import solve
-from harness.trials import prepared_from
+from harness.cli.app import app
+from harness.conformance.trials import prepared_from
+from harness.scene.exchange import export, import_, matrices
+from harness.scene.solve import solve
 from problems import build, formats
-from problems.assembly import LoadCase, Prepared
-from problems.digits import apparent_digits, expected_error
 from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Prepared
+from problems.input.digits import apparent_digits, expected_error
 from problems.prepare import load_case, prepared
 from problems.scene import read_scene
 

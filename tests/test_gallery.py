@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from small import solve_by_nnls
 
-from harness.reference import reference
-from problems.assembly import LoadCase, Prepared
-from problems.joint import Joint
+from harness.verification.reference import reference
+from problems.forms.assembly import LoadCase, Prepared
+from problems.model.joint import Joint
 from problems.prepare import load_case, prepared
 from problems.scene import Scene, read_scene, scene_names
 

@@ -11,12 +11,12 @@ import scipy.sparse as sp
 from scipy.optimize import nnls
 from small import make_load, make_prepared, solve_by_nnls
 
-from problems.assembly import Assembly, LoadCase, Prepared
+from problems.forms.assembly import Assembly, LoadCase, Prepared
+from solvers.active_set.gi_border import Border
+from solvers.active_set.goldfarb_idnani import _State, goldfarb_idnani
+from solvers.active_set.growing_factor import BLOCK, GrowingFactor
 from solvers.base import Answer, Form, Load, Problem
-from solvers.gi import GoldfarbIdnani
-from solvers.gi_border import Border
-from solvers.goldfarb_idnani import _State, goldfarb_idnani
-from solvers.growing_factor import BLOCK, GrowingFactor
+from solvers.methods.gi import GoldfarbIdnani
 
 
 def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:

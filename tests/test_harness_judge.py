@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from harness.judge import Judgement, conditioned_limit, judge
-from harness.reference import Reference
-from problems.assembly import Assembly, LoadCase, Prepared
+from harness.verification.judge import Judgement, conditioned_limit, judge
+from harness.verification.reference import Reference
+from problems.forms.assembly import Assembly, LoadCase, Prepared
 
 X, LAM = np.array([0.75, 0.25]), np.array([1.5])
 
@@ -96,4 +96,3 @@ def test_lengths_in_other_units_are_judged_in_millimetres() -> None:
 @pytest.mark.parametrize(("condition", "limit"), [(1e4, 1e-7), (1e12, 100 * 1e12 / 2**53 * 3)])
 def test_the_limit_that_conditioning_allows(condition: float, limit: float) -> None:
     assert conditioned_limit(1e-7, condition, 3.0) == pytest.approx(limit)
-

@@ -12,8 +12,8 @@ import psutil
 import pytest
 import tiny
 
-from harness.measure import measure
-from harness.plan import Measurement
+from harness.measurement.process import measure
+from harness.planning.plan import Measurement
 
 MIB = 300
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import records
+from harness.results import records
 from problems.errors import InputError
 
 

@@ -20,11 +20,11 @@ import tiny
 from rich.console import Console
 from typer.testing import CliRunner
 
-from harness import records
-from harness.cli import app
-from harness.gate import gate
-from harness.run import run
-from harness.suite import read_suite
+from harness.cli.app import app
+from harness.measurement.run import run
+from harness.planning.suite import read_suite
+from harness.results import records
+from harness.verification.gate import gate
 
 ROOT = Path(__file__).parent.parent
 CONTRACT = {

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from harness import records
-from harness.gate import gate
-from harness.overrides import Overrides, overridden
-from harness.plan import expand
-from harness.run import run
-from harness.suite import Suite, read_suite
+from harness.measurement.run import run
+from harness.planning.overrides import Overrides, overridden
+from harness.planning.plan import expand
+from harness.planning.suite import Suite, read_suite
+from harness.results import records
+from harness.verification.gate import gate
 from problems.errors import InputError
 
 WIDE, REFUSED = "hard/conditioning/1e+10", "hard/duplicates/copies"

@@ -17,14 +17,14 @@ from rich.console import Console
 from small import solve_by_nnls
 from strip import write_strip
 
-from harness import records
-from harness.gate import gate
-from harness.plan import expand
-from harness.run import batches, run
-from harness.suite import read_suite, to_toml, validated
+from harness.measurement.run import batches, run
+from harness.planning.plan import expand
+from harness.planning.suite import read_suite, to_toml, validated
+from harness.results import records
+from harness.verification.gate import gate
 from problems.errors import InputError
+from problems.load_cases.random_gaps import random_gaps
 from problems.prepare import prepared
-from problems.random_gaps import random_gaps
 from problems.scene import read_scene
 from report.sections.series import compared
 
@@ -238,7 +238,7 @@ def test_repeats_of_a_series_stay_together(tmp_path: Path) -> None:
 
 def test_the_table_of_the_report() -> None:
     made("two.toml", "reported")
-    from report.build import write as report
+    from report.writers.markdown import write as report
 
     text = report(Path("reported")).read_text()
     assert "## Series of load cases" in text
@@ -250,7 +250,7 @@ def test_the_table_of_the_report() -> None:
 
 def test_a_report_without_a_library_and_with_cases_that_failed() -> None:
     made("together.toml", "alone")
-    from report.build import write as report
+    from report.writers.markdown import write as report
 
     text = report(Path("alone")).read_text()
     assert "*Together* is given many" in text

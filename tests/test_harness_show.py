@@ -7,8 +7,8 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.plan import Measurement
-from harness.show import Display
+from harness.planning.plan import Measurement
+from harness.terminal.progress import Display
 
 
 def measurement(scene: str, solver: str = "gi", time_limit_s: float = 1000.0) -> Measurement:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from harness.hopeless import out_of_time_before
-from harness.plan import expand
-from harness.suite import checked
+from harness.planning.plan import expand
+from harness.planning.suite import checked
+from harness.planning.timeouts import out_of_time_before
 
 
 def plan(**changes):

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import tiny
 
-from harness.overrides import Overrides, overridden
-from harness.plan import Measurement, expand
-from harness.run import refuse_what_cannot_fit
-from harness.suite import Suite, checked, read_suite, suite_names, to_toml, validated
+from harness.measurement.run import refuse_what_cannot_fit
+from harness.planning.overrides import Overrides, overridden
+from harness.planning.plan import Measurement, expand
+from harness.planning.suite import Suite, checked, read_suite, suite_names, to_toml, validated
 from problems.errors import InputError
 
 TWO = """

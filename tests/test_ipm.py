@@ -11,13 +11,13 @@ import scipy.sparse as sp
 from small import make_load, make_prepared, solve_by_nnls
 from test_gi import by_nnls, definite
 
-from problems.assembly import Prepared
 from problems.errors import InputError
+from problems.forms.assembly import Prepared
 from solvers.base import Answer, Load, Problem
-from solvers.ipm import Ipm
-from solvers.newton_system import SYSTEMS
-from solvers.schemes import Newton, Point, algorithm_2, algorithm_3, mehrotra
-from solvers.start import algorithm_5
+from solvers.interior_point.newton_system import SYSTEMS
+from solvers.interior_point.schemes import Newton, Point, algorithm_2, algorithm_3, mehrotra
+from solvers.interior_point.start import algorithm_5
+from solvers.methods.ipm import Ipm
 
 
 class Given:
@@ -146,7 +146,7 @@ def test_a_start_anew_with_shorter_steps_frees_what_has_jammed(
     assert (answer.status, answer.details["restarts"]) == ("solved", 1)
     np.testing.assert_allclose(Q @ answer.lam, p, atol=1e-10)
     assert (answer.lam > 0).all()
-    monkeypatch.setattr("solvers.ipm.RESTARTS", ())
+    monkeypatch.setattr("solvers.methods.ipm.RESTARTS", ())
     assert solved(Q, p, preconditioner=system).status == "inaccurate"
 
 
@@ -220,7 +220,7 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(system
 
 def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a step it does not call itself solved, and says what held it up."""
-    monkeypatch.setattr("solvers.newton_system.LIMIT", 0)
+    monkeypatch.setattr("solvers.interior_point.newton_system.LIMIT", 0)
     answer = solved(definite(40, 0), np.ones(40))
     assert answer.status == "inaccurate"
     assert answer.details["restarts"] == 2

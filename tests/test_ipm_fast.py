@@ -9,8 +9,8 @@ from test_gi import definite
 
 from problems.errors import InputError
 from solvers.base import Problem
-from solvers.ipm_fast import FastIpm
-from solvers.single_precision import SinglePrecision
+from solvers.linear_algebra.single_precision import SinglePrecision
+from solvers.methods.ipm_fast import FastIpm
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-5, 1e-9])

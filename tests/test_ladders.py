@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.ground import Ground, ground
-from harness.judge import judge
-from harness.plan import expand
-from harness.reference import refined_active_set
-from harness.suite import read_suite
+from harness.planning.plan import expand
+from harness.planning.suite import read_suite
+from harness.verification.ground_truth import Ground, ground
+from harness.verification.judge import judge
+from harness.verification.reference import refined_active_set
 from problems.build import prepared
 from problems.errors import InputError
-from problems.ladder import Made, make_rung, rung_names
-from problems.manufactured import spectrum
+from problems.manufactured.exact import spectrum
+from problems.manufactured.ladder import Made, make_rung, rung_names
 from problems.scene import read_scene, scene_names
 from solvers.base import Form, Load, Problem
 from solvers.registry import make_solver

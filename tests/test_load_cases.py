@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from strip import write_strip
 
-from problems.assembly import Prepared
 from problems.errors import InputError
-from problems.gap_table import measured_gaps
-from problems.load_cases import LoadCases
+from problems.forms.assembly import Prepared
+from problems.load_cases.base import LoadCases
+from problems.load_cases.measured_gaps import measured_gaps
+from problems.load_cases.random_gaps import random_gaps
+from problems.load_cases.sweep import sweep
 from problems.prepare import load_case, prepared
-from problems.random_gaps import random_gaps
 from problems.scene import Scene, read_scene
-from problems.sweep import sweep
 
 RANDOM = "random = { sd = 0.2, correlation_length = 100.0, seed = 7 }"
 

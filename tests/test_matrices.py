@@ -11,9 +11,9 @@ import scipy.io
 import scipy.linalg as sla
 import scipy.sparse as sp
 
-from problems.assembly import LoadCase, Prepared
 from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Prepared
 from problems.scene import read_scene
 
 RNG = np.random.default_rng(11)

@@ -15,9 +15,9 @@ import scipy.sparse as sp
 from small import make_load, make_prepared
 from solving import CASES, IN_HOUSE, allowed, eigenvalues, solve
 
-from harness.trials import prepared_from
-from problems.assembly import LoadCase, Prepared, Vector
-from problems.ladder import make_rung
+from harness.conformance.trials import prepared_from
+from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.manufactured.ladder import make_rung
 from solvers.base import Form
 
 

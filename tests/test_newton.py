@@ -8,15 +8,15 @@ import scipy.linalg as sla
 from scipy.optimize import nnls
 from small import make_load, make_prepared, solve_by_nnls
 
-from problems.assembly import Prepared
+from problems.forms.assembly import Prepared
+from solvers.active_set.block_pivoting import FORCES_FIRST, block_pivoting
+from solvers.active_set.bordered_factor import BorderedFactor
+from solvers.active_set.contact_sets import ContactSets, gaps
+from solvers.active_set.nested import cells_of, representatives
 from solvers.base import Load, Problem
-from solvers.block_pivoting import FORCES_FIRST, block_pivoting
-from solvers.bordered_factor import BorderedFactor
-from solvers.contact_sets import ContactSets, gaps
-from solvers.inverse import BLOCK, inverse_with_factor
-from solvers.nested import cells_of, representatives
-from solvers.newton import ActiveSetNewton
-from solvers.product import product
+from solvers.linear_algebra.inverse import BLOCK, inverse_with_factor
+from solvers.linear_algebra.product import product
+from solvers.methods.newton import ActiveSetNewton
 
 
 def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:
@@ -101,7 +101,7 @@ def test_pivoting_ends_where_full_exchanges_go_round_in_circles(
     forces_first: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A beam pressed on a rigid floor, Q its stiffness by second differences: many starts circle there."""
-    monkeypatch.setattr("solvers.block_pivoting.FORCES_FIRST", forces_first)
+    monkeypatch.setattr("solvers.active_set.block_pivoting.FORCES_FIRST", forces_first)
     size, circled = 20, 0
     bending = np.diff(np.eye(size + 4), 2, axis=0)[:, 2:-2]
     Q = np.asfortranarray(bending.T @ bending)

@@ -7,9 +7,15 @@ import pytest
 import scipy.linalg as sla
 from test_gi import definite
 
-from solvers.conjugate_gradients import conjugate_gradients
-from solvers.newton_system import REORDER, SYSTEMS, OpenLast, Pcg
-from solvers.preconditioner import CholeskyFactor, CholeskyPlusRoot, Identity, Preconditioner, Splitting
+from solvers.interior_point.newton_system import REORDER, SYSTEMS, OpenLast, Pcg
+from solvers.interior_point.preconditioner import (
+    CholeskyFactor,
+    CholeskyPlusRoot,
+    Identity,
+    Preconditioner,
+    Splitting,
+)
+from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
 
 SIZE = 30
 ORDER = np.random.default_rng(7).permutation(SIZE)

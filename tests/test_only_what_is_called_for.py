@@ -11,7 +11,7 @@ import pytest
 from joints import make_joint, make_scene
 
 from problems.build import cache_key
-from problems.effect import effect_class, effect_kinds
+from problems.model.effect import effect_class, effect_kinds
 from problems.scene import plain, read_scene, scene_names
 
 ROOT = Path(__file__).parents[1]
@@ -95,12 +95,15 @@ def test_every_kind_has_a_smallest_scene_here() -> None:
 def test_bits_are_the_same_without_the_other_effects_files(kinds: list[str], tmp_path: Path) -> None:
     """Once with every file there, once from a copy without the files that the scene has no need of."""
     scene = scene_of(tmp_path, *kinds)
-    needs = {"self_weight": {"condensed_load", "line_loads"}, "installed_fasteners": {"ties"}}
+    needs = {
+        "self_weight": {"condensation/condensed_load", "fem/line_loads"},
+        "installed_fasteners": {"condensation/springs"},
+    }
     needed = set().union(*(needs.get(kind, set()) for kind in kinds))
     shutil.copytree(ROOT / "problems", tmp_path / "problems", ignore=shutil.ignore_patterns("__pycache__"))
     for kind in set(effect_kinds()) - set(kinds):
         (tmp_path / "problems" / "effects" / f"{kind}.py").unlink()
-    for name in {"condensed_load", "line_loads", "ties"} - needed:
+    for name in {"condensation/condensed_load", "fem/line_loads", "condensation/springs"} - needed:
         (tmp_path / "problems" / f"{name}.py").unlink()
     everything = imported(scene, tmp_path / "all.npz")
     bare = imported(scene, tmp_path / "bare.npz", tmp_path)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from harness.active_set import contact_set
-from problems.assembly import Prepared
+from harness.verification.principal_pivoting import contact_set
 from problems.build import load_case, prepared
+from problems.forms.assembly import Prepared
 from problems.scene import read_scene, scene_names
 
 TABLE_2 = (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592)

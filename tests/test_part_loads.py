@@ -10,8 +10,6 @@ from joints import degrees, dof, make_joint, make_scene
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from problems.assembly import Prepared
-from problems.effect import Effect, PartLoadEffect, PartModel, StiffnessEffect
 from problems.effects.fasteners import Fasteners
 from problems.effects.local_thickness import LocalThickness
 from problems.effects.ribs import Ribs
@@ -19,7 +17,9 @@ from problems.effects.self_weight import SelfWeight
 from problems.effects.support_shift import SupportShift
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
-from problems.joint import Joint
+from problems.forms.assembly import Prepared
+from problems.model.effect import Effect, PartLoadEffect, PartModel, StiffnessEffect
+from problems.model.joint import Joint
 from problems.prepare import load_case, prepared
 
 E, T = 70e3, 6.0
@@ -191,7 +191,7 @@ def test_junction_moves_as_in_the_whole_plate(load: PartLoadEffect, part: dict[s
 
 
 def test_a_condensed_load_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    from problems import condensed_load
+    from problems.condensation import condensed_load
 
     scene = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1234.0))
     made = prepared(scene)

@@ -18,8 +18,8 @@ from skfem.helpers import dd, ddot, eye, trace
 from problems.effects.ribs import Ribs
 from problems.effects.stringers import Stringers
 from problems.effects.supports import Supports
-from problems.hermite import line_matrices
-from problems.plate import Plate
+from problems.fem.hermite import line_matrices
+from problems.fem.plate import Plate
 
 SIDE = 1000.0
 UNEVEN_X = np.array([0.0, 70.0, 110.0, 260.0, 300.0])

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from solving import CASES, IN_HOUSE, allowed, solve
 from test_reference import exact_solution
 
-from harness.active_set import contact_set
-from harness.judge import conditioned_limit
-from harness.reference import refined_active_set
-from harness.trials import contact_rows, prepared_from, stiffness
-from problems.assembly import LoadCase, Prepared, Vector
+from harness.conformance.trials import contact_rows, prepared_from, stiffness
+from harness.verification.judge import conditioned_limit
+from harness.verification.principal_pivoting import contact_set
+from harness.verification.reference import refined_active_set
+from problems.forms.assembly import LoadCase, Prepared, Vector
 from problems.ladders.units import rescaled
-from problems.manufactured import Shares, frame, solved, spectrum
+from problems.manufactured.exact import Shares, frame, solved, spectrum
 
 LONG = bool(os.environ.get("RIVETBENCH_LONG"))
 SEEDS = st.integers(0, 2**32 - 1)

@@ -15,12 +15,12 @@ from joints import make_joint, make_scene
 from numpy.typing import NDArray
 from small import make_load, make_prepared, solve_by_nnls
 
-from harness import reference as module
-from harness.active_set import contact_set
-from harness.reference import reference, refined_active_set
-from harness.trials import contact_rows, prepared_from
-from problems.assembly import LoadCase, Prepared, Vector
+from harness.conformance.trials import contact_rows, prepared_from
+from harness.verification import reference as module
+from harness.verification.principal_pivoting import contact_set
+from harness.verification.reference import reference, refined_active_set
 from problems.build import prepared
+from problems.forms.assembly import LoadCase, Prepared, Vector
 
 Exact = list[Fraction]
 
@@ -215,7 +215,7 @@ def test_active_set_equals_enumeration(
     Q, p = problem
     first = np.array([start >> i & 1 == 1 for i in range(len(p))])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("harness.active_set.FEW", 1)
+        patch.setattr("harness.verification.principal_pivoting.FEW", 1)
         from_halves = contact_set(Q, p)
     for active in (contact_set(Q, p), contact_set(Q, p, first), from_halves):
         C = np.flatnonzero(active)

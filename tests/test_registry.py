@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from problems.errors import InputError
-from report import labels
+from report.results import labels
+from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
 from solvers.registry import IN_HOUSE, SOLVERS, make_solver, solver_names, solver_version
-from solvers.with_osqp import Osqp
 
 NAMES = solver_names()
 LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")

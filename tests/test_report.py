@@ -14,15 +14,15 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import everything, no_answer, row, write_rows
 
-from report import style
-from report.build import write
-from report.numbers import power, significant
-from report.precision import pareto
-from report.rows import read
-from report.scoreboard import scoreboard
+from report.analysis.precision import pareto
+from report.analysis.shown import drawn, left_out, middle_scenes
+from report.analysis.standings import compare, standings
+from report.document.numbers import power, significant
+from report.figures import style
+from report.figures.scoreboard import scoreboard
+from report.results.reader import read
 from report.sections import times as active
-from report.shown import drawn, left_out, middle_scenes
-from report.standings import compare, standings
+from report.writers.markdown import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
 

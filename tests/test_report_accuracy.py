@@ -11,13 +11,13 @@ from accuracy_results import HIGH, LOW, answer, sweep
 from matplotlib.image import imread
 from synthetic_results import no_answer, row, write_rows
 
-from report import style
-from report.advice import advice
-from report.blocks import Figure, Section, Table, Text
-from report.build import write
-from report.checks import planned_measurements
-from report.precision import pareto, settings, swept, with_errors
-from report.rows import Results, read
+from report.analysis.advice import advice
+from report.analysis.checks import planned_measurements
+from report.analysis.precision import pareto, settings, swept, with_errors
+from report.analysis.shown import best
+from report.document.blocks import Figure, Section, Table, Text
+from report.figures import style
+from report.results.reader import Results, read
 from report.sections import (
     accuracy,
     amortised,
@@ -29,7 +29,7 @@ from report.sections import (
     stability,
     summary,
 )
-from report.shown import best
+from report.writers.markdown import write
 
 SECTIONS = [amortised, asked_achieved, price_list, profiles, recommendation, residual_error, stability]
 

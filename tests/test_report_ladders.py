@@ -13,11 +13,11 @@ from matplotlib.image import imread
 from synthetic_results import no_answer, write_rows
 from synthetic_results import row as any_row
 
-from report import style
-from report.build import write
-from report.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, outcome
-from report.rows import read
+from report.analysis.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, outcome
+from report.figures import style
+from report.results.reader import read
 from report.sections.ladders import rungs_in_order
+from report.writers.markdown import write
 
 EASY, MIDDLE, HARD, ODD = "hard/steep/1e1", "hard/steep/1e5", "hard/steep/1e9", "hard/odd/one"
 WRONG = {"verdict": "outside", "displacement_error_mm": 3e-3, "limit_mm": 1e-6}

@@ -29,12 +29,13 @@ from paper_results import (
 from scipy.stats import linregress
 from synthetic_results import no_answer
 
-from report import printed, style
-from report.build import write
-from report.fit import exponent
+from report.analysis.fit import exponent
+from report.figures import style
+from report.sections import printed
 from report.sections.paper import figures5_7, table1, table2, table3, table4
 from report.sections.paper.crossings import BETTER, below, compared, worst
 from report.sections.paper.selection import cells_of_paper, method
+from report.writers.markdown import write
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from synthetic_results import no_answer, row, write_rows
 
-from report.rows import read
+from report.results.reader import read
 from report.sections import ingredients, same_method, scaling, speed
 
 LOW, HIGH = "4386/0052", "4386/1074"

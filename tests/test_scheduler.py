@@ -25,19 +25,19 @@ import tiny
 from rich.console import Console
 from strip import write_strip
 
-from harness import scheduler
-from harness.records import MEASUREMENTS, read
-from harness.run import run as run_suite
-from harness.scheduler import AHEAD, done_as_completed, other_versions, versions, workers
+from harness.measurement import scheduler
+from harness.measurement.run import run as run_suite
+from harness.measurement.scheduler import AHEAD, done_as_completed, other_versions, versions, workers
+from harness.planning.suite import read_suite
+from harness.results.records import MEASUREMENTS, read
 from harness.series import store
-from harness.series.desk import Job
 from harness.series.on_worker import solve_on_worker
 from harness.series.run import on_workers, run
-from harness.suite import read_suite
+from harness.series.session import Job
 from problems.errors import InputError
-from problems.gap_table import measured_gaps
+from problems.load_cases.measured_gaps import measured_gaps
+from problems.load_cases.random_gaps import random_gaps
 from problems.prepare import prepared
-from problems.random_gaps import random_gaps
 from problems.scene import read_scene
 
 CASES = 60
@@ -160,7 +160,7 @@ def test_workers_of_this_machine_are_processes_of_their_own() -> None:
 def test_a_scheduler_that_does_not_answer_leaves_the_solved_cases(
     job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("harness.scheduler.ANSWERS_WITHIN", "1s")
+    monkeypatch.setattr("harness.measurement.scheduler.ANSWERS_WITHIN", "1s")
     out = tmp_path / "out"
     with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9.*does not answer"):
         run(job, {}, out, quiet(), "tcp://127.0.0.1:9")
@@ -209,8 +209,9 @@ def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
     ) as cluster:
-        with pytest.raises(InputError, match="nthreads = 2: start it with --nthreads 1"), workers(
-            cluster.scheduler_address
+        with (
+            pytest.raises(InputError, match="nthreads = 2: start it with --nthreads 1"),
+            workers(cluster.scheduler_address),
         ):
             pass
         cluster.scale(0)

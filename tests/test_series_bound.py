@@ -14,14 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
-from harness.exact_residual import gamma
-from harness.reference import refined_active_set
-from harness.series.bound import Bound, gaps, independence
-from harness.series.compliance import largest_compliance
-from harness.series.residual import Split, bits, refined, residual, split
-from harness.series.vouch import Vouched, vouch
-from harness.trials import known_case, prepared_from, stiffness
-from problems.assembly import Assembly, LoadCase, Prepared
+from harness.conformance.trials import known_case, prepared_from, stiffness
+from harness.verification.batched.bound import Bound, gaps, independence
+from harness.verification.batched.compliance import largest_compliance
+from harness.verification.batched.residual import Split, bits, refined, residual, split
+from harness.verification.batched.vouch import Vouched, vouch
+from harness.verification.exact_residual import gamma
+from harness.verification.reference import refined_active_set
+from problems.forms.assembly import Assembly, LoadCase, Prepared
 from solvers.base import Load
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from report import series as statistics
-from report.series import QUANTILES, convergence, exceedance, quantile_maps, read
-from report.series_report import write
+from report.results import series as statistics
+from report.results.series import QUANTILES, convergence, exceedance, quantile_maps, read
+from report.writers.series import write
 
 CASES, M = 240, 12
 IDENTITY = {"solver": "newton", "form": "dual", "tolerance": 1e-11}

@@ -19,12 +19,12 @@ from small import solve_by_nnls
 from strip import write_strip
 from typer.testing import CliRunner
 
-from harness.cli import app
-from harness.series import desk as desk_module
+from harness.cli.app import app
+from harness.series import session as desk_module
 from harness.series import store
-from harness.series.desk import Desk, Job
+from harness.series.session import Desk, Job
+from problems.load_cases.random_gaps import random_gaps
 from problems.prepare import load_case, prepared
-from problems.random_gaps import random_gaps
 from problems.scene import read_scene
 
 ROOT = Path(__file__).parent.parent
@@ -272,7 +272,9 @@ def test_memory_does_not_grow_with_the_cases() -> None:
 @pytest.mark.parametrize("fault", ["raise RuntimeError", "return answers[:-1]", "return [None] * len(loads)"])
 def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault: str) -> None:
     """A plugin whose `together` fails on one block."""
-    text = tiny.EXACT + f"""
+    text = (
+        tiny.EXACT
+        + f"""
     def together(self, state):
         def answers(loads, tolerance):
             answers = [self.solve(state, load, tolerance) for load in loads]
@@ -281,6 +283,7 @@ def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault:
             return answers
         return answers
 """
+    )
     Path("atonce.py").write_text(text)
     scene, count = read_scene("strip.toml"), desk_module.BLOCK + 5
     job = Job(scene, random_gaps(scene, prepared(scene), count, 0), "atonce", "dual", 1e-9, 1e-7, 0, 1,

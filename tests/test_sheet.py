@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from report import style
-from report.solution import _figures
+from report.figures import style
+from report.writers.solution import _figures
 
 KINDS = ("fasteners", "installed_fasteners", "clamps")
 

@@ -17,17 +17,17 @@ from rich.console import Console
 from small import solve_by_nnls
 from typer.testing import CliRunner
 
-from harness.cli import app
-from harness.ledger import ledger
-from harness.solve import solve
-from harness.validate import estimated
+from harness.cli.app import app
+from harness.scene.ledger import ledger
+from harness.scene.solve import solve
+from harness.scene.validate import estimated
 from problems import build
 from problems.build import cache_key
-from problems.cache import root
 from problems.errors import InputError
 from problems.prepare import load_case, prepared
 from problems.scene import read_scene
-from report.vtu import grid_with_fields, write_vtu
+from problems.storage.cache import root
+from report.writers.vtu import grid_with_fields, write_vtu
 
 ROOT = Path(__file__).parents[1]
 SCENE = """
@@ -85,7 +85,7 @@ value = 1e-3
 def _without_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes most of the time: only where a test looks at pictures."""
     if "pictures" not in request.fixturenames:
-        monkeypatch.setattr("report.solution._figures", lambda *_: {})
+        monkeypatch.setattr("report.writers.solution._figures", lambda *_: {})
 
 
 @pytest.fixture
@@ -150,8 +150,8 @@ def no_factor(Q: Any, p: Any, closed: Any) -> tuple[Any, Any, float, float]:
 
 
 def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solvers.with_piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
-    monkeypatch.setattr("harness.active_set._solve_on", no_factor)
+    monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
+    monkeypatch.setattr("harness.verification.principal_pivoting._solve_on", no_factor)
     record = run(tmp_path, APART, solver="piqp")
     assert not record["qp"]
     assert record["code"] == 0
@@ -253,7 +253,7 @@ def test_only_what_is_called_for_is_imported(tmp_path: Path) -> None:
     """Through the whole command, pictures included."""
     (tmp_path / "scene.toml").write_text(APART)
     code = (
-        "import sys\nfrom harness.cli import main\n"
+        "import sys\nfrom harness.cli.app import main\n"
         "try:\n    main()\n"
         "finally:\n    print(*[m for m in sys.modules if m.startswith(('problems.', 'solvers.'))])"
     )
@@ -269,8 +269,9 @@ def test_only_what_is_called_for_is_imported(tmp_path: Path) -> None:
         "problems.effects.initial_gap",
         "problems.effects.pressure",
     }
-    assert not modules & {"problems.ties", "problems.condensed_load", "problems.csv_table"}
-    assert not modules & {"solvers.ipm", "solvers.gi", "solvers.registry"}
+    condensation = {"problems.condensation.springs", "problems.condensation.condensed_load"}
+    assert not modules & {*condensation, "problems.input.csv_table"}
+    assert not modules & {"solvers.methods.ipm", "solvers.methods.gi", "solvers.registry"}
 
 
 def test_own_matrices_without_coordinates(tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.solver_code import code_of
-from problems.fingerprint import ROOT, fingerprint
+from harness.measurement.solver_code import code_of
+from problems.storage.fingerprint import ROOT, fingerprint
 from solvers.registry import IN_HOUSE, SOLVERS, make_solver
 
 
@@ -29,7 +29,9 @@ def change(file: Path, old: str, new: str) -> None:
 
 
 def hashes(package: Path) -> dict[str, str]:
-    files = {name: place.partition(":")[0].partition(".")[2] for name, place in SOLVERS.items()}
+    files = {
+        name: place.partition(":")[0].partition(".")[2].replace(".", "/") for name, place in SOLVERS.items()
+    }
     return {name: hash_of(package / f"{file}.py", package) for name, file in files.items()}
 
 
@@ -44,19 +46,23 @@ def test_a_copy_elsewhere_has_the_same_hash(package: Path) -> None:
 
 def test_words_and_layout_do_not_count(package: Path) -> None:
     before = hashes(package)
-    for file in package.glob("*.py"):
+    for file in package.rglob("*.py"):
         text = file.read_text("utf-8")
         file.write_text(f'{text}\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n')
     added = hashes(package)
     assert changed(package, before) == set(SOLVERS)  # a function is code
-    for file in package.glob("*.py"):
+    for file in package.rglob("*.py"):
         change(file, '\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n', (
             '\n# another comment\ndef _unused() -> None:  # more\n    """Other\n    words."""\n'
         ))  # fmt: skip
     change(package / "base.py", '"""No answer, and why."""', '"""There is none, for this cause."""')
     change(package / "base.py", '"""What a solver is:', '"""What is meant by a solver:')
-    change(package / "inverse.py", 'f"dpotri returned {info}"', 'f"dpotri says {info}"')
-    change(package / "inverse.py", "def mirror(upper: Matrix) -> None:", "def mirror(upper: Any) -> Any:")
+    change(package / "linear_algebra/inverse.py", 'f"dpotri returned {info}"', 'f"dpotri says {info}"')
+    change(
+        package / "linear_algebra/inverse.py",
+        "def mirror(upper: Matrix) -> None:",
+        "def mirror(upper: Any) -> Any:",
+    )
     assert changed(package, added) == set()
 
 
@@ -75,10 +81,10 @@ def test_what_all_are_made_of_counts_for_all(package: Path) -> None:
 
 def test_a_library_does_not_depend_on_the_solvers_of_the_house(package: Path) -> None:
     before = hashes(package)
-    (package / "with_osqp.py").write_text("OTHER = 1\n")
-    (package / "newton.py").write_text("OTHER = 1\n")
+    (package / "libraries/osqp.py").write_text("OTHER = 1\n")
+    (package / "methods/newton.py").write_text("OTHER = 1\n")
     assert changed(package, before) == {"osqp", "newton"}
-    (package / "adapter.py").write_text("OTHER = 1\n")
+    (package / "libraries/adapter.py").write_text("OTHER = 1\n")
     assert changed(package, before) == {*SOLVERS} - {*IN_HOUSE} | {"newton"}
 
 

@@ -10,17 +10,17 @@ import pytest
 from small import make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
-from harness.trials import contact_rows, prepared_from
-from problems.assembly import LoadCase, Vector
+from harness.conformance.trials import contact_rows, prepared_from
+from problems.forms.assembly import LoadCase, Vector
+from problems.load_cases.random_gaps import random_gaps
 from problems.prepare import load_case, prepared
-from problems.random_gaps import random_gaps
 from problems.scene import read_scene
-from solvers.banded_inverse import BandedInverse, along, banded_inverse
+from solvers.active_set.batched import Together
+from solvers.active_set.bordered_factor import Set
+from solvers.active_set.contact_sets import Trial
 from solvers.base import Answer, Load, Problem
-from solvers.bordered_factor import Set
-from solvers.contact_sets import Trial
-from solvers.newton import ActiveSetNewton
-from solvers.together import Together
+from solvers.linear_algebra.banded_inverse import BandedInverse, along, banded_inverse
+from solvers.methods.newton import ActiveSetNewton
 
 TOLERANCE = 1e-10
 
@@ -194,7 +194,7 @@ def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
         starts.append(C)
         return Answer("solved", np.zeros(45))
 
-    monkeypatch.setattr("solvers.together.SWEEPS", 4)  # not enough to be done, but for the set
+    monkeypatch.setattr("solvers.active_set.batched.SWEEPS", 4)  # not enough to be done, but for the set
     together = Together(data.Q, M, told)
     together(loads[:1], TOLERANCE)
     starts.clear()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import make_load, make_prepared, solve_by_nnls
 
-from problems.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase, Prepared
 from solvers.base import FORMS, Form, Load, Near, Problem, Solver
 from solvers.registry import SOLVERS, make_solver
 

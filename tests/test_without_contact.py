@@ -13,9 +13,9 @@ from rich.console import Console
 from test_formats import FOLDERS, PATHS, files_of
 from typer.testing import CliRunner
 
-from harness.cli import app
-from harness.exchange import export, import_
-from harness.solve import solve
+from harness.cli.app import app
+from harness.scene.exchange import export, import_
+from harness.scene.solve import solve
 from problems import formats
 from problems.errors import InputError
 from problems.prepare import load_case, prepared
@@ -53,7 +53,7 @@ def answered(path: Path, out: Path, solver: str | None = None) -> dict[str, Any]
 
 
 def test_a_part_alone_is_a_linear_solve(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("solvers.with_piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
+    monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
     monkeypatch.setattr("problems.build.lapack.dpotri", lambda *_: pytest.fail("K was inverted for Q"))
     found = answered(path, path.parent / "out", solver="piqp")
     assert (found["n"], found["m"], found["qp"]) == (18, 0, False)

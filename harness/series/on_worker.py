@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .desk import Desk, Job, Result
+from .session import Desk, Job, Result
 
 _open: dict[str, Desk] = {}
 

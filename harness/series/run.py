@@ -14,16 +14,16 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from problems.effect import ForceEffect
+from harness.measurement.machine import installed_version, machine
+from harness.measurement.scheduler import done_as_completed, workers
+from harness.results import records
+from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
+from problems.model.effect import ForceEffect
 from problems.prepare import prepared
 
-from .. import records
-from ..exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
-from ..machine import installed_version, machine
-from ..scheduler import done_as_completed, workers
 from . import store
-from .desk import BLOCK, Desk, Job, Result
 from .on_worker import solve_on_worker
+from .session import BLOCK, Desk, Job, Result
 
 VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
 

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.results import records
 from problems.errors import Fault, InputError
-from problems.load_cases import LoadCases
+from problems.load_cases.base import LoadCases
 
-from .. import records
-from .desk import Result
+from .session import Result
 
 CASES, GAPS, SERIES = "cases.jsonl", "gaps.f4", "series.json"
 CHUNK = 2**20  # bytes

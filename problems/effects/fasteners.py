@@ -7,10 +7,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..assembly import Vector
-from ..effect import Between, ForceEffect, pressed, unknown_pair
-from ..joint import Joint, Positive
-from ..positions import Positions
+from problems.forms.assembly import Vector
+from problems.model.effect import Between, ForceEffect, pressed, unknown_pair
+from problems.model.joint import Joint, Positive
+from problems.model.positions import Positions
 
 
 class Fasteners(Positions, ForceEffect):

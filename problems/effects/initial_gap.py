@@ -9,9 +9,9 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..assembly import Matrix, Vector
-from ..effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
-from ..joint import Finite, Joint, Positive, Table
+from problems.forms.assembly import Matrix, Vector
+from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from problems.model.joint import Finite, Joint, Positive, Table
 
 
 class RandomField(Table):

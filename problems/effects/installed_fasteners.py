@@ -8,10 +8,10 @@ from typing import ClassVar, Literal
 import numpy as np
 import scipy.sparse as sp
 
-from ..assembly import Vector
-from ..effect import Between, Effect, ForceEffect, Pair, TieEffect, pairs_of, unknown_pair
-from ..joint import TOOL, Finite, Joint, Positive
-from ..positions import Positions
+from problems.forms.assembly import Vector
+from problems.model.effect import Between, Effect, ForceEffect, Pair, TieEffect, pairs_of, unknown_pair
+from problems.model.joint import TOOL, Finite, Joint, Positive
+from problems.model.positions import Positions
 
 
 class InstalledFasteners(Positions, TieEffect):

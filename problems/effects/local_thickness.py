@@ -8,10 +8,10 @@ from typing import ClassVar, Literal
 
 import scipy.sparse as sp
 
-from ..effect import Effect, Range, StiffnessEffect
-from ..hermite import line_matrices
-from ..joint import Finite, Joint, Positive
-from ..plate import Plate
+from problems.fem.hermite import line_matrices
+from problems.fem.plate import Plate
+from problems.model.effect import Effect, Range, StiffnessEffect
+from problems.model.joint import Finite, Joint, Positive
 
 
 class LocalThickness(StiffnessEffect):

@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from ..assembly import Vector
-from ..csv_table import in_place_of_file
-from ..effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
-from ..joint import Finite, Joint
+from problems.forms.assembly import Vector
+from problems.input.csv_table import in_place_of_file
+from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from problems.model.joint import Finite, Joint
 
 
 class MeasuredGap(GapEffect):

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..assembly import Vector
-from ..effect import ForceEffect, unknown_part
-from ..joint import Finite, Joint
+from problems.forms.assembly import Vector
+from problems.model.effect import ForceEffect, unknown_part
+from problems.model.joint import Finite, Joint
 
 
 class Pressure(ForceEffect):

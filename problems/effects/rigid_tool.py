@@ -7,9 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..assembly import Vector
-from ..effect import Effect, GapEffect, Pair, contacts_of, unknown_part
-from ..joint import TOOL, Finite, Joint
+from problems.forms.assembly import Vector
+from problems.model.effect import Effect, GapEffect, Pair, contacts_of, unknown_part
+from problems.model.joint import TOOL, Finite, Joint
 
 
 class RigidTool(GapEffect):

@@ -6,10 +6,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..assembly import Vector
-from ..effect import PartLoadEffect, PartModel
-from ..joint import Finite, Positive
-from ..line_loads import line_loads
+from problems.fem.line_loads import line_loads
+from problems.forms.assembly import Vector
+from problems.model.effect import PartLoadEffect, PartModel
+from problems.model.joint import Finite, Positive
 
 KG_PER_M3_TIMES_M_PER_S2 = 1e-9  # N/mm³
 

@@ -8,9 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..assembly import Vector
-from ..effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
-from ..joint import Finite, Joint, Positive
+from problems.forms.assembly import Vector
+from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from problems.model.joint import Finite, Joint, Positive
 
 
 class Shims(GapEffect):

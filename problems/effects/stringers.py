@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
 
-from ..effect import StiffnessEffect
-from ..joint import Finite, Joint, Positive
-from ..plate import Plate
+from problems.fem.plate import Plate
+from problems.model.effect import StiffnessEffect
+from problems.model.joint import Finite, Joint, Positive
 
 
 class Stringers(StiffnessEffect):

@@ -8,9 +8,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..assembly import Vector
-from ..effect import Effect, PartLoadEffect, PartModel
-from ..joint import Finite, Joint
+from problems.forms.assembly import Vector
+from problems.model.effect import Effect, PartLoadEffect, PartModel
+from problems.model.joint import Finite, Joint
+
 from .supports import Supports
 
 

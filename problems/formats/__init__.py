@@ -14,7 +14,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from ..errors import Fault, InputError
+from problems.errors import Fault, InputError
 
 Data = dict[str, Any]
 NAMES = ("K", "A", "f", "g", "nodes")

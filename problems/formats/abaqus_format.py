@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from ..errors import Fault, InputError
-from . import Data
+from problems.errors import Fault, InputError
+from problems.formats import Data
+
 from .mtx_format import write_others
 
 NORMAL = 3  # the degree of freedom that displacements are written as

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..errors import InputError
-from . import Data, pyyeti
+from problems.errors import InputError
+from problems.formats import Data, pyyeti
 
 
 def write(path: Path, data: Data) -> None:

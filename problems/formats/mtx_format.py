@@ -7,8 +7,8 @@ from pathlib import Path
 import scipy.io
 import scipy.sparse as sp
 
-from ..matrices import read_mtx
-from . import Data, vector
+from problems.formats import Data, vector
+from problems.input.user_matrices import read_mtx
 
 
 def write(path: Path, data: Data) -> None:

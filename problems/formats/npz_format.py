@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import NAMES, Data
+from problems.formats import NAMES, Data
 
 
 def write(path: Path, data: Data) -> None:

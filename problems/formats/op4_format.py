@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import Data, pyyeti, vector
+from problems.formats import Data, pyyeti, vector
 
 
 def write(path: Path, data: Data) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..errors import InputError
-from . import Data
+from problems.errors import InputError
+from problems.formats import Data
 
 
 def write(path: Path, data: Data) -> None:

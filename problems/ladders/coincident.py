@@ -6,9 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from ..assembly import Assembly, LoadCase
-from ..ladder import Ladder, Made, Rung
-from ..manufactured import frame, solved, spectrum
+from problems.forms.assembly import Assembly, LoadCase
+from problems.manufactured.exact import frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Made, Rung
 
 N = 64  # unknowns a part
 CONDITION = 1e4

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from ..ladder import Ladder, Made, Rung
-from ..manufactured import frame, solved, spectrum
+from problems.manufactured.exact import frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Made, Rung
 
 N = 64  # unknowns a part
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from ..ladder import Ladder, Rung
-from ..manufactured import Shares, frame, solved, spectrum
+from problems.manufactured.exact import Shares, frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Rung
 
 N = 64  # contacts
 CONDITION = 1e6

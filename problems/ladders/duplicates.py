@@ -10,8 +10,8 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from ..ladder import Ladder, Made, Rung
-from ..manufactured import frame, solved, spectrum
+from problems.manufactured.exact import frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Made, Rung
 
 N = 64  # unknowns a part
 TWICE = 8

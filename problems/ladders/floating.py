@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..ladder import Ladder, Made, Rung, plates
-from ..manufactured import frame, solved, spectrum
+from problems.manufactured.exact import frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Made, Rung, plates
+
 from .parts import FASTENERS, GAP, HELD, JUNCTION
 
 REFUSED = "K must be positive definite"

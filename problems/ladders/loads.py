@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from ..assembly import LoadCase, Vector
-from ..ladder import Ladder, Made, Rung
-from ..manufactured import Frame, Random, Shares, frame, solved, spectrum
+from problems.forms.assembly import LoadCase, Vector
+from problems.manufactured.exact import Frame, Random, Shares, frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Made, Rung
 
 N = 64  # contacts
 FORCE = 1000.0  # N

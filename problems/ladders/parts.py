@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..assembly import LoadCase
-from ..ladder import Ladder, Made, Rung, plates
-from ..manufactured import Shares, frame, solved, spectrum
+from problems.forms.assembly import LoadCase
+from problems.manufactured.exact import Shares, frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Made, Rung, plates
 
 JUNCTION = {"length": 1000.0, "width": 300.0, "nodes": (12, 5)}
 HELD = {"thickness": 6.0, "north": {"length": 300.0, "elements": 4}, "clamped": ("north",)}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from ..ladder import Ladder, Rung, plates
+from problems.manufactured.ladder import Ladder, Rung, plates
+
 from .parts import FASTENERS, GAP, HELD, JUNCTION
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from ..ladder import Ladder, Rung, plates
+from problems.manufactured.ladder import Ladder, Rung, plates
+
 from .parts import FASTENERS, GAP, HELD, JUNCTION
 
 POINTS = ((100.0, 0.0), (900.0, 0.0), (100.0, 300.0), (900.0, 300.0))

@@ -6,8 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from ..ladder import Ladder, Rung
-from ..manufactured import Shares, frame, solved, spectrum
+from problems.manufactured.exact import Shares, frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Rung
+
 from .units import rescaled
 
 N = 64  # contacts

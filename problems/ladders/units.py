@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from ..assembly import Assembly, LoadCase, Vector
-from ..ladder import Ladder, Made, Rung
-from ..manufactured import frame, solved, spectrum
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.manufactured.exact import frame, solved, spectrum
+from problems.manufactured.ladder import Ladder, Made, Rung
 
 N = 64  # unknowns a part
 CONDITION = 1e6

@@ -9,11 +9,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from .. import marks, style
-from ..blocks import Figure, Section, Text
-from ..precision import ENOUGH, WRONG, in_view, looks, pareto, with_errors
-from ..rows import ANSWERED, Results
-from ..shown import drawn, left_out, scenes, sizes
+from report.analysis.precision import ENOUGH, WRONG, in_view, looks, pareto, with_errors
+from report.analysis.shown import drawn, left_out, scenes, sizes
+from report.document.blocks import Figure, Section, Text
+from report.figures import marks, style
+from report.results.reader import ANSWERED, Results
 
 STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, "solid_joinstyle": "miter"}
 

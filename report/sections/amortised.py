@@ -9,12 +9,13 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from .. import style
-from ..blocks import Column, Figure, Section, Table, number
-from ..numbers import MISSING, counted, significant, tidy_power, whole
-from ..precision import ACCURACIES, in_view, judged, looks, pareto, settings, swept
-from ..rows import Results
-from ..shown import middle_scenes
+from report.analysis.precision import ACCURACIES, in_view, judged, looks, pareto, settings, swept
+from report.analysis.shown import middle_scenes
+from report.document.blocks import Column, Figure, Section, Table, number
+from report.document.numbers import MISSING, counted, significant, tidy_power, whole
+from report.figures import style
+from report.results.reader import Results
+
 from .accuracy import staircase
 
 LOAD_CASES = (1, 10, 100, 1000)

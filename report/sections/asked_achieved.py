@@ -7,12 +7,12 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from .. import style
-from ..blocks import Figure, Section, Table, number, word
-from ..labels import in_order, named
-from ..numbers import whole
-from ..precision import in_view, looks, swept
-from ..rows import Results
+from report.analysis.precision import in_view, looks, swept
+from report.document.blocks import Figure, Section, Table, number, word
+from report.document.numbers import whole
+from report.figures import style
+from report.results.labels import in_order, named
+from report.results.reader import Results
 
 
 def section(results: Results) -> Section | None:

@@ -9,11 +9,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from .. import style
-from ..blocks import Figure, Section
-from ..numbers import significant, whole
-from ..rows import TIMES, Results
-from ..shown import best, left_out, middle_scenes, of_tolerances
+from report.analysis.shown import best, left_out, middle_scenes, of_tolerances
+from report.document.blocks import Figure, Section
+from report.document.numbers import significant, whole
+from report.figures import style
+from report.results.reader import TIMES, Results
 
 ROW = 0.2  # inches
 STEPS = {

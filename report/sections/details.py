@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Block, Column, Section, Table, Text, number, word
-from ..numbers import MISSING, power, significant, whole
-from ..rows import VERDICTS, Results
+from report.document.blocks import Block, Column, Section, Table, Text, number, word
+from report.document.numbers import MISSING, power, significant, whole
+from report.results.reader import VERDICTS, Results
 
 FIGURES = [
     *("scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeats"),

@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, PowerNorm
 
-from .. import style
-from ..blocks import Block, Figure, Section, Text
-from ..maps import Array, draw, grid_of, outline
-from ..rows import Results
-from ..shown import middle_scene
+from report.analysis.shown import middle_scene
+from report.document.blocks import Block, Figure, Section, Text
+from report.figures import style
+from report.figures.maps import Array, draw, grid_of, outline
+from report.results.reader import Results
 
 
 def section(results: Results) -> Section | None:

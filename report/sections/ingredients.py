@@ -6,10 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Column, Section, Table, number, word
-from ..labels import in_order
-from ..numbers import spread, whole
-from ..rows import Results
+from report.document.blocks import Column, Section, Table, number, word
+from report.document.numbers import spread, whole
+from report.results.labels import in_order
+from report.results.reader import Results
 
 KEYS = ["solver", "form", "scene", "threads", "tolerance"]
 

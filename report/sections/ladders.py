@@ -7,12 +7,12 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Block, Column, Figure, Section, Table, Text, number, word
-from ..labels import IN_HOUSE, in_order
-from ..ladder_map import ladder_map
-from ..numbers import MISSING, counted, power, whole
-from ..outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, holds, with_outcomes
-from ..rows import Results
+from report.analysis.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, holds, with_outcomes
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.numbers import MISSING, counted, power, whole
+from report.figures.ladder_map import ladder_map
+from report.results.labels import IN_HOUSE, in_order
+from report.results.reader import Results
 
 CONDITION = 1e12  # of K: up to it the in-house solvers are to hold
 

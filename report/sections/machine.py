@@ -6,10 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Block, Section, Table, Text, word
-from ..labels import ORDER
-from ..numbers import listed, tidy_power
-from ..rows import Results
+from report.document.blocks import Block, Section, Table, Text, word
+from report.document.numbers import listed, tidy_power
+from report.results.labels import ORDER
+from report.results.reader import Results
 
 MEANING = """\
 - **solver (form)**: what was run. *Primal*: min ½xᵀKx − fᵀx, Aᵀx ≤ g, in the displacements x. *Dual*:

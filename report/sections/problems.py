@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pandas as pd
 
-from ..blocks import Block, Section, Table, number, word
-from ..numbers import MISSING, as_number, power, signed, whole
-from ..printed import TABLE_4
-from ..rows import Results
+from report.document.blocks import Block, Section, Table, number, word
+from report.document.numbers import MISSING, as_number, power, signed, whole
+from report.results.reader import Results
+
+from .printed import TABLE_4
 
 PRINTED = {n: cond for _, n, _, cond in TABLE_4}
 

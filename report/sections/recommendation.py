@@ -6,11 +6,11 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Section, Table, number, word
-from ..numbers import listed, power, significant, tidy_power, whole
-from ..precision import ACCURACIES, judged, settings, swept
-from ..rows import Results
-from ..standings import TIE, preferred
+from report.analysis.precision import ACCURACIES, judged, settings, swept
+from report.analysis.standings import TIE, preferred
+from report.document.blocks import Section, Table, number, word
+from report.document.numbers import listed, power, significant, tidy_power, whole
+from report.results.reader import Results
 
 
 def section(results: Results) -> Section | None:

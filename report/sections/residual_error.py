@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from .. import style
-from ..blocks import Block, Figure, Section, Table, Text, number, word
-from ..labels import in_order
-from ..numbers import power, tidy_power, whole
-from ..precision import EXACT, swept
-from ..rows import Results
-from ..shown import styles_of
+from report.analysis.precision import EXACT, swept
+from report.analysis.shown import styles_of
+from report.document.blocks import Block, Figure, Section, Table, Text, number, word
+from report.document.numbers import power, tidy_power, whole
+from report.figures import style
+from report.results.labels import in_order
+from report.results.reader import Results
 
 RESIDUALS = {"primal_residual": "mm", "dual_residual": "N", "duality_gap": "N·mm"}
 

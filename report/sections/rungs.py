@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from ..blocks import Block, Section, Table, number, word
-from ..numbers import as_number, power, whole
-from ..outcomes import with_outcomes
-from ..rows import RUNGS, Results
+from report.analysis.outcomes import with_outcomes
+from report.document.blocks import Block, Section, Table, number, word
+from report.document.numbers import as_number, power, whole
+from report.results.reader import RUNGS, Results
 
 FIGURES = (
     *("label", "scene", "status", "verdict", "outcome", "displacement_error_mm", "limit_mm"),

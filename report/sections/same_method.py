@@ -6,10 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Column, Section, Table, number, word
-from ..numbers import significant, whole
-from ..rows import Results
-from ..timed import records, seconds_text, timed
+from report.analysis.timed import records, seconds_text, timed
+from report.document.blocks import Column, Section, Table, number, word
+from report.document.numbers import significant, whole
+from report.results.reader import Results
 
 #: Ours, the form, and the other code of a dual active-set method.
 PAIRS = (("gi", "dual", "daqp"), ("gi", "primal", "quadprog"))

@@ -7,14 +7,14 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from .. import style
-from ..blocks import Column, Figure, Section, Table, number, word
-from ..fit import exponent
-from ..labels import in_order
-from ..numbers import MISSING, whole
-from ..rows import Results
-from ..shown import styles_of
-from ..timed import records, seconds_text
+from report.analysis.fit import exponent
+from report.analysis.shown import styles_of
+from report.analysis.timed import records, seconds_text
+from report.document.blocks import Column, Figure, Section, Table, number, word
+from report.document.numbers import MISSING, whole
+from report.figures import style
+from report.results.labels import in_order
+from report.results.reader import Results
 
 FEWEST = 3  # sizes
 #: What grows, and its unit.

@@ -6,10 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Column, Section, Table, Text, number, word
-from ..labels import IN_HOUSE, named
-from ..numbers import power, spread, whole
-from ..rows import ANSWERED, CELL, Results
+from report.document.blocks import Column, Section, Table, Text, number, word
+from report.document.numbers import power, spread, whole
+from report.results.labels import IN_HOUSE, named
+from report.results.reader import ANSWERED, CELL, Results
 
 CASE = ["setup_s", "solve_s", "form_s"]
 ROUND = ["scene", "threads"]

@@ -7,12 +7,12 @@ from typing import Any
 
 import pandas as pd
 
-from .. import style
-from ..blocks import Block, Column, Figure, Section, Table, number, word
-from ..labels import IN_HOUSE, in_order
-from ..numbers import significant, span, spread, whole
-from ..rows import Results
-from ..shown import drawn, left_out, styles_of
+from report.analysis.shown import drawn, left_out, styles_of
+from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.document.numbers import significant, span, spread, whole
+from report.figures import style
+from report.results.labels import IN_HOUSE, in_order
+from report.results.reader import Results
 
 PANEL = 3.0  # inches
 ROUND = ["scene", "threads", "repeat"]

@@ -6,10 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from ..blocks import Block, Section, Table, Text, number, word
-from ..labels import named
-from ..numbers import counted, whole
-from ..rows import ANSWERED, CELL, Results
+from report.document.blocks import Block, Section, Table, Text, number, word
+from report.document.numbers import counted, whole
+from report.results.labels import named
+from report.results.reader import ANSWERED, CELL, Results
 
 SPREAD = 0.2  # most less least, over the median: a time that spreads by more is called unstable
 SHORT = 0.05  # seconds: below, the clock and the start of threads tell

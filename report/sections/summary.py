@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..advice import advice
-from ..blocks import Block, Column, Figure, Section, Table, Text, number, word
-from ..numbers import counted, listed, power, whole
-from ..precision import ENOUGH
-from ..rows import Results
-from ..scoreboard import scoreboard
-from ..shown import left_out, sidelined
-from ..standings import TIE, compare, standings
+from report.analysis.advice import advice
+from report.analysis.precision import ENOUGH
+from report.analysis.shown import left_out, sidelined
+from report.analysis.standings import TIE, compare, standings
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.numbers import counted, listed, power, whole
+from report.figures.scoreboard import scoreboard
+from report.results.reader import Results
 
 
 def section(results: Results) -> Section | None:

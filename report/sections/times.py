@@ -10,10 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from .. import marks, style
-from ..blocks import Figure, Section
-from ..rows import ANSWERED, Results
-from ..shown import best, left_out, of_tolerances, styles_of
+from report.analysis.shown import best, left_out, of_tolerances, styles_of
+from report.document.blocks import Figure, Section
+from report.figures import marks, style
+from report.results.reader import ANSWERED, Results
 
 PANEL = 3.0  # inches
 OUTSIDE: dict[str, Any] = {

@@ -6,22 +6,14 @@ from collections import Counter
 
 import pandas as pd
 
-from ...blocks import Block, Column, Section, Table, Text, word
-from ...numbers import counted
-from ...rows import Results
+from report.document.blocks import Block, Column, Section, Table, Text, word
+from report.document.numbers import counted
+from report.results.reader import Results
+
 from . import claims_comparison, claims_complexity, claims_contacts, claims_linear, claims_start
 from .scaling import measured
 from .selection import cells_of_paper, is_paper, of_problems
-from .verdict import (
-    CONFIRMED,
-    DEPENDS,
-    NOT_CONFIRMED,
-    NOT_DECIDED,
-    NOT_MEASURED,
-    Claim,
-    Measured,
-    Verdict,
-)
+from .verdict import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_DECIDED, NOT_MEASURED, Claim, Measured, Verdict
 
 CLAIMS: list[Claim] = [
     *claims_linear.CLAIMS,

@@ -7,9 +7,10 @@ from typing import Any
 
 import pandas as pd
 
-from ...numbers import counted, power, significant
-from ...standings import geometric_mean
-from ...timed import records, timed
+from report.analysis.standings import geometric_mean
+from report.analysis.timed import records, timed
+from report.document.numbers import counted, power, significant
+
 from .claims_linear import is_faster, pairs
 from .crossings import BETTER, below, sizes, worst
 from .selection import method

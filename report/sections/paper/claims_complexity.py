@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...fit import Exponent
-from ...numbers import significant, whole
+from report.analysis.fit import Exponent
+from report.document.numbers import significant, whole
+
 from .scaling import fitted, keys
 from .selection import method
 from .verdict import Case, Claim, Measured, by_case

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import pandas as pd
 
-from ...numbers import significant
-from ...timed import timed
+from report.analysis.timed import timed
+from report.document.numbers import significant
+
 from .crossings import at_share, sizes
 from .selection import method
 from .verdict import Case, Claim, Measured, by_case

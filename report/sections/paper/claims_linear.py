@@ -7,9 +7,10 @@ from typing import Any
 
 import pandas as pd
 
-from ...numbers import significant
-from ...standings import TIE
-from ...timed import records, timed
+from report.analysis.standings import TIE
+from report.analysis.timed import records, timed
+from report.document.numbers import significant
+
 from .cg import SYSTEMS, counts
 from .selection import ipm
 from .targets import LATE, ORDERINGS, RATIO, largest_late, ratios

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from ...numbers import as_number, power, significant, span, tidy_power, whole
-from ...standings import TIE
-from ...timed import records
+from report.analysis.standings import TIE
+from report.analysis.timed import records
+from report.document.numbers import as_number, power, significant, span, tidy_power, whole
+
 from .claims_linear import pairs
 from .selection import figures_of, ipm
 from .table2 import RIVALS, STARTS, loads, no_more

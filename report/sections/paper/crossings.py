@@ -8,8 +8,9 @@ from itertools import pairwise
 
 import pandas as pd
 
-from ...numbers import counted, significant
-from ...timed import records, timed
+from report.analysis.timed import records, timed
+from report.document.numbers import counted, significant
+
 from .selection import METHODS, method
 
 

@@ -6,11 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from ... import style
-from ...blocks import Block, Figure, Section, Text
-from ...maps import Array, draw
-from ...printed import TABLE_4
-from ...rows import Results
+from report.document.blocks import Block, Figure, Section, Text
+from report.figures import style
+from report.figures.maps import Array, draw
+from report.results.reader import Results
+from report.sections.printed import TABLE_4
+
 from .selection import SCALING, is_paper
 
 PROBLEMS = (1, 3)  # those of Figure 3

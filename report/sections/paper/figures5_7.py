@@ -7,13 +7,14 @@ from typing import Any
 
 import pandas as pd
 
-from ... import style
-from ...blocks import Block, Column, Figure, Section, Table, number, word
-from ...labels import in_order
-from ...numbers import whole
-from ...rows import Results
-from ...timed import records, seconds_text
-from .. import times
+from report.analysis.timed import records, seconds_text
+from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.document.numbers import whole
+from report.figures import style
+from report.results.labels import in_order
+from report.results.reader import Results
+from report.sections import times
+
 from .crossings import BETTER, below, compared, sizes, worst
 from .looks import LOOKS
 from .selection import METHODS, cells_of_paper, is_paper, method, of_problems

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ... import style
+from report.figures import style
 
 LOOKS: dict[str, dict[str, Any]] = {
     "IPM": {"color": style.BLUE, "marker": "o", "linestyle": "-", "markerfacecolor": style.BLUE},

@@ -7,10 +7,11 @@ from typing import Any
 
 import pandas as pd
 
-from ...fit import Exponent, exponent
-from ...numbers import as_number
-from ...rows import Results
-from ...timed import records, timed
+from report.analysis.fit import Exponent, exponent
+from report.analysis.timed import records, timed
+from report.document.numbers import as_number
+from report.results.reader import Results
+
 from .selection import METHODS, cells_of_paper, method, of_scaling
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...rows import Results
-from ...timed import records
+from report.analysis.timed import records
+from report.results.reader import Results
 
 SUITE = "paper"
 SCALING = "scaling/"  # scenes of one joint at several sizes; all others belong to the paper's problems
@@ -88,13 +88,10 @@ def of_problems(cells: pd.DataFrame) -> pd.DataFrame:
     return cells[~cells["scene"].str.startswith(SCALING)]
 
 
-
-
 def figures_of(cell: Mapping[str, Any] | None, name: str) -> dict[str, Any]:
     """A dictionary within the details of a cell; empty where there is none."""
     found = cell["details"].get(name) if cell is not None else None
     return found if isinstance(found, dict) else {}
-
 
 
 def first(cells: pd.DataFrame) -> dict[str, Any] | None:

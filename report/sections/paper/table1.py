@@ -8,12 +8,13 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from ... import style
-from ...blocks import Block, Column, Figure, Section, Table, Text, number, word
-from ...numbers import MISSING, listed, significant, tidy_power, whole
-from ...printed import TABLE_1
-from ...rows import Results
-from ...timed import records, seconds_text
+from report.analysis.timed import records, seconds_text
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.numbers import MISSING, listed, significant, tidy_power, whole
+from report.figures import style
+from report.results.reader import Results
+from report.sections.printed import TABLE_1
+
 from .cg import SYSTEMS, Counts, counts, system_name
 from .selection import asked, cells_of_paper, first, ipm, is_paper, of_problems
 from .targets import late_target, ratio_target

@@ -7,11 +7,12 @@ from typing import Any
 
 import pandas as pd
 
-from ...blocks import Column, Section, Table, Text, number, word
-from ...numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
-from ...printed import TABLE_2
-from ...rows import ANSWERED, Results
-from ...timed import records, seconds_text
+from report.analysis.timed import records, seconds_text
+from report.document.blocks import Column, Section, Table, Text, number, word
+from report.document.numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
+from report.results.reader import ANSWERED, Results
+from report.sections.printed import TABLE_2
+
 from .selection import cells_of_paper, figures_of, first, ipm, is_paper
 
 STARTS = {"stp1": "STP1", "stp2": "STP2", "algorithm_5": "Algorithm 5", "mehrotra": "Mehrotra"}

@@ -8,11 +8,12 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from ... import style
-from ...blocks import Block, Column, Figure, Section, Table, number, word
-from ...numbers import MISSING, whole
-from ...rows import Results
-from ...timed import records, seconds_text
+from report.analysis.timed import records, seconds_text
+from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.document.numbers import MISSING, whole
+from report.figures import style
+from report.results.reader import Results
+
 from .looks import LOOKS
 from .scaling import QUANTITIES, fitted, measured
 from .selection import METHODS, is_paper

@@ -6,11 +6,12 @@ from typing import Any
 
 import pandas as pd
 
-from ...blocks import Section, Table, number
-from ...numbers import as_number, signed, whole
-from ...printed import TABLE_4
-from ...rows import Results
-from ...timed import records
+from report.analysis.timed import records
+from report.document.blocks import Section, Table, number
+from report.document.numbers import as_number, signed, whole
+from report.results.reader import Results
+from report.sections.printed import TABLE_4
+
 from .selection import SCALING, is_paper
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from ...timed import records
+from report.analysis.timed import records
+
 from .cg import SYSTEMS, Counts, counts
 from .selection import first, ipm
 

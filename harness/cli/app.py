@@ -1,0 +1,236 @@
+"""The command line: run, report, gate, list, check; `series` is in series_command.py, those of one scene in
+scene_commands.py.
+
+What takes time to import is imported in the commands.
+"""
+
+from __future__ import annotations
+
+import signal
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from harness.terminal.console import Plugin, Scheduler, option, reported
+from harness.terminal.exit_codes import DONE, FELL_SHORT
+
+from . import scene as scene_commands
+from . import series as series_command
+
+app = typer.Typer(
+    no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+)
+app.add_typer(scene_commands.app)
+app.add_typer(series_command.app)
+
+
+class FormName(StrEnum):
+    primal = "primal"
+    dual = "dual"
+
+
+class Listed(StrEnum):
+    solvers = "solvers"
+    scenes = "scenes"
+    suites = "suites"
+
+
+@app.callback()
+def harness() -> None:
+    """Compare quadratic-programming solvers on aircraft riveting problems.
+
+    \b
+    Start here:
+      python -m harness run                       measure the suite `default` (15 minutes) and report on it
+      python -m harness run --size 4386           the small problems only
+      python -m harness list solvers              what can be measured
+      python -m harness run --plugin mine.py      with a solver of your own
+      python -m harness solve scene.toml --out d  one scene: gaps, displacements, forces, with pictures
+      python -m harness series SCENE --out DIR    thousands of load cases on one assembly
+      python -m harness COMMAND --help            more on each command
+
+    \b
+    Exit codes: 0 ok, 1 accuracy lost, 2 wrong usage or bad input,
+                3 nothing could be judged, 130 interrupted.
+    """
+
+
+@app.command()
+def run(
+    suite: Annotated[
+        str, typer.Argument(metavar="SUITE", help="Name of a suite, or path of its TOML file.")
+    ] = "default",
+    size: Annotated[list[int] | None, option("N", "Only scenes with so many unknowns. Repeatable.")] = None,
+    scene: Annotated[
+        list[str] | None, option("NAME", "These scenes: name, glob, .toml or own matrices .npz. Repeatable.")
+    ] = None,
+    solver: Annotated[
+        list[str] | None, option("NAME", "Only these solvers, of the suite or not. Repeatable.")
+    ] = None,
+    form: Annotated[list[FormName] | None, option("FORM", "primal or dual, only that. Repeatable.")] = None,
+    tolerance: Annotated[
+        list[float] | None, option("TOL", "Tolerance handed to the solvers. Repeatable.")
+    ] = None,
+    repeat: Annotated[int | None, option("N", "How often to measure each.", min=1)] = None,
+    threads: Annotated[
+        list[int] | None, option("N", "Threads of the linear algebra. Repeatable.", min=1)
+    ] = None,
+    time_limit: Annotated[float | None, option("SECONDS", "From the start of the solver.", min=0.001)] = None,
+    memory_limit: Annotated[int | None, option("MIB", "For the solver's processes together.", min=1)] = None,
+    out: Annotated[Path | None, option("DIR", "Where results go.  [default: results/SUITE]")] = None,
+    plugin: Plugin = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Measure a suite and write rows, answers and report.
+
+    Each measurement is a process of its own, ended at its time or memory limit. Rows are kept as they
+    come in: stop it with Ctrl-C, run the same command again, and it goes on where it stopped.
+
+    \b
+    Examples:
+      python -m harness run --size 4386
+      python -m harness run --scene 4386/0107 --solver ipm --solver piqp --form dual
+      python -m harness run --scene my-matrices.npz --tolerance 1e-6 --tolerance 1e-9
+      python -m harness run gate --out results/gate
+      python -m harness run my-suite.toml --repeat 5 --threads 1 --threads 2
+      python -m harness run --scheduler tcp://10.0.0.5:8786
+
+    \b
+    Exit codes: 0 measured, 1 not all, for workers were lost, 2 wrong usage or bad input,
+                3 nothing could be judged, 130 interrupted.
+    """
+    with reported() as console:
+        from harness.measurement.run import run as run_suite
+        from harness.planning.overrides import Overrides, overridden
+        from harness.planning.suite import read_suite
+        from harness.results.records import MEASUREMENTS
+
+        change = Overrides(
+            sizes=tuple(size or ()),
+            scenes=tuple(scene or ()),
+            solvers=tuple(solver or ()),
+            forms=tuple(choice.value for choice in form or ()),
+            tolerances=tuple(tolerance or ()),
+            repeats=repeat,
+            threads=tuple(threads or ()),
+            time_limit_s=time_limit,
+            memory_limit_mib=memory_limit,
+            plugin=plugin,
+        )
+        chosen = overridden(read_suite(suite), change)
+        directory = out or Path("results") / chosen.name
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        code = run_suite(chosen, directory, console, scheduler)
+        if (directory / MEASUREMENTS).is_file():
+            from report.writers.markdown import write  # slow to import: not before the first row
+
+            console.print(f"Report: {write(directory)}")
+        raise typer.Exit(code)
+
+
+@app.command()
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")],
+) -> None:
+    """Write DIR/report/report.md anew from the rows.
+
+    \b
+    Example:
+      python -m harness report results/default
+    """
+    with reported() as console:
+        from harness.results import records
+        from harness.series.store import SERIES
+        from problems.errors import InputError
+
+        if (directory / SERIES).is_file():
+            from report.writers.series import write as write_series
+
+            console.print(f"Report: {write_series(directory)}")
+            return
+        path = directory / records.MEASUREMENTS
+        if not path.is_file():
+            raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` makes one")
+        if not records.read(path):
+            raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
+        from report.writers.markdown import write
+
+        console.print(f"Report: {write(directory)}")
+
+
+@app.command()
+def gate(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")],
+) -> None:
+    """Judge the saved answers anew, and fail where accuracy was lost.
+
+    The figures in the rows are not trusted: each answer is compared with the reference of its scene.
+
+    \b
+    Examples:
+      python -m harness run gate && python -m harness gate results/gate
+
+    \b
+    Exit codes:
+      0  every gated row is within 1e-7 mm (on a rung of a ladder, what conditioning allows)
+      1  accuracy lost: a gated row is outside, cannot be judged, has no answer, or was never measured
+      2  wrong usage or bad input
+      3  nothing could be judged
+    """
+    with reported() as console:
+        from harness.verification.gate import gate as judge_directory
+
+        raise typer.Exit(judge_directory(directory, console))
+
+
+@app.command("list")
+def list_(what: Listed) -> None:
+    """List the solvers, scenes or suites that can be named.
+
+    \b
+    Examples:
+      python -m harness list solvers
+      python -m harness list scenes
+    """
+    with reported() as console:
+        from .listing import listing
+
+        console.print(listing(what.value))
+
+
+@app.command()
+def check(
+    solver: Annotated[list[str] | None, option("NAME", "A solver by name. Repeatable.")] = None,
+    plugin: Plugin = None,
+) -> None:
+    """Test solvers on small problems with known answers, and say what is wrong with them.
+
+    \b
+    Examples:
+      python -m harness check --plugin mine.py
+      python -m harness check --solver ipm --solver gi
+
+    \b
+    Exit codes: 0 nothing found, 1 faults found, 2 wrong usage or bad input.
+    """
+    with reported() as console:
+        from harness.conformance.check import run as check_solver
+        from solvers.registry import SOLVERS, make_solver
+
+        names = solver or ([plugin.stem] if plugin else list(SOLVERS))
+        faulty = False
+        for name in names:
+            make_solver(name, {}, plugin)
+            findings = check_solver(partial(make_solver, name, {}, plugin))
+            faulty |= bool(findings)
+            console.print(f"{name}: {len(findings) or 'no'} faults", style="red" if findings else "green")
+            for finding in findings:
+                console.print(f"  {finding}", highlight=False, markup=False)
+        raise typer.Exit(FELL_SHORT if faulty else DONE)
+
+
+def main() -> None:
+    app(prog_name="python -m harness")

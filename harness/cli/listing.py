@@ -1,0 +1,44 @@
+"""The tables of `list`: solvers, scenes, suites."""
+
+from __future__ import annotations
+
+from rich.table import Table
+
+from harness.planning.suite import read_suite, suite_names
+from problems.errors import InputError
+from problems.manufactured.ladder import rung_names
+from problems.scene import read_scene, scene_names
+from solvers.registry import SOLVERS, make_solver, solver_names, solver_version
+
+
+def listing(what: str) -> Table:
+    """A table of "solvers", "scenes" or "suites"."""
+    return {"solvers": _solvers, "scenes": _scenes, "suites": _suites}[what]()
+
+
+def _solvers() -> Table:
+    table = Table("solver", "forms", "version", "through")
+    for name in solver_names():
+        try:
+            forms = " ".join(make_solver(name, {}).forms)
+        except InputError as error:
+            forms = error.faults[0].allowed
+        table.add_row(name, forms, solver_version(name), "" if name in SOLVERS else "qpsolvers")
+    return table
+
+
+def _scenes() -> Table:
+    table = Table("scene", "n", "m", "title")
+    for name in [*scene_names(), *rung_names()]:
+        scene = read_scene(name)
+        table.add_row(name, *(str(size) for size in scene.expected_size or ("", "")), scene.title)
+    return table
+
+
+def _suites() -> Table:
+    table = Table("suite", "scenes", "solvers", "what for")
+    for name in suite_names():
+        suite = read_suite(name)
+        solvers = dict.fromkeys(entry.name for entry in suite.solver)
+        table.add_row(name, str(len(suite.scenes)), " ".join(solvers), suite.description or suite.title)
+    return table

@@ -1,0 +1,112 @@
+"""The commands for one scene: solve, validate, export, import."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from harness.terminal.console import SceneName, option, reported
+
+app = typer.Typer(rich_markup_mode=None)
+
+SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
+
+
+@app.command()
+def solve(
+    scene: SceneName,
+    out: Annotated[Path, option("DIR", "Where the answer goes.")],
+    solver: Annotated[
+        str | None, option("NAME", "A solver by name.  [default: the active-set method of the references]")
+    ] = None,
+    tolerance: Annotated[float, option("TOL", "Tolerance handed to a named solver.", min=0.0)] = 1e-9,
+) -> None:
+    """Solve one scene: gaps, displacements and contact forces, as pictures and files.
+
+    Without --solver the answer comes with a proven bound on its error; with one it is judged against that
+    answer. A scene whose parts do not meet is a linear solve. What was computed, by which effect, and what
+    was skipped stands in a ledger.
+
+    \b
+    Examples:
+      python -m harness solve gallery/heavy-sheet-on-tool --out results/sheet
+      python -m harness solve my-scene.toml --solver piqp --out results/mine
+
+    \b
+    Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input.
+    """
+    with reported(SAFE, INTERRUPTED) as console:
+        from harness.scene.solve import solve as solve_scene
+
+        raise typer.Exit(solve_scene(scene, solver, tolerance, out, console))
+
+
+@app.command()
+def validate(scene: SceneName) -> None:
+    """Check a scene without solving it, and say what will be built, how large, and in about what time.
+
+    \b
+    Examples:
+      python -m harness validate my-scene.toml
+
+    \b
+    Exit codes: 0 fine, 2 bad input.
+    """
+    with reported(SAFE, INTERRUPTED) as console:
+        from harness.scene.validate import validate as validate_scene
+
+        validate_scene(scene, console)
+
+
+@app.command()
+def export(
+    scene: SceneName,
+    form: Annotated[
+        str, typer.Option("--format", metavar="FORMAT", help="npz, mtx, op4, dmig, abaqus, qpsolvers.")
+    ],
+    out: Annotated[Path, option("PATH", "A file; a folder for mtx and abaqus.")],
+) -> None:
+    """Write K, A, f, g of a scene for another program.
+
+    \b
+    Examples:
+      python -m harness export 4386/0107 --format npz --out joint.npz
+      python -m harness export gallery/three-part-stack --format qpsolvers --out stack.npz
+
+    \b
+    Exit codes: 0 written, 2 wrong usage or bad input.
+    """
+    with reported(SAFE, INTERRUPTED) as console:
+        from harness.scene.exchange import export as export_scene
+
+        export_scene(scene, form, out, console)
+
+
+@app.command("import")
+def import_(
+    files: Annotated[
+        list[str], typer.Argument(metavar="[NAME=]FILE...", help="Files with K, A, f, g; see below.")
+    ],
+    out: Annotated[Path, option("FILE.npz", "Where the problem goes.")],
+) -> None:
+    """Read K, A, f, g from other programs' files, check them, and write one .npz to run and solve.
+
+    Matrix Market and Abaqus matrix text (.mtx) hold one matrix, named by the file or by NAME=; .npz (also
+    of qpsolvers), Nastran .op4 and DMIG (.pch, .bdf) name theirs. K is checked for symmetry, definiteness and
+    the digits that it seems to have.
+
+    \b
+    Examples:
+      python -m harness import K.mtx A.mtx f.mtx g.mtx --out mine.npz
+      python -m harness import K=job_STIF2.mtx A.mtx f.mtx g.mtx --out mine.npz
+      python -m harness import joint.op4 --out mine.npz
+
+    \b
+    Exit codes: 0 read and written, 2 wrong usage or bad input.
+    """
+    with reported(SAFE, INTERRUPTED) as console:
+        from harness.scene.exchange import import_ as import_files
+
+        import_files(files, out, console)

@@ -1,0 +1,130 @@
+"""The command `series`: many load cases on one assembly."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from harness.terminal.console import Plugin, SceneName, Scheduler, option, reported
+
+if TYPE_CHECKING:
+    from problems.load_cases.base import LoadCases
+
+app = typer.Typer(rich_markup_mode=None)
+
+SEED = 0
+
+
+@app.command()
+def series(
+    scene: SceneName,
+    out: Annotated[Path, option("DIR", "Where rows, gaps and report go.")],
+    cases: Annotated[
+        int | None, option("N", "How many cases.  [default: 100 random ones; all of a table]", min=1)
+    ] = None,
+    seed: Annotated[
+        int | None, option("SEED", f"Of the random gaps, with the case's number.  [default: {SEED}]", min=0)
+    ] = None,
+    mean: Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")] = None,
+    sd: Annotated[float | None, option("MM", "Their standard deviation.  [default: the scene's]")] = None,
+    correlation_length: Annotated[
+        float | None, option("MM", "Their correlation length.  [default: the scene's]")
+    ] = None,
+    gaps: Annotated[
+        Path | None, option("FILE", "Measured gaps, .csv .npz .npy: a row a case, a column a contact, mm.")
+    ] = None,
+    sweep: Annotated[
+        list[str] | None,
+        option("KEY=VALUES", "A scene's key and its values. Repeatable, for all combinations."),
+    ] = None,
+    solver: Annotated[str, option("NAME", "The solver.")] = "newton",
+    form: Annotated[
+        str | None, option("FORM", "primal or dual.  [default: dual where the solver takes it]")
+    ] = None,
+    tolerance: Annotated[float, option("TOL", "Tolerance handed to the solver.")] = 1e-11,
+    limit: Annotated[float, option("MM", "The error that is allowed.")] = 1e-7,
+    check: Annotated[
+        int, option("N", "Compare every N-th case with the certified reference; 0: none.", min=0)
+    ] = 100,
+    threads: Annotated[int, option("N", "Threads of the linear algebra.", min=1)] = 2,
+    plugin: Plugin = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
+
+    The assembly is opened and the solver prepared once. Each case is a row, vouched for by a proven bound
+    on its error, and its gaps are kept: stop it with Ctrl-C, run the same command again, and it goes on
+    where it stopped; with more --cases it is extended.
+
+    \b
+    Examples:
+      python -m harness series 4386/1074 --cases 1000 --out results/gaps
+      python -m harness series 4386/0107 --sd 0.2 --correlation-length 150 --cases 200 --out results/var
+      python -m harness series 4386/1074 --gaps measured.csv --out results/measured
+      python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
+      python -m harness series 4386/0107 --sweep initial_gap.mean=0.2,0.4 \\
+                                         --sweep fasteners.preload=500:1500:11 --out results/both
+      python -m harness series 4386/1074 --cases 1000 --threads 1 --scheduler local:2 --out results/gaps
+
+    \b
+    Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
+                3 nothing could be judged, 130 interrupted.
+    """
+    with reported() as console:
+        from harness.measurement.solver_code import code_of
+        from harness.series.run import run
+        from harness.series.session import Job
+        from harness.series.store import CASES
+        from problems.errors import Fault, InputError
+        from problems.prepare import prepared
+        from problems.scene import read_scene
+        from solvers.registry import make_solver, solver_version
+
+        random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
+        drawn = [name for name, value in random.items() if value is not None]
+        sources = [
+            name for name, given in (("--gaps", gaps), ("--sweep", sweep), *((d, d) for d in drawn)) if given
+        ]
+        faults = []
+        if (gaps and sweep) or (drawn and (gaps or sweep)):
+            faults.append(Fault("series", "cases", " ".join(sources), "random gaps, --gaps or --sweep"))
+        if sweep and cases is not None:
+            faults.append(Fault("--cases", "cases", cases, "a sweep has as many as it has values"))
+        made = make_solver(solver, {}, plugin)
+        taken = form or ("dual" if "dual" in made.forms else made.forms[0])
+        if taken not in made.forms:
+            faults.append(Fault("--form", "form", taken, f"{solver} takes {' and '.join(made.forms)}"))
+        if tolerance <= 0 or limit <= 0:
+            faults.append(Fault("series", "tolerance, limit", (tolerance, limit), "must be positive"))
+        if faults:
+            raise InputError(faults)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        read = read_scene(scene)
+        with console.status("opening the assembly"):
+            data = prepared(read)
+        if gaps:
+            from problems.load_cases.measured_gaps import measured_gaps
+
+            chosen: LoadCases = measured_gaps(read, data, gaps, cases)
+        elif sweep:
+            from problems.load_cases.sweep import sweep as swept
+
+            chosen = swept(read, sweep)
+        else:
+            from problems.load_cases.random_gaps import random_gaps
+
+            chosen = random_gaps(read, data, cases or 100, seed or SEED, mean, sd, correlation_length)
+        job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin)  # type: ignore[arg-type]
+        facts = {
+            "solver_version": solver_version(solver, plugin),
+            "solver_code": code_of(made),
+        }
+        code = run(job, facts, out, console, scheduler)
+        if (out / CASES).is_file():
+            from report.writers.series import write  # slow to import: not before the first row
+
+            console.print(f"Report: {write(out)}")
+        raise typer.Exit(code)

@@ -1,0 +1,1 @@
+"""Whether a solver keeps the contract, in plain words."""

@@ -1,0 +1,90 @@
+"""Small contact problems whose answers are known without a solver.
+
+Choose x, λ ≥ 0 and gaps y ≥ 0 with λᵢyᵢ = 0, put f = Kx + Aλ and g = Aᵀx + y: the optimality conditions
+then hold by construction, and since K is positive definite the answer is the only one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Prepared, Vector
+from solvers.base import Load
+
+Random = np.random.Generator
+
+#: The cases of a trial: the probability that a contact is closed.
+CLOSED = {"some contacts closed": 0.4, "others closed": 0.6, "all open": 0.0, "all closed": 1.0}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A load case with its answer: x (n,) in mm, lam (m,) in N."""
+
+    name: str
+    load: Load
+    x: Vector
+    lam: Vector
+
+
+@dataclass(frozen=True)
+class Trial:
+    name: str
+    prepared: Prepared
+    cases: tuple[Case, ...]
+
+
+def prepared_from(blocks: tuple[Matrix, ...], A: sp.csc_array) -> Prepared:
+    """Factors and Q = AᵀK⁻¹A of small blocks."""
+    factors = tuple(sla.cholesky(K) for K in blocks)
+    bare = Prepared(Assembly(blocks, A), factors, np.zeros((0, 0)))
+    Q = A.T @ bare.solve_K(A.toarray())
+    return Prepared(bare.assembly, factors, (Q + Q.T) / 2)
+
+
+def contact_rows(pairs: int, tools: int) -> sp.csc_array:
+    """A of two parts that face each other at `pairs` nodes, the first one also at `tools` rigid supports."""
+    first = sp.eye_array(pairs + tools)
+    second = -sp.eye_array(pairs, pairs + tools)
+    return sp.csc_array(sp.vstack([first, second]))
+
+
+def stiffness(random: Random, size: int) -> Matrix:
+    """Symmetric positive definite, N/mm, condition number 1e3."""
+    basis = np.linalg.qr(random.standard_normal((size, size)))[0]
+    K = (basis * np.logspace(2, 5, size)) @ basis.T
+    return (K + K.T) / 2
+
+
+def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> Case:
+    """A load case in which each contact is closed with the probability `closed`."""
+    n, m = prepared.assembly.n, prepared.assembly.m
+    A = prepared.assembly.A
+    shut = random.random(m) < closed
+    lam = np.where(shut, random.uniform(1, 100, m), 0.0)
+    opening = np.where(shut, 0.0, random.uniform(0.05, 1, m))
+    x = random.normal(0, 0.3, n)
+    f = prepared.assembly.multiply_K(x) + A @ lam
+    g = A.T @ x + opening
+    p = prepared.dual_load(LoadCase(f, g))
+    for array in (f, g, p):
+        array.flags.writeable = False
+    return Case(name, Load(f, g, p), x, lam)
+
+
+def trials(seed: int = 0) -> list[Trial]:
+    """One contact; two parts; two parts and a rigid tool. Arrays are read-only as in a measurement."""
+    random = np.random.default_rng(seed)
+    made = []
+    for name, pairs, tools in (("one contact", 1, 0), ("two parts", 12, 0), ("two parts and a tool", 30, 10)):
+        blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
+        prepared = prepared_from(blocks, contact_rows(pairs, tools))
+        for array in (*blocks, *prepared.factors, prepared.Q, prepared.assembly.A.data):
+            array.flags.writeable = False
+        cases = tuple(known_case(random, prepared, closed, title) for title, closed in CLOSED.items())
+        made.append(Trial(name, prepared, cases))
+    return made

@@ -1,0 +1,1 @@
+"""One process per measurement: started, watched, ended, recorded."""

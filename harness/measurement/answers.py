@@ -1,0 +1,55 @@
+"""What a solver hands over: whether it can be taken for an answer, its figures, and its file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from harness.results.records import Row
+from problems.forms.assembly import Prepared, Vector
+from solvers.base import Answer, Status
+
+
+class Refused(Exception):
+    """The answer cannot be taken; the text says why."""
+
+
+def checked(answer: Answer, data: Prepared, form: str) -> Answer:
+    """The answer; Refused where what the solver returned is none."""
+    if not isinstance(answer, Answer):
+        raise Refused(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
+    if answer.status not in get_args(Status):
+        raise Refused(f"status {answer.status!r}; allowed: {', '.join(get_args(Status))}")
+    if answer.status == "solved" and (answer.lam if form == "dual" else answer.x) is None:
+        raise Refused(f"says solved, and gives no {'lam' if form == 'dual' else 'x'}")
+    for name, value, size in (("lam", answer.lam, data.assembly.m), ("x", answer.x, data.assembly.n)):
+        if value is None:
+            continue
+        if np.shape(value) != (size,):
+            raise Refused(f"{name} has shape {np.shape(value)}; wanted ({size},)")
+        if not np.isfinite(np.asarray(value, dtype=float)).all():
+            raise Refused(f"{name} has NaN or infinity")
+    return answer
+
+
+def figures(answer: Answer) -> Row:
+    """What the solver says of it, for the row."""
+    return {
+        "iterations": answer.iterations,
+        "inner_iterations": answer.inner_iterations,
+        "solver_reported_s": answer.reported_s,
+        "details": answer.details,
+    }
+
+
+def save(path: Path, x: Vector, lam: Vector | None, m: int) -> None:
+    """x (n,) in mm and lam (m,) in N, NaN where the solver gives none; the file appears whole."""
+    new = path.with_name(path.name + ".new")
+    with new.open("wb") as file:
+        np.savez(file, x=x, lam=np.full(m, np.nan) if lam is None else lam)
+        file.flush()
+        os.fsync(file.fileno())
+    new.replace(path)

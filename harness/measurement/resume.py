@@ -1,0 +1,54 @@
+"""Which rows of an earlier run still stand: of the same scene, solver, code and accuracy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from harness.planning.plan import Measurement
+from harness.results import records
+from harness.results.records import Row
+from problems.scene import read_scene
+
+from .describe import Description, Solvers
+
+
+def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
+    """The rows that DIRECTORY holds; what a new run of the plan would not repeat is set aside."""
+    path = directory / records.MEASUREMENTS
+    if records.set_torn_aside(path):
+        console.print(f"{path}: the last line was torn; it now stands in {records.TORN}", style="yellow")
+    rows = records.read(path)
+    planned = {m.key: m for m in plan}
+    sources = {m.scene: m.source for m in plan}
+    scene_keys = {name: read_scene(source).key for name, source in sources.items()}
+
+    def is_old(row: Row) -> bool:
+        m = planned.get(row["key"])
+        return m is not None and outdated(row, m, solvers[m.solver, m.variant], scene_keys[m.scene])
+
+    old = [row for row in rows if is_old(row)]
+    if old:
+        for row in old:
+            records.append(directory / records.OUTDATED, row | {"answer": None})
+        rows = [row for row in rows if row not in old]
+        records.rewrite(path, rows)
+        why = "the scene, the solver or the limits have changed since"
+        console.print(f"{len(old)} rows are set aside in {records.OUTDATED}: {why}", style="yellow")
+    return rows
+
+
+def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
+    """Whether a row is of another scene, random field, solver or accuracy, or was ended by a limit that is
+    wider now.
+    """
+    law = m.series.model_dump(exclude={"cases"}) if m.series else {}
+    now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated, law)
+    asked = row.get("limit_asked_mm", row.get("limit_mm"))  # rows once had the one limit alone
+    drawn = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
+    solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
+    before = (*solved, asked, row.get("gated"), drawn)
+    out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
+    out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
+    return now != before or out_of_time or out_of_memory

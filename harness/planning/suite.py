@@ -1,0 +1,213 @@
+"""A suite: which scenes, solvers, forms, tolerances and repeats to measure. A TOML file, checked whole.
+
+title = "…"
+scenes = ["4386/0107", "6112/*", "my-scene.toml"]     # names, globs over names, or paths
+tolerances = [1e-9]
+[[solver]]
+name = "ipm"
+forms = ["dual"]
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+
+from problems.errors import Fault, InputError
+from problems.input.validation import unknown, validation_faults
+from problems.manufactured.ladder import PREFIX, rung_names
+from problems.scene import read_toml, scene_names
+from solvers.base import Form
+from solvers.registry import SOLVERS, solver_names
+
+SUITES = Path(__file__).parent.parent / "suites"
+Some = Field(min_length=1)
+
+
+class SolverEntry(BaseModel):
+    """One [[solver]]: how it is called, and what it is measured on.
+
+    Without `forms` it is the dual, or the primal of a solver that takes that only. `threads` and `cases` go
+    before the suite's. together : of a series so many load cases at once, by the solver's `together`.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    forms: Annotated[list[Form], Some] | None = None
+    variant: str = ""
+    options: dict[str, Any] = {}
+    tolerances: Annotated[list[PositiveFloat], Some] | None = None
+    scenes: Annotated[list[str], Some] | None = None
+    repeats: PositiveInt | None = None
+    threads: Annotated[list[PositiveInt], Some] | None = None
+    cases: PositiveInt | None = None
+    together: PositiveInt | None = None
+    gated: bool = True
+    time_limit_s: PositiveFloat | None = None
+
+
+class RandomCases(BaseModel):
+    """[series]: each scene with so many random initial gaps, solved in one process one after another.
+
+    mean, sd and correlation_length, mm, are those of the scene's `initial_gap` where they are not given.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    cases: PositiveInt
+    seed: Annotated[int, Field(ge=0)] = 0
+    mean: float | None = None
+    sd: PositiveFloat | None = None
+    correlation_length: PositiveFloat | None = None
+
+
+class Suite(BaseModel):
+    """What a suite file says; scenes are names, or absolute paths of files. `name` is the file's.
+
+    yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
+    time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of so many unknowns; time_limit_s for the rest.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str
+    title: str = ""
+    description: str = ""
+    scenes: Annotated[list[str], Some]
+    tolerances: Annotated[list[PositiveFloat], Some] = [1e-9]
+    repeats: PositiveInt = 1
+    threads: Annotated[list[PositiveInt], Some] = [2]
+    time_limit_s: PositiveFloat = 60.0
+    time_limit_by_size_s: dict[PositiveInt, PositiveFloat] = {}
+    memory_limit_mib: PositiveInt = 8192
+    limit_mm: PositiveFloat = 1e-7
+    yardstick: bool = False
+    plugin: str | None = None
+    series: RandomCases | None = None
+    solver: Annotated[list[SolverEntry], Some]
+
+    def time_limit(self, n: int) -> float:
+        """The limit in seconds on a scene of n unknowns."""
+        return self.time_limit_by_size_s.get(n, self.time_limit_s)
+
+
+def suite_names() -> list[str]:
+    """The suites that come with the package."""
+    return sorted(path.stem for path in SUITES.glob("*.toml"))
+
+
+def read_suite(name_or_path: str) -> Suite:
+    """Read a suite by name or by the path of its TOML file.
+
+    Raises InputError naming the file, the key, the value and what is allowed, all faults at once.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        path = SUITES / f"{name_or_path}.toml"
+        if not path.is_file():
+            raise InputError.one("SUITE", "name", name_or_path, unknown("suite", name_or_path, suite_names()))
+    return checked(read_toml(path), path)
+
+
+def checked(data: dict[str, Any], path: Path) -> Suite:
+    """A suite from a TOML file's content; its globs and relative paths are made out here."""
+    faults: list[Fault] = []
+    data = {"name": path.stem, **data}
+    if isinstance(data.get("scenes"), list):
+        data["scenes"] = found_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
+    if isinstance(data.get("plugin"), str):
+        data["plugin"] = str((path.parent / data["plugin"]).resolve())
+    faults += _unknown_solvers(data, path)
+    return validated(data, path, faults)
+
+
+def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) -> Suite:
+    """A suite from what `to_toml` wrote, or with what is wrong with it besides `faults`."""
+    faults = list(faults)
+    try:
+        suite = Suite.model_validate(data)
+    except ValidationError as error:
+        faults += validation_faults(path, Suite, error)
+    else:
+        faults += [*_twice(suite, path), *_of_no_series(suite, path)]
+    if faults:
+        raise InputError(faults)
+    return suite
+
+
+def found_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:
+    """The scenes that names, globs and paths (relative to `base`) stand for, each once, in their order.
+
+    The rungs of the ladders are meant by patterns that begin with "hard/" alone.
+    """
+    found: dict[str, None] = {}
+    for pattern in map(str, patterns):
+        if Path(pattern).suffix in (".toml", ".npz"):
+            path = (base / pattern).resolve()
+            if not path.is_file():
+                faults.append(Fault(where, key, pattern, "no such file"))
+            found[str(path)] = None
+            continue
+        known = rung_names() if pattern.startswith(PREFIX) else scene_names()
+        names = [name for name in known if fnmatchcase(name, pattern)]
+        if not names:
+            faults.append(Fault(where, key, pattern, unknown("scene", pattern, known)))
+        found |= dict.fromkeys(names)
+    return list(found) or list(map(str, patterns))
+
+
+def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
+    entries = data["solver"] if isinstance(data.get("solver"), list) else []
+    names = {k: str(e["name"]) for k, e in enumerate(entries) if isinstance(e, dict) and "name" in e}
+    known = [*SOLVERS, *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
+    if not set(names.values()) <= set(known):
+        known += [name for name in solver_names() if name not in known]  # slow, it imports every library
+    return [
+        Fault(str(path), f"solver.{k}.name", name, unknown("solver", name, known))
+        for k, name in names.items()
+        if name not in known
+    ]
+
+
+def _twice(suite: Suite, path: Path) -> Iterator[Fault]:
+    """Entries that a table could not tell apart."""
+    above: dict[tuple[str, str], tuple[object, bool]] = {}
+    for k, entry in enumerate(suite.solver):
+        way = entry.options, entry.together is not None
+        if above.setdefault((entry.name, entry.variant), way) != way:
+            what = "options" if above[entry.name, entry.variant][0] != entry.options else "`together`"
+            allowed = f"{entry.name} stands above with other {what} under this variant; name another"
+            yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
+
+
+def _of_no_series(suite: Suite, path: Path) -> Iterator[Fault]:
+    for k, entry in enumerate(suite.solver):
+        for key in ("cases", "together"):
+            if suite.series is None and (value := getattr(entry, key)) is not None:
+                yield Fault(str(path), f"solver.{k}.{key}", value, "is for a suite with [series]")
+
+
+def to_toml(suite: Suite) -> str:
+    """The suite as a TOML file that reads back as the same suite."""
+    data = suite.model_dump(exclude_none=True, exclude={"solver"})
+    lines = [f"{key} = {_value(value)}" for key, value in data.items()]
+    for entry in suite.solver:
+        lines += ["", "[[solver]]"]
+        lines += [f"{key} = {_value(value)}" for key, value in entry.model_dump(exclude_none=True).items()]
+    return "\n".join(lines) + "\n"
+
+
+def _value(value: Any) -> str:
+    match value:
+        case dict():
+            items = (f"{json.dumps(str(key))} = {_value(item)}" for key, item in value.items())
+            return "{" + ", ".join(items) + "}"
+        case list():
+            return "[" + ", ".join(map(_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)

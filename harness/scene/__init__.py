@@ -1,0 +1,1 @@
+"""One scene: validated, solved, exported."""

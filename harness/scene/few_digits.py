@@ -1,0 +1,26 @@
+"""What is said of the digits that a user's stiffness matrix seems to have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from harness.verification.judge import LIMIT_MM
+from problems.forms.assembly import Assembly, Prepared, Vector
+from problems.input.digits import DOUBLE, apparent_digits, expected_error
+
+
+def digits_of(assembly: Assembly) -> int:
+    """The fewest digits that the entries of a block of K seem to have, at most 16."""
+    return min(apparent_digits(K[np.nonzero(K)]) for K in assembly.blocks)
+
+
+def said_of_digits(data: Prepared, x: Vector, lam: Vector) -> tuple[str, bool]:
+    """A sentence on K's digits for an answer x, λ, and whether they are too few for 1e-7 mm."""
+    digits = digits_of(data.assembly)
+    if digits == DOUBLE:
+        return "The entries of K have all digits of double precision", False
+    error = expected_error(data, x, lam, digits)
+    text = f"The entries of K seem to have {digits} digits: if they were rounded, displacements are off by"
+    few = error > LIMIT_MM
+    more = f", more than {LIMIT_MM:g} mm: export it with more digits" if few else ""
+    return f"{text} about {error:.0e} mm{more}", few

@@ -1,0 +1,111 @@
+"""What each effect of a scene added, measured alone: stiffness, load, gap or constraints, time and memory."""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from problems.forms.assembly import Prepared, Vector
+from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect, effect_kinds
+from problems.model.joint import Joint
+from problems.prepare import load_case
+from problems.scene import Scene
+
+BALANCE = 1e-9  # a sum so small beside its terms is rounding
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One effect and one thing that it added; seconds and MiB at its peak, None if nothing was computed."""
+
+    effect: str
+    adds: str
+    amount: str
+    seconds: float | None
+    mib: float | None
+
+
+@dataclass
+class Cost:
+    seconds: float = 0.0
+    mib: float = 0.0
+
+
+@contextmanager
+def measured() -> Iterator[Cost]:
+    """The time of a `with` block and the most memory that it had allocated at once."""
+    cost = Cost()
+    tracemalloc.start()
+    start = time.perf_counter()
+    try:
+        yield cost
+    finally:
+        cost.seconds = time.perf_counter() - start
+        cost.mib = tracemalloc.get_traced_memory()[1] / 2**20
+        tracemalloc.stop()
+
+
+def ledger(scene: Scene, prepared: Prepared, built: bool) -> list[Entry]:
+    """An entry for each thing that an effect adds. built : the stiffness was computed now, not loaded."""
+    if scene.joint is None:
+        return []
+    return [
+        entry for effect in scene.effects for entry in _entries(effect, scene, scene.joint, prepared, built)
+    ]
+
+
+def not_called_for(scene: Scene) -> list[str]:
+    """The kinds of effects that the scene does not name: their modules are not imported."""
+    named = {effect.kind for effect in scene.effects}
+    return [kind for kind in effect_kinds() if kind not in named]
+
+
+def _entries(effect: Effect, scene: Scene, joint: Joint, prepared: Prepared, built: bool) -> Iterator[Entry]:
+    name = " ".join(filter(None, [effect.kind, getattr(effect, "part", None)]))
+    for first, second in effect.contacts:
+        yield Entry(name, "constraints", f"{joint.node_count} contacts of {first} and {second}", None, None)
+    if isinstance(effect, StiffnessEffect):
+        if not built:
+            yield Entry(name, "stiffness", "in the assembly from the cache", None, None)
+            return
+        (part,) = (part for part in joint.part if part.name == effect.part)
+        with measured() as cost:
+            term = effect.stiffness(joint.plate(part))
+        yield Entry(name, "stiffness", f"{term.nnz} entries of the plate's K", cost.seconds, cost.mib)
+        return
+    if isinstance(effect, TieEffect):
+        with measured() as cost:
+            T, k = effect.springs(joint)
+        yield Entry(name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", cost.seconds, cost.mib)
+    alone = replace(scene, effects=(*scene.stiffness_effects, effect))
+    with measured() as cost:
+        load = load_case(alone, prepared)
+    if isinstance(effect, GapEffect):
+        yield Entry(name, "gap", _gap(load.g), cost.seconds, cost.mib)
+    else:
+        yield Entry(name, "load", _forces(load.f, joint), cost.seconds, cost.mib)
+
+
+def _gap(g: Vector) -> str:
+    touched = g[g != 0]
+    if not touched.size:
+        return "0 mm"
+    return f"{touched.min():.4g} … {touched.max():.4g} mm at {touched.size} contacts"
+
+
+def _forces(f: Vector, joint: Joint) -> str:
+    forces = {part.name: f[joint.unknowns(part.name)] for part in joint.part}
+    text = ", ".join(f"{name} {_sum(own)}" for name, own in forces.items() if own.any())
+    return f"{text} on {np.count_nonzero(f)} nodes" if text else "0 N"
+
+
+def _sum(f: Vector) -> str:
+    """The sum of forces; of those in balance, how large they are."""
+    if abs(f.sum()) < BALANCE * abs(f).sum():
+        return f"±{abs(f).max():.4g} N in balance"
+    return f"{f.sum():+.4g} N"

@@ -1,0 +1,257 @@
+"""One scene from its file to an answer on disk; the report draws it from there.
+
+DIR/solution.npz holds the arrays, DIR/solution.json what was done: the steps and their time, the ledger of
+the effects, what was skipped, and how well the answer is known.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from harness.measurement.answers import Refused, checked
+from harness.measurement.machine import resident_mib
+from harness.results.records import replace_text, to_line
+from harness.terminal.exit_codes import DONE, FELL_SHORT
+from harness.verification.judge import LIMIT_MM, judge
+from harness.verification.reference import Reference, reference
+from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.model.effect import ForceEffect, PartLoadEffect, TieEffect
+from problems.prepare import load_case, prepared
+from problems.scene import Scene, read_scene
+from solvers.base import Form, Load, Problem, Solver
+
+from .few_digits import said_of_digits
+from .ledger import Entry, ledger, not_called_for
+from .validate import refuse_what_cannot_fit
+
+ACTIVE_SET = "active set (block principal pivoting), refined"
+LINEAR = "linear solve with the Cholesky factors of K"
+
+
+class Steps:
+    """The seconds of each step, and what building the matrices took that could not come from the cache."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+        self.seconds: dict[str, float] = {}
+        self.built: list[str] = []
+
+    @property
+    def condensed(self) -> bool:
+        """Whether a part's stiffness was computed, not loaded."""
+        return any(text.startswith("condensing") for text in self.built)
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        with self.console.status(name):
+            yield
+        self.seconds[name] = time.perf_counter() - start
+
+    def building(self, text: str, fraction: float) -> None:
+        if text not in self.built:
+            self.built.append(text)
+
+
+def solve(source: str, solver: str | None, tolerance: float, out: Path, console: Console) -> int:
+    """Solve a scene, write DIR, show the outcome. Returns 0 where the answer is known to 1e-7 mm, else 1.
+
+    Raises InputError.
+    """
+    begun = time.perf_counter()
+    steps = Steps(console)
+    with steps.step("reading the scene"):
+        scene = read_scene(source)
+        refuse_what_cannot_fit(scene, source)
+    chosen = _solver(solver) if solver else None
+    with steps.step("matrices"):
+        data = prepared(scene, steps.building)
+    with steps.step("the effects, each alone"):
+        entries = ledger(scene, data, steps.condensed)
+    with steps.step("loads and gaps"):
+        load = load_case(scene, data)
+        p = data.dual_load(load)
+    meets = bool((p > 0).any())
+    with steps.step("answer with a proven bound"):
+        known = reference(scene.key, data, load)
+    if solver and chosen and meets:
+        with steps.step(f"solving with {solver}"):
+            x, lam, said = _answer(solver, chosen, data, Load(load.f, load.g, p), tolerance)
+        verdict = judge(data, load, known, x, lam, LIMIT_MM)
+        said |= {"verdict": verdict.verdict, "judged_error_mm": verdict.displacement_error_mm}
+    else:
+        x, lam = known.x, known.lam
+        within = known.bound_mm <= LIMIT_MM
+        verdict_here = "within" if within else "cannot_be_judged"
+        method = ACTIVE_SET if meets else LINEAR
+        said = {"method": method, "status": "solved", "verdict": verdict_here, "judged_error_mm": None}
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError.one("--out", "directory", str(out), f"cannot be written: {error}") from error
+    record = said | {
+        "scene": scene.name,
+        "title": scene.title,
+        "scene_key": scene.key,
+        "n": data.assembly.n,
+        "m": data.assembly.m,
+        "cond_K": data.facts.get("cond_K"),
+        "qp": meets,
+        "closest_mm": float(-p.max()) if p.size else None,
+        "error_bound_mm": known.bound_mm,
+        "route": known.route,
+        **_layout(scene, data),
+        "ledger": [vars(entry) for entry in entries],
+        "digits": said_of_digits(data, known.x, known.lam)[0] if scene.matrices else None,
+        "skipped": list(_skipped(scene, steps, meets, solver, p)),
+        "steps": steps.seconds,
+        "peak_rss_mib": resident_mib("VmHWM"),
+    }
+    _save(out, record, data, load, x, lam)
+    with steps.step("pictures and files"):
+        from report.writers.solution import write  # slow to import: not before the answer is saved
+
+        written = write(out)
+    _show(record, entries, known, console)
+    console.print(f"{time.perf_counter() - begun:.1f} s in all. Answer: {written}")
+    return DONE if record["verdict"] == "within" else FELL_SHORT
+
+
+def _solver(name: str) -> Solver:
+    from solvers.registry import make_solver  # slow to import: not without a solver
+
+    return make_solver(name, {})
+
+
+def _answer(
+    name: str, solver: Solver, data: Prepared, load: Load, tolerance: float
+) -> tuple[Vector, Vector, dict[str, Any]]:
+    """x (n,), λ (m,) or NaN where there is none, and what the solver says. Raises InputError without an x."""
+    form: Form = "dual" if "dual" in solver.forms else "primal"
+    state = solver.prepare(solver.convert(Problem(data, form)))
+    try:
+        answer = checked(solver.solve(solver.setup(state, load, tolerance), load, tolerance), data, form)
+    except Refused as error:
+        raise InputError.one("--solver", name, str(error), "gave no answer; try another solver") from error
+    lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
+    x = answer.x
+    if form == "dual" and answer.lam is not None:
+        x = data.recover(lam, LoadCase(load.f, load.g))
+    if x is None:
+        raise InputError.one("--solver", name, answer.status, "gave no answer; try another solver")
+    said = {"method": f"{name}, {form} form, tolerance {tolerance:g}", "status": answer.status}
+    return np.asarray(x, dtype=float), lam, said | {"iterations": answer.iterations}
+
+
+def _layout(scene: Scene, data: Prepared) -> dict[str, Any]:
+    """Where parts and pairs stand in x and λ, and what a picture marks."""
+    assembly = data.assembly
+    if scene.joint is None:
+        spans = zip(assembly.parts, assembly.slices, strict=True)
+        nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
+        bare: dict[str, Any] = {"clamped": [], "supports": []}
+        parts = [
+            {"name": name, "start": s.start, "stop": s.stop, "outline": _extent(nodes[s]), **bare}
+            for name, s in spans
+        ]
+        return {
+            "parts": parts,
+            "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else [],
+            "marks": {},
+        }
+    joint = scene.joint
+    size = joint.node_count
+    parts = []
+    for k, part in enumerate(joint.part):
+        plate = joint.plate(part)
+        held = [e.held_points for e in scene.stiffness_effects if e.part == part.name]
+        parts.append(
+            {
+                "name": part.name,
+                "start": k * size,
+                "stop": (k + 1) * size,
+                "outline": [0.0, joint.junction.length, plate.y[0], plate.y[-1]],
+                "clamped": part.clamped,
+                "supports": [point for points in held for point in points],
+            }
+        )
+    pairs = [{"pair": pair, "start": k * size, "stop": (k + 1) * size} for k, pair in enumerate(joint.pairs)]
+    marks: dict[str, list[list[float]]] = {}
+    for effect in scene.effects:
+        if isinstance(effect, ForceEffect) and len(points := effect.marks(joint)):
+            marks.setdefault(effect.kind, []).extend(points.tolist())
+    return {"parts": parts, "pairs": pairs, "marks": marks}
+
+
+def _extent(nodes: Vector) -> list[float]:
+    """The smallest and largest x, then y, of some nodes."""
+    return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist()
+
+
+def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vector) -> Iterator[str]:
+    if not meets:
+        instead = f"; {solver} was not run" if solver else ""
+        why = "The scene has no contact"
+        if p.size:
+            closest = f"the closest contact stays {-p.max():.3g} mm open"
+            why = f"The answer without contact violates no gap, {closest}"
+        yield f"the quadratic program: it was not called for. {why}{instead}"
+    if not steps.built:
+        yield "condensation, Cholesky factors and Q: the assembly came from the cache"
+    elif scene.joint is not None and not steps.condensed:
+        yield "condensation: the parts came from the cache"
+    if scene.joint is not None:
+        if not any(isinstance(effect, TieEffect) for effect in scene.effects):
+            yield "springs between parts: K stays block diagonal"
+        if not any(isinstance(effect, PartLoadEffect) for effect in scene.effects):
+            yield "condensing loads: none stands beyond the junction"
+        if others := not_called_for(scene):
+            yield f"effects that the scene does not name, not imported: {', '.join(others)}"
+
+
+def _save(out: Path, record: dict[str, Any], data: Prepared, load: LoadCase, x: Vector, lam: Vector) -> None:
+    A = data.assembly.A
+    arrays = {
+        "x": x,
+        "lam": lam,
+        "gap_before": load.g,
+        "gap_after": load.g - A.T @ x,
+        "A_data": A.data,
+        "A_indices": A.indices,
+        "A_indptr": A.indptr,
+    }
+    if data.assembly.nodes is not None:
+        arrays |= {"nodes": data.assembly.nodes, "contact_nodes": data.assembly.contact_nodes}
+    np.savez(out / "solution.npz", **arrays)
+    replace_text(out / "solution.json", to_line(record) + "\n")
+
+
+def _show(record: dict[str, Any], entries: list[Entry], known: Reference, console: Console) -> None:
+    table = Table("effect", "adds", "what", "s", "MiB", title="What each effect added")
+    for entry in entries:
+        cost = ("–", "–") if entry.seconds is None else (f"{entry.seconds:.3f}", f"{entry.mib:.1f}")
+        table.add_row(entry.effect, entry.adds, entry.amount, *cost)
+    if entries:
+        console.print(table)
+    if record["digits"]:
+        console.print(f"{record['digits']}.")
+    for line in record["skipped"]:
+        console.print(f"Skipped: {line}.", style="dim")
+    error = record["judged_error_mm"]
+    style = "green" if record["verdict"] == "within" else "red"
+    if error is None:
+        console.print(
+            f"{record['method']}: every displacement within {known.bound_mm:.1e} mm, proven.", style=style
+        )
+    else:
+        text = f"{record['method']}: {record['status']}, {error:.1e} mm from the answer with a proven bound"
+        console.print(f"{text} ({known.bound_mm:.1e} mm): {record['verdict']} {LIMIT_MM:g} mm.", style=style)

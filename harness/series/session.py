@@ -1,0 +1,220 @@
+"""Where load cases are solved: the assembly open, the solver prepared, the last answers for warm starts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+import threadpoolctl
+from numpy.typing import NDArray
+
+from harness.measurement.answers import checked
+from harness.measurement.loads import loads_of
+from harness.measurement.warm_starts import WarmStarts
+from harness.results.records import Row
+from harness.verification.batched.bound import Bound
+from harness.verification.batched.vouch import Vouched, vouch
+from harness.verification.judge import judge
+from harness.verification.reference import refined_active_set
+from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.load_cases.base import LoadCases
+from problems.prepare import prepared
+from problems.scene import Scene
+from solvers.base import Answer, Form, Load, Problem, failed
+from solvers.registry import make_solver
+
+Gaps = NDArray[np.float32]
+
+BLOCK = 64  # cases that share a pass over K and Q
+AT_ONCE_S = 5.0  # a block is closed after so long, so that slow cases are not lost with it
+NEARS = 32  # answers kept for warm starts: memory does not grow with the number of cases
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a series solves, and how. check : every so many cases are compared with the reference; 0: none."""
+
+    scene: Scene
+    cases: LoadCases
+    solver: str
+    form: Form
+    tolerance: float
+    limit_mm: float
+    check: int
+    threads: int
+    options: dict[str, Any] = field(default_factory=dict)
+    plugin: Path | None = None
+    key: str = field(default_factory=lambda: uuid4().hex)
+
+
+@dataclass(frozen=True)
+class Result:
+    """The row of a case and the gap that is left, (m,) mm; None where there is no answer."""
+
+    row: Row
+    gap: Gaps | None
+
+
+@dataclass(frozen=True)
+class _Tried:
+    case: int
+    load: Load
+    row: Row
+    answer: Answer
+
+
+class Desk:
+    """A job being done in this process."""
+
+    def __init__(self, job: Job) -> None:
+        threadpoolctl.threadpool_limits(job.threads)
+        self.job = job
+        self.data: Prepared = prepared(job.scene)
+        self.bound = Bound.of(self.data)
+        self.solver = make_solver(job.solver, job.options, job.plugin)
+        problem = Problem(self.data, job.form)
+        self.state = self.solver.prepare(self.solver.convert(problem))
+        self.together = self.solver.together(self.state)
+        self.ready: Any = None
+        self.starts = WarmStarts(problem, NEARS)
+
+    def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
+        """The cases, some at a time, each list as soon as it is done."""
+        for start in range(0, len(numbers), BLOCK):
+            loads = self._loads(numbers[start : start + BLOCK])
+            if self.together is not None:
+                yield self._finished(self._try_together(loads))
+                continue
+            begun, tried = time.monotonic(), []
+            for case, load in loads:
+                tried.append(self._try(case, load))
+                if time.monotonic() - begun > AT_ONCE_S:
+                    yield self._finished(tried)
+                    begun, tried = time.monotonic(), []
+            if tried:
+                yield self._finished(tried)
+
+    def _loads(self, numbers: Sequence[int]) -> list[tuple[int, Load]]:
+        cases = [self.job.cases.load(k, self.data) for k in numbers]
+        return list(zip(numbers, loads_of(cases, self.data), strict=True))
+
+    def _try_together(self, loads: list[tuple[int, Load]]) -> list[_Tried]:
+        """Solve them all at once; where that raises, one after another, so that it is known which does."""
+        assert self.together is not None
+        start = time.perf_counter()
+        try:
+            answers = self.together([load for _, load in loads], self.job.tolerance)
+            tried = [
+                _Tried(case, load, self._begun(case), checked(answer, self.data, self.job.form))
+                for (case, load), answer in zip(loads, answers, strict=True)
+            ]
+        except Exception:
+            return [self._try(case, load) for case, load in loads]
+        for each in tried:
+            each.row["solve_s"] = (time.perf_counter() - start) / len(tried)
+        return tried
+
+    def _begun(self, case: int) -> Row:
+        return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
+
+    def _try(self, case: int, load: Load) -> _Tried:
+        """Solve one; what the solver raises becomes its status."""
+        row = self._begun(case)
+        found = None if self.ready is None else self.starts.nearest(load)
+        start = time.perf_counter()
+        try:
+            if found is None:
+                self.ready = self.solver.setup(self.state, load, self.job.tolerance)
+            else:
+                row["warm_from"], near = found
+                self.ready = self.solver.update(self.state, self.ready, load, self.job.tolerance, near)
+            row["setup_s"] = time.perf_counter() - start
+            start = time.perf_counter()
+            answer = self.solver.solve(self.ready, load, self.job.tolerance)
+            row["solve_s"] = time.perf_counter() - start
+            answer = checked(answer, self.data, self.job.form)
+        except Exception as error:
+            self.ready = None
+            answer = failed(f"{type(error).__name__}: {error}"[:500])
+        self.starts.keep(load, answer, case)
+        return _Tried(case, load, row, answer)
+
+    def _finished(self, tried: list[_Tried]) -> list[Result]:
+        """Rows, with what is known of the answers."""
+        start = time.perf_counter()
+        known = self._vouched(tried)
+        if self.together is not None:
+            self._try_again(tried, known)
+        share = (time.perf_counter() - start) / len(tried)
+        return [self._result(each, known.get(each.case), share) for each in tried]
+
+    def _try_again(self, tried: list[_Tried], known: dict[int, Vouched]) -> None:
+        """What is not proven to be within the limit, with the p for which Qλ − p is the gap that was found.
+
+        So the answers lose what Q and p have lost in rounding. The better of the two stays.
+        """
+        places = {each.case: k for k, each in enumerate(tried)}
+        far = [tried[places[case]] for case, about in known.items() if about.bound_mm > self.job.limit_mm]
+        if not far:
+            return
+        lams = np.column_stack([each.answer.lam for each in far if each.answer.lam is not None])
+        p = self.data.Q @ lams - np.column_stack([known[each.case].gap for each in far])
+        loads = [(each.case, replace(each.load, p=column)) for each, column in zip(far, p.T, strict=True)]
+        new = self._try_together(loads)
+        for case, about in self._vouched(new).items():
+            if about.bound_mm < known[case].bound_mm:
+                known[case] = about
+                old, better = tried[places[case]], next(each for each in new if each.case == case)
+                count = (old.answer.iterations or 0) + (better.answer.iterations or 0)
+                tried[places[case]] = replace(old, answer=replace(better.answer, iterations=count))
+
+    def _vouched(self, tried: list[_Tried]) -> dict[int, Vouched]:
+        needed = ("lam", "x") if self.job.form == "primal" else ("lam",)
+        answered = [each for each in tried if all(getattr(each.answer, v) is not None for v in needed)]
+        if not answered:
+            return {}
+        lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
+        own = [each.answer.x if self.job.form == "primal" else None for each in answered]
+        found = vouch(self.bound, [each.load for each in answered], lams, own)
+        return {each.case: about for each, about in zip(answered, found, strict=True)}
+
+    def _result(self, tried: _Tried, about: Vouched | None, vouch_s: float) -> Result:
+        answer, job = tried.answer, self.job
+        row = tried.row | {
+            "status": answer.status,
+            "message": answer.details.get("cause"),
+            "iterations": answer.iterations,
+            "inner_iterations": answer.inner_iterations,
+            "form_s": vouch_s,
+            "verdict": "no_answer",
+            "limit_mm": job.limit_mm,
+        }
+        if about is None:
+            return Result(row, None)
+        row |= {
+            "active": about.active,
+            "bound_mm": about.bound_mm,
+            **{name: getattr(about, name) for name in ("primal_residual", "dual_residual", "duality_gap")},
+            "min_gap_mm": float(about.gap.min()),
+            "mean_gap_mm": float(about.gap.mean()),
+            "max_gap_mm": float(about.gap.max()),
+            "verdict": "within" if about.bound_mm <= job.limit_mm else "cannot_be_judged",
+        }
+        if job.check and tried.case % job.check == 0:
+            row |= self._compared(tried, about.x)
+        return Result(row, about.gap.astype(np.float32))
+
+    def _compared(self, tried: _Tried, x: Vector) -> Row:
+        """The distance to the certified reference, which outweighs the bound."""
+        case = LoadCase(tried.load.f, tried.load.g)
+        known = refined_active_set(self.data, case)
+        lam = np.asarray(tried.answer.lam, dtype=float)
+        judged = judge(self.data, case, known, x, lam, self.job.limit_mm)
+        names = ("displacement_error_mm", "reference_bound_mm", "contact_mismatch")
+        found: Row = {name: getattr(judged, name) for name in names}
+        return found if judged.verdict == "cannot_be_judged" else found | {"verdict": judged.verdict}

@@ -1,0 +1,126 @@
+"""What the terminal shows of a run: a row as it comes in, a bar, and the time that is left."""
+
+from __future__ import annotations
+
+import time
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from harness.planning.plan import Measurement
+from harness.results.records import Row
+
+GROWTH = 2.5  # seconds ~ n^GROWTH, between the n² of a product and the n³ of a factorisation
+SCENE = ("scene", "")  # the step of opening or building one
+STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no_answer": "red"}
+
+#: heading, width, and what stands in it.
+COLUMNS = [
+    ("scene", -23, lambda row: row["scene"]),
+    ("solver", -14, lambda row: f"{row['solver']} {row['variant']}".strip()),
+    ("form", -6, lambda row: row["form"]),
+    ("tol", 6, lambda row: f"{row['tolerance']:.0e}"),
+    ("thr", 3, lambda row: str(row["threads_asked"])),
+    ("status", -15, lambda row: row["status"]),
+    ("iter", 6, lambda row: _figure(row["iterations"], "d")),
+    ("prepare s", 9, lambda row: _figure(_sum(row, "convert_s", "prepare_s"), ".2f")),
+    ("solve s", 8, lambda row: _solve_time(row)),
+    ("error mm", 8, lambda row: _figure(row["displacement_error_mm"], ".1e")),
+    ("verdict", -16, lambda row: row["verdict"]),
+]
+
+
+def _figure(value: float | None, form: str) -> str:
+    return "–" if value is None else format(value, form)
+
+
+def _sum(row: Row, *names: str) -> float | None:
+    known = [row[name] for name in names if row[name] is not None]
+    return sum(known) if known else None
+
+
+def _solve_time(row: Row) -> str:
+    if row["solve_s"] is None:
+        return f"> {row['time_limit_s']:g}" if row["status"] == "time_limit" else "–"
+    return _figure(_sum(row, "setup_s", "solve_s", "form_s"), ".2f")
+
+
+def _line(cells: list[str]) -> str:
+    widths = [width for _, width, _ in COLUMNS]
+    aligned = (c.ljust(-w) if w < 0 else c.rjust(w) for c, w in zip(cells, widths, strict=True))
+    return "  ".join(aligned).rstrip()
+
+
+def row_text(row: Row) -> Text:
+    """One line of the table; the reason below it where there is no answer."""
+    text = Text(_line([cell(row) for *_, cell in COLUMNS]), style=STYLES[row["verdict"]])
+    if row["message"] and row["verdict"] == "no_answer":
+        text.append(f"\n    {row['message'].splitlines()[0][:150]}", style="dim")
+    return text
+
+
+class Display:
+    """Rows scroll by above a bar; without a terminal only the rows are printed."""
+
+    def __init__(self, console: Console, left: list[Measurement], done: int, sizes: dict[str, int]) -> None:
+        self.console = console
+        self.left = list(left)
+        self.closed = {m.scene for m in left}
+        self.sizes = sizes
+        self.seen: dict[tuple[str, str], tuple[int, float]] = {}
+        self.progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[left]}"),
+            console=console,
+            disable=not console.is_terminal,
+        )
+        self.task: TaskID = self.progress.add_task("", total=len(left) + done, completed=done, left="")
+
+    def __enter__(self) -> Display:
+        self.console.print(_line([heading for heading, *_ in COLUMNS]), style="bold", soft_wrap=True)
+        self.progress.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.progress.stop()
+
+    def doing(self, text: str) -> None:
+        """What is being done now, beside the bar."""
+        self.progress.update(self.task, description=text, left=self._time_left())
+
+    def building(self, scene: str, step: str, fraction: float) -> None:
+        """How far a step of building a scene has come."""
+        self.doing(f"{scene}: {step} {fraction:.0%}" if fraction else f"{scene}: {step}")
+
+    def ready(self, scene: str, seconds: float) -> None:
+        """A scene is open, with its reference."""
+        self.closed.discard(scene)
+        self._learn(SCENE, scene, seconds)
+
+    def _learn(self, step: tuple[str, str], scene: str, seconds: float) -> None:
+        self.seen[step] = self.sizes.get(scene, 0), seconds
+
+    def finished(self, measurement: Measurement, row: Row, seconds: float) -> None:
+        """A measurement is done."""
+        self.left.remove(measurement)
+        self._learn((measurement.solver, measurement.form), measurement.scene, seconds)
+        self.console.print(row_text(row), soft_wrap=True)
+        self.progress.update(self.task, advance=1, left=self._time_left())
+
+    def _time_left(self) -> str:
+        """From what the same step took before, carried over to the size; else from the other steps."""
+        if not self.seen or not self.left:
+            return ""
+        total = sum(self._guess(SCENE, scene) for scene in self.closed)
+        total += sum(min(self._guess((m.solver, m.form), m.scene), m.time_limit_s) for m in self.left)
+        return f"{time.strftime('%H:%M:%S', time.gmtime(total))} left"
+
+    def _guess(self, step: tuple[str, str], scene: str) -> float:
+        usual = sum(seconds for _, seconds in self.seen.values()) / len(self.seen)
+        size, seconds = self.seen.get(step, (0, usual))
+        growth = (self.sizes.get(scene, 0) / size) ** GROWTH if size else 1.0
+        return seconds * growth

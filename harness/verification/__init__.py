@@ -1,0 +1,1 @@
+"""The referee: references with proven error bounds, verdicts, the accuracy gate."""

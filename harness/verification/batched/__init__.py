@@ -1,0 +1,1 @@
+"""The same bounds for many load cases at a time."""

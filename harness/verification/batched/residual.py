@@ -1,0 +1,91 @@
+"""r = f − Kx − Aλ of a block of load cases, a column each, with one pass over K and a bound on its error.
+
+K and x are cut in two, K = K₁ + K₂ and x = x₁ + x₂ with so few bits in K₁ and x₁ that BLAS multiplies them
+exactly (see `exact_residual`). K₂ and x₂ are 2⁻ᵇ times smaller, b ≈ 20, and so is what the products with
+them lose, in whatever order: |fl(K₂x₁) − K₂x₁| ≤ γ_n |K₂||x₁| ≤ γ_n (Σ_j |K₂|_ij) max|x₁|, and Kx₂ likewise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.verification.exact_residual import ROWS_AT_A_TIME, cut, exponent, gamma
+from problems.forms.assembly import Assembly, Matrix
+
+SAFE = 1.01  # for the rounding of the bounds themselves
+
+
+@dataclass(frozen=True)
+class Split:
+    """x = head + tail exactly, (n, k), the head of so few bits that its products with K₁ are exact."""
+
+    head: Matrix
+    tail: Matrix
+
+    @property
+    def rounded(self) -> Matrix:
+        return self.head + self.tail
+
+    def plus(self, correction: Matrix) -> Split:
+        """Another point, x + correction but for the rounding of the tail."""
+        return Split(self.head, self.tail + correction)
+
+
+def bits(n: int) -> int:
+    """b with n products of two b-bit numbers summing up to at most 53 bits: 2(b − 1) + log₂ n ≤ 53."""
+    return (53 - int(np.ceil(np.log2(max(n, 2))))) // 2 + 1
+
+
+def split(assembly: Assembly, x: Matrix) -> Split:
+    """x (n, k) cut, block by block of K."""
+    head = np.empty_like(x)
+    for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
+        head[rows] = cut(x[rows], exponent(abs(x[rows]).max(axis=0)), bits(len(K)))[0]
+    return Split(head, x - head)
+
+
+def residual(assembly: Assembly, f: Matrix, x: Split, lam: Matrix) -> tuple[Matrix, Matrix]:
+    """(r, e), (n, k) N each, with |r − (f − Kx − Aλ)| ≤ e. f (n, k), λ (m, k)."""
+    A = assembly.A.tocsr()
+    r, size = f - A @ lam, abs(f) + abs(A) @ abs(lam)
+    error = np.empty_like(r)
+    for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
+        products, error[rows] = _products(K, x.head[rows], x.tail[rows])
+        for product in products:
+            r[rows] -= product
+            size[rows] += abs(product)
+    depth = int(np.diff(A.indptr).max(initial=0)) + 5
+    return r, SAFE * (error + gamma(depth) * size)
+
+
+def refined(
+    assembly: Assembly, x: Split, r: Matrix, error: Matrix, d: Matrix, stiffest: float
+) -> tuple[Split, Matrix, Matrix]:
+    """x + d, and its residual r − Kd with a bound on its error. stiffest ≥ ‖K‖_∞, N/mm.
+
+    d is small, so that a plain product with it will do: |fl(Kd) − Kd| ≤ γ_n ‖K‖_∞ max|d|.
+    """
+    there, n = x.plus(d), assembly.n
+    Kd = assembly.multiply_K(d)
+    moved = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(there.tail).max(axis=0)
+    return there, r - Kd, SAFE * (error + stiffest * moved + gamma(1) * (abs(r) + abs(Kd)))
+
+
+def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matrix]:
+    """K₁x₁, K₂x₁ and Kx₂, and what they are in doubt by together."""
+    n, b = len(K), bits(len(K))
+    products = [np.empty_like(head) for _ in range(3)]
+    lost = np.empty_like(head)
+    head_size, tail_size = abs(head).max(axis=0), abs(tail).max(axis=0)
+    for start in range(0, n, ROWS_AT_A_TIME):
+        chunk = slice(start, min(start + ROWS_AT_A_TIME, n))
+        whole = K.T[chunk]  # K is symmetric and stored by columns, so these are contiguous rows
+        top = exponent(np.max(abs(whole), axis=1, keepdims=True))
+        K1, K2 = cut(whole, top, b)
+        for product, left, right in zip(products, (K1, K2, whole), (head, head, tail), strict=True):
+            product[chunk] = left @ right
+        sums = [abs(each).sum(axis=1, keepdims=True) for each in (K2, whole)]
+        lost[chunk] = SAFE * gamma(n) * (sums[0] * head_size + sums[1] * tail_size)
+    return products, lost

@@ -1,0 +1,84 @@
+"""From the forces of a block of load cases to displacements, gaps, residuals and proven error bounds.
+
+Everything here is done for all cases of the block at once, matrix by matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.forms.assembly import Vector
+from solvers.base import Load
+
+from .bound import Bound, gaps
+from .residual import refined, residual, split
+
+
+@dataclass(frozen=True)
+class Vouched:
+    """One answer, looked at: x (n,) mm, gap = g − Aᵀx (m,) mm, and max|x − x*| ≤ bound_mm for certain.
+
+    active : the closed contacts, those with q_ii λ_i > (Qλ − p)_i.
+
+    primal_residual, dual_residual, duality_gap as the judge has them: mm, N, N·mm.
+    """
+
+    x: Vector
+    gap: Vector
+    active: int
+    bound_mm: float
+    primal_residual: float
+    dual_residual: float
+    duality_gap: float
+
+
+def vouch(
+    bound: Bound,
+    loads: Sequence[Load],
+    lams: Sequence[Vector],
+    own: Sequence[Vector | None],
+) -> list[Vouched]:
+    """One for each load with its finite λ (m,) and, in the primal form, the solver's own x (n,).
+
+    In the dual form the answer is x = K⁻¹(f − Aλ). The bound is that of a point near by, whose λ is zero
+    where q_ii λ_i ≤ (Qλ − p)_i, plus the distance to it.
+    """
+    prepared, assembly = bound.prepared, bound.prepared.assembly
+    A = assembly.A
+    f, g, p = (np.column_stack([getattr(load, name) for load in loads]) for name in "fgp")
+    lam = np.column_stack(lams)
+    compliance = np.diag(prepared.Q)[:, None]
+    clean = np.where(compliance * lam > prepared.Q @ lam - p, np.maximum(lam, 0.0), 0.0)
+
+    x = split(assembly, prepared.solve_K(f - A @ clean))
+    r, r_error = residual(assembly, f, x, clean)
+    x, r, r_error = refined(assembly, x, r, r_error, prepared.solve_K(r), bound.stiffest)
+    bounds = bound.bound(r, r_error, *gaps(assembly, g, x), clean)
+
+    given = x.rounded
+    shed = A @ (lam - clean)
+    if own[0] is not None:
+        answer = np.column_stack([each for each in own if each is not None])
+    else:
+        answer = given - prepared.solve_K(shed) if shed.any() else given
+    moved = answer - given
+    rounding = np.finfo(float).eps * abs(given).max(axis=0)
+    bounds = bounds + abs(moved).max(axis=0) + rounding
+    if moved.any():
+        r = r - assembly.multiply_K(moved) - shed
+    gap = g - A.T @ answer
+    return [
+        Vouched(
+            x=answer[:, k],
+            gap=gap[:, k],
+            active=int((clean[:, k] > 0).sum()),
+            bound_mm=float(bounds[k]),
+            primal_residual=float(max(-gap[:, k].min(initial=0.0), 0.0)),
+            dual_residual=float(max(abs(r[:, k]).max(initial=0.0), -lam[:, k].min(initial=0.0))),
+            duality_gap=float(abs(lam[:, k] @ gap[:, k] - answer[:, k] @ r[:, k])),
+        )
+        for k in range(len(loads))
+    ]

@@ -1,0 +1,165 @@
+"""Residuals of the optimality conditions, nearly exact, each with a bound on its own error.
+
+    r = f − Kx − Aλ   (n,) N         s = g − Aᵀx   (m,) mm
+
+x and λ are unevaluated sums hi + lo of two float64 vectors. Sums and products are made free of error:
+two_sum and two_product give the rounding besides the result (Knuth; Dekker), K is cut into slices of
+so few bits that BLAS multiplies them exactly (Ozaki, Ogita, Oishi and Rump, Numer. Algorithms
+59:95–118, 2012), and the terms are added with their roundings (Ogita, Rump and Oishi, SIAM J. Sci.
+Comput. 26:1955–1988, 2005): |Σ computed − Σ| ≤ u|Σ| + γ²_k Σ|terms|, u = 2⁻⁵³, γ_k = ku/(1 − ku).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.forms.assembly import Assembly, Matrix, Vector
+
+U = 2.0**-53
+ROWS_AT_A_TIME = 16  # with what is made of them they stay in the processor's cache
+K_SLICES, X_SLICES = 2, 3
+
+
+@dataclass(frozen=True)
+class Double:
+    """hi + lo, |lo| at most about u|hi|."""
+
+    hi: Vector
+    lo: Vector
+
+    def plus(self, correction: Vector) -> Double:
+        hi, error = two_sum(self.hi, correction)
+        return Double(*two_sum(hi, error + self.lo))
+
+
+@dataclass(frozen=True)
+class Enclosed:
+    """A vector and a bound on its error, entry by entry."""
+
+    value: Vector
+    error: Vector
+
+
+def two_sum(a: Vector, b: Vector) -> tuple[Vector, Vector]:
+    """(s, e) with s = fl(a + b) and s + e = a + b exactly."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+def two_product(a: Vector, b: Vector) -> tuple[Vector, Vector]:
+    """(p, e) with p = fl(ab) and p + e = ab exactly, unless that under- or overflows."""
+    p = a * b
+    (a1, a2), (b1, b2) = _halves(a), _halves(b)
+    return p, a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
+
+
+def _halves(a: Vector) -> tuple[Vector, Vector]:
+    c = 134217729.0 * a  # 2²⁷ + 1
+    hi = c - (c - a)
+    return hi, a - hi
+
+
+class Sum:
+    """Adds terms with their roundings; `error` is what the terms themselves are in doubt by."""
+
+    def __init__(self, size: int) -> None:
+        self.hi, self.lo = np.zeros(size), np.zeros(size)
+        self.size, self.error = np.zeros(size), np.zeros(size)
+        self.terms = 0
+
+    def add(self, term: Vector) -> None:
+        self.hi, rounding = two_sum(self.hi, term)
+        self.lo += rounding
+        self.size += abs(term)
+        self.terms += 1
+
+    def enclosed(self) -> Enclosed:
+        value = self.hi + self.lo
+        error = U * abs(value) + gamma(self.terms) ** 2 * self.size + self.error
+        return Enclosed(value, 1.01 * error)
+
+
+def gamma(k: int) -> float:
+    """γ_k = ku/(1 − ku)."""
+    return k * U / (1 - k * U)
+
+
+def forces(assembly: Assembly, f: Vector, x: Double, lam: Double) -> Enclosed:
+    """r = f − Kx − Aλ with its error bound, N."""
+    total = Sum(assembly.n)
+    total.add(f)
+    _add_sparse(total, sp.csr_array(assembly.A), lam)
+    for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
+        _subtract_dense(total, rows, K, Double(x.hi[rows], x.lo[rows]))
+    return total.enclosed()
+
+
+def gaps(assembly: Assembly, g: Vector, x: Double) -> Enclosed:
+    """s = g − Aᵀx with its error bound, mm."""
+    total = Sum(assembly.m)
+    total.add(g)
+    _add_sparse(total, sp.csr_array(assembly.A.T), x)
+    return total.enclosed()
+
+
+def _add_sparse(total: Sum, A: sp.csr_array, v: Double) -> None:
+    """total −= Av, one entry of every row at a time."""
+    counts = np.diff(A.indptr)
+    for k in range(int(counts.max(initial=0))):
+        rows = np.flatnonzero(counts > k)
+        entry = A.indptr[rows] + k
+        for part in (v.hi, v.lo):
+            term, rounding = np.zeros((2, len(counts)))
+            term[rows], rounding[rows] = two_product(-A.data[entry], part[A.indices[entry]])
+            total.add(term)
+            total.add(rounding)
+
+
+def _subtract_dense(total: Sum, rows: slice, K: Matrix, x: Double) -> None:
+    """total[rows] −= Kx: the products of the slices of K and x.hi exactly, what is left in float64.
+
+    A slice of b bits each makes n products of 2b bits; their sum has at most 53 where
+    2(b − 1) + log₂ n ≤ 53, whatever the order in which it is added.
+    """
+    n = len(K)
+    bits = (53 - int(np.ceil(np.log2(max(n, 2))))) // 2 + 1
+    slices, rest = [], x.hi
+    top = exponent(np.max(abs(x.hi), initial=0.0))
+    for k in range(X_SLICES):
+        piece, rest = cut(rest, top - k * bits, bits)
+        slices.append(piece)
+    exact, inexact = np.column_stack(slices), np.column_stack([rest, x.lo])
+    left = float(abs(inexact).sum()) * (1 + 4 * n * U)
+    length = float(abs(x.hi).sum()) * (1 + 2 * n * U)
+    products, error = np.empty((K_SLICES * X_SLICES + 3, n)), np.empty(n)
+    for start in range(0, n, ROWS_AT_A_TIME):
+        chunk = slice(start, min(start + ROWS_AT_A_TIME, n))
+        remainder = K.T[chunk]  # K is symmetric and stored by columns, so these are contiguous rows
+        exponents = exponent(np.max(abs(remainder), axis=1, keepdims=True))
+        products[:2, chunk] = (remainder @ inexact).T
+        for k in range(K_SLICES):
+            piece, remainder = cut(remainder, exponents - k * bits, bits)
+            products[2 + k * X_SLICES : 2 + (k + 1) * X_SLICES, chunk] = (piece @ exact).T
+        products[-1, chunk] = remainder @ x.hi
+        error[chunk] = gamma(n) * np.exp2(exponents[:, 0]) * (left + 2.0 ** (-K_SLICES * bits) * length)
+    for product in products:
+        term = np.zeros(len(total.hi))
+        term[rows] = -product
+        total.add(term)
+    total.error[rows] += 1.01 * error
+
+
+def exponent(size: Matrix | float) -> Matrix:
+    """The least e with |size| < 2^e."""
+    return np.frexp(size)[1].astype(float)
+
+
+def cut(a: Matrix, top: Matrix | float, bits: int) -> tuple[Matrix, Matrix]:
+    """a = piece + rest exactly, piece in units of 2^(top − bits + 1), for |a| ≤ 2^top."""
+    sigma = 1.5 * np.exp2(top + 53 - bits)
+    piece = (a + sigma) - sigma
+    return piece, a - piece

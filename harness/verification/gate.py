@@ -1,0 +1,133 @@
+"""The accuracy gate: judges the saved answers anew, and says so by an exit code.
+
+The figures in the rows are not looked at. A row only says which answer belongs to which scene; the
+problem's data and the reference are made from the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from harness.planning.plan import expand
+from harness.planning.suite import validated
+from harness.results import records
+from harness.results.records import Row
+from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
+from harness.terminal.progress import STYLES
+from problems.errors import Fault, InputError
+from problems.scene import read_toml
+
+from .ground_truth import Ground, ground
+from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
+
+#: What the gate reads of a row: which answer belongs to which scene.
+NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", "limit_mm")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One gated measurement, judged anew; row is None where it was never made."""
+
+    key: str
+    judgement: Judgement
+    limit_mm: float
+    why: str = ""
+
+
+def gate(directory: Path, console: Console) -> int:
+    """Judge every gated row of DIRECTORY.
+
+    Returns 0 where all that the suite gates is within 1e-7 mm (on a rung of a ladder, what conditioning
+    allows), 1 where it is not (a row outside, without an answer, missing, or not to be judged), 3 where no
+    answer at all could be judged. Raises InputError.
+    """
+    if not directory.is_dir():
+        raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
+    rows = gated_rows(directory / records.MEASUREMENTS)
+    findings = [*judged(rows, directory), *never_made(rows, directory)]
+    console.print(table(findings))
+    verdicts = [finding.judgement.verdict for finding in findings]
+    fine = verdicts.count("within")
+    if not fine and "outside" not in verdicts:
+        console.print("Nothing could be judged: no gated row has an answer that can be.", style="red")
+        return NOTHING_JUDGED
+    if fine < len(findings):
+        console.print(f"Accuracy lost: {len(findings) - fine} of {len(findings)} gated rows.", style="red")
+        return FELL_SHORT
+    wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
+    limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
+    console.print(f"Passed: all {fine} gated rows are within {limits}.", style="green")
+    return DONE
+
+
+def gated_rows(path: Path) -> dict[str, Row]:
+    """The gated rows by their keys. Raises InputError where one does not say what it belongs to."""
+    rows = records.read(path)
+    faults = [
+        Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
+        for number, row in enumerate(rows, start=1)
+        for name in NEEDED
+        if name not in row
+    ]
+    if faults:
+        raise InputError(faults)
+    return {row["key"]: row for row in rows if row["gated"]}
+
+
+def judged(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
+    """The rows' answers, judged; scene by scene, so that each is opened once."""
+    base: Ground | None = None
+    source = None
+    for row in sorted(rows.values(), key=lambda row: str(row["source"])):
+        if base is None or row["source"] != source:
+            base, source = ground(row["source"]), row["source"]
+        yield judged_row(row, base.of_case(row.get("series"), row.get("case")), directory)
+
+
+def judged_row(row: Row, base: Ground, directory: Path) -> Finding:
+    limit = base.limit_mm(min(row["limit_mm"], LIMIT_MM))
+    bound = base.reference.bound_mm
+    if not row["answer"]:
+        why = f"{row['status']}: {row['message'] or 'no answer'}".splitlines()[0]
+        return Finding(row["key"], Judgement("no_answer", bound), limit, why)
+    if row["scene_key"] != base.scene.key:
+        why = "the scene has changed since it was measured: run again"
+        return Finding(row["key"], Judgement("cannot_be_judged", bound), limit, why)
+    judgement = base.judge_file(directory / row["answer"], limit)
+    match judgement.verdict:
+        case "no_answer":
+            why = f"{row['answer']} is missing, damaged or not finite"
+        case "cannot_be_judged":
+            why = f"the reference is known to {bound:.0e} mm only, not to {REFERENCE_SHARE * limit:.0e}"
+        case "outside":
+            why = f"{judgement.displacement_error_mm:.3e} mm from the reference"
+        case _:
+            why = ""
+    return Finding(row["key"], judgement, limit, why)
+
+
+def never_made(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
+    """What the suite that was run gates, and no row is there for."""
+    path = directory / "suite.toml"
+    if path.is_file():
+        for measurement in expand(validated(read_toml(path), path)):
+            if measurement.gated and measurement.key not in rows:
+                why = "never measured: the run did not end"
+                yield Finding(measurement.key, Judgement("no_answer"), measurement.limit_mm, why)
+
+
+def table(findings: list[Finding]) -> Table:
+    made = Table(
+        "measurement", "error mm", "limit mm", "verdict", "why", title="Gate: the answers judged anew"
+    )
+    for finding in findings:
+        error, verdict = finding.judgement.displacement_error_mm, finding.judgement.verdict
+        shown = "–" if error is None else f"{error:.1e}"
+        limit = f"{finding.limit_mm:.0e}"
+        made.add_row(finding.key, shown, limit, verdict, finding.why, style=STYLES[verdict])
+    return made

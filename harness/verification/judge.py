@@ -1,0 +1,110 @@
+"""Judges an answer from the problem's own data and the reference.
+
+With x, λ the answer, x* the reference and y = g − Aᵀx the gaps that are left:
+
+    displacement_error_mm = max|x − x*|
+    backward_error        = max(‖Kx − f + Aλ‖ / F, max|min(λ‖A‖ / F, y / G)|)     max-norms
+    min_gap_mm            = min y
+    primal_residual       = max(0, max(Aᵀx − g))                          mm
+    dual_residual         = max(max|Kx − f + Aλ|, max(0, −λ))             N
+    duality_gap           = |xᵀKx − fᵀx + gᵀλ|                            N·mm
+    contact_mismatch      = closed in x* and y > limit, or open in x* and y ≤ limit
+
+The backward error is what is left of the optimality conditions (equilibrium; λ ≥ 0, y ≥ 0, λᵀy = 0) as a
+share of the terms in them, F = ‖K‖‖x‖ + ‖f‖ + ‖A‖‖λ‖ and G = ‖Aᵀ‖‖x‖ + ‖g‖: a stable algorithm reaches
+some 2⁻⁵³, however ill-conditioned K is. The duality gap is the primal objective ½xᵀKx − fᵀx minus the
+dual one −½xᵀKx − gᵀλ. A contact counts as open in x* when its gap there is above 2·limit: closer than
+that, an answer within the limit may have it either way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from problems.forms.assembly import LoadCase, Prepared, Vector
+
+from .reference import Reference
+
+Verdict = Literal["within", "outside", "cannot_be_judged", "no_answer"]
+
+#: The accuracy asked for, max-norm of the displacement difference, mm.
+LIMIT_MM = 1e-7
+
+#: A reference may use up to this share of the limit for its own error.
+REFERENCE_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The judge's part of a row; None where a figure does not apply."""
+
+    verdict: Verdict
+    reference_bound_mm: float | None = None
+    displacement_error_mm: float | None = None
+    contact_mismatch: int | None = None
+    min_gap_mm: float | None = None
+    primal_residual: float | None = None
+    dual_residual: float | None = None
+    duality_gap: float | None = None
+    backward_error: float | None = None
+
+
+def conditioned_limit(limit_mm: float, cond_K: float, largest_mm: float) -> float:
+    """max(limit, 100 cond(K) 2⁻⁵³ max|x*|): what can be asked of a solver that works in float64."""
+    return max(limit_mm, 100 * cond_K * 2.0**-53 * largest_mm)
+
+
+def judge(
+    prepared: Prepared, load: LoadCase, reference: Reference, x: Vector, lam: Vector, limit_mm: float
+) -> Judgement:
+    """Judge x (n,) in mm and lam (m,) in N; lam all NaN where the solver gives no forces.
+
+    The verdict is `within` when max|x − x*| ≤ limit_mm, and `cannot_be_judged` when the error bound
+    of x* is above a tenth of the limit.
+    """
+    A = prepared.assembly.A
+    if x.shape != (A.shape[0],) or not np.isfinite(x).all():
+        return Judgement("no_answer", reference.bound_mm)
+    error = float(np.max(np.abs(x - reference.x) * reference.unit_mm))
+    y = load.g - A.T @ x
+    gap, reference_gap = y * reference.gap_unit_mm, (load.g - A.T @ reference.x) * reference.gap_unit_mm
+    kept_open = reference.active & (gap > limit_mm)
+    kept_closed = ~reference.active & (reference_gap > 2 * limit_mm) & (gap <= limit_mm)
+    dual_residual = duality_gap = backward_error = None
+    if lam.shape == (A.shape[1],) and np.isfinite(lam).all():
+        Kx = prepared.assembly.multiply_K(x)
+        force = Kx - load.f + A @ lam
+        dual_residual = float(max(np.max(np.abs(force)), np.max(-lam, initial=0.0)))
+        backward_error = _backward_error(prepared, load, x, lam, force, y)
+        duality_gap = float(abs(x @ Kx - load.f @ x + load.g @ lam))
+    if not reference.bound_mm <= REFERENCE_SHARE * limit_mm:
+        verdict: Verdict = "cannot_be_judged"
+    else:
+        verdict = "within" if error <= limit_mm else "outside"
+    return Judgement(
+        verdict=verdict,
+        reference_bound_mm=reference.bound_mm,
+        displacement_error_mm=error,
+        contact_mismatch=int(np.sum(kept_open | kept_closed)),
+        min_gap_mm=float(np.min(gap, initial=np.inf)),
+        primal_residual=float(np.max(-gap, initial=0.0)),
+        dual_residual=dual_residual,
+        duality_gap=duality_gap,
+        backward_error=backward_error,
+    )
+
+
+def _backward_error(
+    prepared: Prepared, load: LoadCase, x: Vector, lam: Vector, force: Vector, y: Vector
+) -> float:
+    A = prepared.assembly.A
+    K_norm = max(float(np.abs(K).sum(axis=1).max()) for K in prepared.assembly.blocks)
+    A_norm, At_norm = (float(abs(A).sum(axis=axis).max()) for axis in (1, 0))
+    x_size = float(np.abs(x).max())
+    F = K_norm * x_size + float(np.abs(load.f).max()) + A_norm * float(np.abs(lam).max())
+    G = At_norm * x_size + float(np.abs(load.g).max())
+    complementarity = np.minimum(lam * A_norm / (F or 1.0), y / (G or 1.0))
+    return float(max(np.abs(force).max() / (F or 1.0), np.abs(complementarity).max()))

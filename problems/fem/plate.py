@@ -1,0 +1,89 @@
+"""A rectangular Kirchhoff plate of Bogner–Fox–Schmit elements on a tensor grid.
+
+Four degrees of freedom a node: w, w_x, w_y, w_xy. The shape functions are products of cubic
+Hermite functions, so the stiffness is a sum of Kronecker products of one-dimensional matrices:
+
+    K = D [My⊗Hx + Hy⊗Mx + ν (By⊗Bxᵀ + Byᵀ⊗Bx) + 2(1−ν) Gy⊗Gx],   D = E t³ / (12 (1 − ν²))
+
+Source: Bogner, Fox, Schmit, Proc. Conf. Matrix Methods in Struct. Mech., 1965.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.forms.assembly import Vector
+
+from .hermite import evaluate, line_matrices
+
+
+@dataclass(frozen=True)
+class Plate:
+    """Grid and material of one part.
+
+    x : (nx,) and y : (ny,) grid lines in mm, ascending. thickness in mm, young in N/mm².
+    Degree of freedom (iy, b, ix, a) has the index ((2 iy + b) nx + ix) 2 + a, where a and b count
+    the derivatives along x and y: the lines y = const are contiguous.
+    """
+
+    x: Vector
+    y: Vector
+    thickness: float
+    young: float
+    poisson: float
+
+    @property
+    def size(self) -> int:
+        return 4 * len(self.x) * len(self.y)
+
+    @property
+    def rigidity(self) -> float:
+        """D = E t³ / (12 (1 − ν²)), N·mm."""
+        return self.young * self.thickness**3 / (12 * (1 - self.poisson**2))
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / 2(1 + ν), N/mm²."""
+        return self.young / (2 * (1 + self.poisson))
+
+    def stiffness(self) -> sp.csr_array:
+        """(size, size), N/mm and N: the bending stiffness of the free plate."""
+        X, Y = line_matrices(self.x), line_matrices(self.y)
+        nu = self.poisson
+        return (
+            self.rigidity
+            * (
+                sp.kron(Y.M, X.H)
+                + sp.kron(Y.H, X.M)
+                + nu * (sp.kron(Y.B, X.B.T) + sp.kron(Y.B.T, X.B))
+                + 2 * (1 - nu) * sp.kron(Y.G, X.G)
+            ).tocsr()
+        )
+
+    def evaluate(self, x: float, y: float, dx: int = 0, dy: int = 0) -> sp.csr_array:
+        """Row (1, size) that reads the deflection, or a derivative of it, at a point."""
+        return sp.kron(evaluate(self.y, y, dy), evaluate(self.x, x, dx)).tocsr()
+
+    def beam_along_y(self, x: float, EI: float, GJ: float, start: float, stop: float) -> sp.csr_array:
+        """Stiffness of a beam at x between y = start and stop: EI ∫w_yy² + GJ ∫w_xy², N·mm²."""
+        line = line_matrices(self.y, start, stop)
+        e, slope = evaluate(self.x, x), evaluate(self.x, x, 1)
+        return (EI * sp.kron(line.H, e.T @ e) + GJ * sp.kron(line.G, slope.T @ slope)).tocsr()
+
+    def beam_along_x(self, y: float, EI: float, GJ: float) -> sp.csr_array:
+        """Stiffness of a beam at y over the whole length: EI ∫w_xx² + GJ ∫w_xy², N·mm²."""
+        line = line_matrices(self.x)
+        e, slope = evaluate(self.y, y), evaluate(self.y, y, 1)
+        return (EI * sp.kron(e.T @ e, line.H) + GJ * sp.kron(slope.T @ slope, line.G)).tocsr()
+
+    def line_dofs(self, line: int) -> np.ndarray:
+        """The 4 nx degrees of freedom on the grid line y[line]."""
+        width = 4 * len(self.x)
+        return np.arange(line * width, (line + 1) * width)
+
+    def deflection_dofs(self, line: int) -> np.ndarray:
+        """The nx deflections on the grid line y[line], by ascending x."""
+        return 4 * len(self.x) * line + 2 * np.arange(len(self.x))

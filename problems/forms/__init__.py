@@ -1,0 +1,1 @@
+"""The quadratic programs: what load cases share, and one file per form."""

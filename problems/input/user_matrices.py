@@ -1,0 +1,111 @@
+"""A user's own K, A, f, g: from one .npz, or from Matrix Market files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from problems.errors import Fault, InputError
+from problems.forms.assembly import Assembly, LoadCase, Matrix
+
+SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| that is taken for rounding
+
+
+def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
+    """Read and check K, A, f, g.
+
+    files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
+        nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
+    K is split into its diagonal blocks. Raises InputError with everything that is wrong.
+    """
+    where = {key: str(path) for key, path in files.items()}
+    if "problem" in files:
+        data = _read_npz(files["problem"])
+        where = {key: str(files["problem"]) for key in (*"KAfg", "nodes")}
+    else:
+        data = {key: _read_mtx(path, key) for key, path in files.items()}
+    faults = [Fault(where.get(key, "matrices"), key, None, "is missing") for key in "KAfg" if key not in data]
+    if faults:
+        raise InputError(faults)
+    for key, values in data.items():
+        if values.dtype.kind not in "fiub" or (key in "KA" and values.ndim != 2):
+            found = f"{values.dtype} array of shape {values.shape}"
+            faults.append(Fault(where.get(key, "matrices"), key, found, "real numbers; K and A matrices"))
+    if faults:
+        raise InputError(faults)
+    K, A = (sp.csr_array(data[key], dtype=float) for key in "KA")
+    f, g = (np.asarray(data[key], dtype=float).ravel() for key in "fg")
+    nodes = np.asarray(data["nodes"], dtype=float) if "nodes" in data else None
+
+    n, m = K.shape[0], A.shape[1]
+    shapes = {"K": (K.shape, (n, n)), "A": (A.shape, (n, m)), "f": (f.shape, (n,)), "g": (g.shape, (m,))}
+    if nodes is not None:
+        shapes["nodes"] = (nodes.shape, (n, 2))
+    for key, (found, wanted) in shapes.items():
+        if found != wanted:
+            faults.append(Fault(where[key], f"{key}.shape", found, f"must be {wanted}"))
+    for key, values in {"K": K.data, "A": A.data, "f": f, "g": g}.items():
+        if not np.isfinite(values).all():
+            faults.append(Fault(where[key], key, "NaN or infinity", "every entry must be finite"))
+    if faults:
+        raise InputError(faults)
+    untouched = np.flatnonzero(abs(A).sum(axis=0) == 0)
+    if untouched.size:
+        raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must touch an unknown")
+    asymmetry = abs(K - K.T).max() / max(abs(K).max(), np.finfo(float).tiny)
+    if asymmetry > SYMMETRY:
+        raise InputError.one(where["K"], "max|K − Kᵀ| / max|K|", float(asymmetry), f"must be ≤ {SYMMETRY:g}")
+    return _blocks((K + K.T) / 2, A, f, g, nodes)
+
+
+def _blocks(
+    K: sp.csr_array, A: sp.csr_array, f: Matrix, g: Matrix, nodes: Matrix | None
+) -> tuple[Assembly, LoadCase]:
+    """Split K into diagonal blocks; unknowns of one block must stand together in x."""
+    count, label = connected_components(K, directed=False)
+    starts = np.flatnonzero(np.diff(label, prepend=-1))
+    if len(starts) != count:  # interleaved blocks: one dense block is always right
+        starts = np.array([0])
+    ends = np.append(starts[1:], K.shape[0])
+    blocks = tuple(K[a:b, a:b].toarray(order="F") for a, b in zip(starts, ends, strict=True))
+    names = tuple(f"part {k + 1}" for k in range(len(blocks)))
+    return Assembly(blocks, sp.csc_array(A), nodes, names), LoadCase(f, g)
+
+
+def _read_npz(path: Path) -> dict[str, Any]:
+    try:
+        with np.load(path) as archive:
+            return {key: archive[key] for key in (*"KAfg", "nodes") if key in archive.files}
+    except (OSError, ValueError, EOFError, KeyError) as error:
+        raise InputError.one(path, "file", str(error), "a readable .npz with K, A, f, g") from error
+    except Exception as error:  # zipfile and pickle raise their own kinds
+        raise InputError.one(path, "file", repr(error), "a readable .npz with K, A, f, g") from error
+
+
+def _read_mtx(path: Path, key: str) -> Any:
+    try:
+        found = read_mtx(path)
+        return found.toarray() if sp.issparse(found) and key in "fg" else found
+    except (OSError, ValueError) as error:
+        raise InputError.one(path, key, str(error), "a readable Matrix Market file") from error
+
+
+def read_mtx(path: Path) -> Any:
+    """A Matrix Market file, array or sparse.
+
+    Raises ValueError if entries are missing. mmread takes these for zeros or dies of them, as it does of an
+    array without entries.
+    """
+    rows, columns, entries, form, _, symmetry = scipy.io.mminfo(path)
+    if form == "array":
+        entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
+    with path.open("rb") as file:
+        found = sum(1 for line in file if line.strip() and not line.startswith(b"%")) - 1  # the sizes
+    if found < entries:
+        raise ValueError(f"truncated: {found} of {entries} entries")
+    return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))

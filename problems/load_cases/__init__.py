@@ -1,0 +1,1 @@
+"""Many load cases on one assembly: random gaps, measured gaps, sweeps."""

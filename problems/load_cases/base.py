@@ -1,0 +1,31 @@
+"""The load cases of a series: many f and g on one assembly, each made when it is asked for."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from problems.forms.assembly import LoadCase, Prepared
+
+
+class LoadCases(ABC):
+    """Cases 0 … count − 1. Case k depends on k alone: not on `count`, nor on the cases made before it."""
+
+    count: int
+
+    @property
+    @abstractmethod
+    def key(self) -> str:
+        """Hash of everything that determines case k, whatever the count."""
+
+    @abstractmethod
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
+        """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
+
+    def only(self, numbers: Sequence[int]) -> LoadCases:
+        """What is needed of it for these cases, to send it elsewhere. Their numbers stay."""
+        return self
+
+    def parameters(self, k: int) -> dict[str, float | str]:
+        """What sets case k apart, for its row."""
+        return {}

@@ -1,0 +1,115 @@
+"""Load cases with measured gaps: a table of a row a case and a column a contact, in mm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from problems.errors import Fault, InputError
+from problems.forms.assembly import LoadCase, Matrix, Prepared, Vector
+from problems.model.effect import GapEffect
+from problems.prepare import load_case
+from problems.scene import Scene
+from problems.storage.cache import digest
+
+from .base import LoadCases
+
+ALLOWED = "every gap must be a finite number, in mm"
+FAULTS = 10  # named; the rest is counted
+ROWS_AT_A_TIME = 256
+
+
+@dataclass(frozen=True)
+class MeasuredGaps(LoadCases):
+    """Case k is the scene with a row of the table in place of its gaps.
+
+    gaps : (rows, m) mm. numbers : the cases that the rows are, where they are not 0, 1, 2, …
+    """
+
+    forces: LoadCase
+    gaps: Matrix
+    count: int
+    numbers: tuple[int, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Of the width alone: a table may grow while it is being solved, and each case has its own hash."""
+        return digest("table", self.gaps.shape[1])
+
+    def parameters(self, k: int) -> dict[str, float | str]:
+        """The hash of its gaps, by which a row that has changed since is found."""
+        return {"gaps": digest(np.ascontiguousarray(self._row(k)).tobytes())}
+
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
+        return LoadCase(self.forces.f, np.array(self._row(k)))
+
+    def only(self, numbers: Sequence[int]) -> MeasuredGaps:
+        """Without the other rows."""
+        return replace(self, gaps=np.array([self._row(k) for k in numbers]), numbers=tuple(numbers))
+
+    def _row(self, k: int) -> Vector:
+        return self.gaps[self.numbers.index(k) if self.numbers else k]
+
+
+def measured_gaps(scene: Scene, prepared: Prepared, path: Path, count: int | None = None) -> MeasuredGaps:
+    """The first `count` rows, or all, of a .csv (numbers; # begins a comment), .npz or .npy.
+
+    Of an .npz the array `gaps` is taken, or the only one; an .npy is memory-mapped, the others are read
+    whole. Raises InputError that names the cases that cannot be used.
+    """
+    gaps = _read(path)
+    m = prepared.assembly.m
+    if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
+        raise InputError.one(path, "shape", gaps.shape, f"a row a case and a column for each of {m} contacts")
+    if count is not None and count > len(gaps):
+        raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
+    faults = list(_faults(path, gaps))
+    if faults:
+        more = len(faults) - FAULTS
+        rest = [Fault(str(path), "cases", f"{more} more", ALLOWED)] if more > 0 else []
+        raise InputError(faults[:FAULTS] + rest)
+    if scene.joint is None:
+        forces = load_case(scene, prepared)
+    else:
+        forces_only = tuple(e for e in scene.effects if not isinstance(e, GapEffect))
+        forces = load_case(replace(scene, effects=forces_only), prepared)
+    return MeasuredGaps(forces, gaps, len(gaps) if count is None else count)
+
+
+def _faults(path: Path, gaps: Matrix) -> Iterator[Fault]:
+    for start in range(0, len(gaps), ROWS_AT_A_TIME):
+        wrong = ~np.isfinite(gaps[start : start + ROWS_AT_A_TIME])
+        for row in np.flatnonzero(wrong.any(axis=1)):
+            contacts = np.flatnonzero(wrong[row])
+            others = f" and {len(contacts) - 1} more" if len(contacts) > 1 else ""
+            value = float(gaps[start + row, contacts[0]])
+            yield Fault(str(path), f"case {start + row}, contact {contacts[0]}{others}", value, ALLOWED)
+
+
+def _read(path: Path) -> Matrix:
+    try:
+        match path.suffix:
+            case ".csv":
+                # What is no number becomes NaN, as what is missing is, and is named with its case.
+                table = pd.read_csv(path, header=None, comment="#", low_memory=False)
+                return table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+            case ".npy":
+                return _real(np.load(path, mmap_mode="r"))
+            case ".npz":
+                with np.load(path) as archive:
+                    (name,) = ["gaps"] if "gaps" in archive.files else archive.files
+                    return _real(archive[name])
+    except Exception as error:  # pandas, numpy and zipfile raise kinds of their own
+        said = f"{type(error).__name__}: {error}"
+        raise InputError.one(path, "file", said, "a readable table of numbers") from error
+    raise InputError.one(path, "file", path.suffix, "a .csv, .npz or .npy")
+
+
+def _real(array: Matrix) -> Matrix:
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"an array of {array.dtype}")
+    return array

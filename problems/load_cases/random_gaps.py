@@ -1,0 +1,97 @@
+"""Load cases that differ in a random initial gap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from problems.effects.initial_gap import InitialGap
+from problems.errors import Fault, InputError
+from problems.forms.assembly import LoadCase, Prepared
+from problems.input.validation import validation_faults
+from problems.model.joint import Joint
+from problems.prepare import load_case
+from problems.scene import Scene
+from problems.storage.cache import digest
+
+from .base import LoadCases
+
+#: The bits of a case's seed: so many are exact in every reader of JSON.
+SEED_BITS = 53
+
+
+@dataclass(frozen=True)
+class RandomGaps(LoadCases):
+    """Case k is the scene with its `initial_gap` drawn anew, with a seed made of (seed, k).
+
+    rest : the scene's forces and its other gaps. field : the `initial_gap`.
+    """
+
+    joint: Joint
+    rest: LoadCase
+    field: InitialGap
+    seed: int
+    count: int
+
+    @property
+    def key(self) -> str:
+        return digest(self.field.model_dump(mode="json"), self.seed)
+
+    def parameters(self, k: int) -> dict[str, Any]:
+        """The seed which, written into the scene's `random`, gives this case."""
+        state = np.random.SeedSequence((self.seed, k)).generate_state(1, np.uint64)[0]
+        return {"gap_seed": int(state) >> (64 - SEED_BITS)}
+
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
+        assert self.field.random is not None
+        drawn = self.field.random.model_copy(update={"seed": self.parameters(k)["gap_seed"]})
+        gap = self.field.model_copy(update={"random": drawn}).gap(self.joint)
+        return LoadCase(self.rest.f, self.rest.g + gap)
+
+
+def random_gaps(
+    scene: Scene,
+    prepared: Prepared,
+    cases: int,
+    seed: int,
+    mean: float | None = None,
+    sd: float | None = None,
+    correlation_length: float | None = None,
+) -> RandomGaps:
+    """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) go before what it says.
+
+    Raises InputError where neither says them, or the scene has no joint or more than one `initial_gap`.
+    """
+    where = f"scene {scene.name}"
+    if scene.joint is None:
+        allowed = "a random field needs a joint; own matrices take a table of gaps (--gaps)"
+        raise InputError.one(where, "assembly", "own matrices", allowed)
+    found = [effect for effect in scene.effects if isinstance(effect, InitialGap)]
+    if len(found) > 1:
+        raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
+    own = found[0].random if found else None
+    said = {
+        "mean": found[0].mean if found else None,
+        "sd": own.sd if own else None,
+        "correlation_length": own.correlation_length if own else None,
+    }
+    asked = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
+    given = said | {key: value for key, value in asked.items() if value is not None}
+    missing = [
+        Fault(where, key, None, f"is not in the scene: give --{key.replace('_', '-')}, in mm")
+        for key, value in given.items()
+        if value is None
+    ]
+    if missing:
+        raise InputError(missing)
+    random = {"sd": given["sd"], "correlation_length": given["correlation_length"], "seed": 0}
+    table = (found[0].model_dump() if found else {"kind": "initial_gap"}) | {"mean": given["mean"]}
+    try:
+        field = InitialGap.model_validate(table | {"random": random})
+    except ValidationError as error:
+        raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
+    others = replace(scene, effects=tuple(effect for effect in scene.effects if effect not in found))
+    return RandomGaps(scene.joint, load_case(others, prepared), field, seed, cases)

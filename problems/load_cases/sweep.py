@@ -1,0 +1,146 @@
+"""Load cases that step through values of a scene's keys: initial_gap.mean=0.1:1.0:10."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from problems.errors import Fault, InputError
+from problems.forms.assembly import LoadCase, Prepared
+from problems.input.validation import validation_faults
+from problems.model.effect import TieEffect
+from problems.prepare import load_case
+from problems.scene import Scene
+from problems.storage.cache import digest
+
+from .base import LoadCases
+
+FORM = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One --sweep: the key as it was written, the effect and the keys in it, the values."""
+
+    name: str
+    effect: int
+    keys: tuple[str, ...]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Sweep(LoadCases):
+    """All combinations of the steps' values, the last one running fastest."""
+
+    scene: Scene
+    steps: tuple[Step, ...]
+    count: int
+
+    @property
+    def key(self) -> str:
+        return digest([[step.name, step.values] for step in self.steps])
+
+    def parameters(self, k: int) -> dict[str, Any]:
+        places = np.unravel_index(k, [len(step.values) for step in self.steps])
+        return {step.name: step.values[i] for step, i in zip(self.steps, places, strict=True)}
+
+    def load(self, k: int, prepared: Prepared) -> LoadCase:
+        effects = list(self.scene.effects)
+        for step, value in zip(self.steps, self.parameters(k).values(), strict=True):
+            effects[step.effect] = _changed(effects[step.effect], step, value)
+        return load_case(replace(self.scene, effects=tuple(effects)), prepared)
+
+
+def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
+    """The cases of some --sweep options. Raises InputError with everything that is wrong."""
+    faults: list[Fault] = []
+    steps = tuple(step for text in texts if (step := _step(scene, text, faults)))
+    for step in steps:
+        for value in step.values:
+            try:
+                effect = _changed(scene.effects[step.effect], step, value)
+            except ValidationError as error:
+                effect, name = scene.effects[step.effect], effect_name(scene, step.effect)
+                faults += validation_faults(f"--sweep {step.name}", type(effect), error, name, effect.units)
+                continue
+            assert scene.joint is not None
+            faults += [Fault(f"--sweep {step.name}", *fault) for fault in effect.faults(scene.joint)]
+    names = [step.name for step in steps]
+    faults += [
+        Fault("--sweep", name, names, "is swept twice") for name in set(names) if names.count(name) > 1
+    ]
+    if faults:
+        raise InputError(faults)
+    return Sweep(scene, steps, int(np.prod([len(step.values) for step in steps])))
+
+
+def effect_name(scene: Scene, index: int) -> str:
+    """initial_gap, or pressure.0 and pressure.1 where there are several."""
+    kind = scene.effects[index].kind
+    alike = [i for i, effect in enumerate(scene.effects) if effect.kind == kind]
+    return kind if len(alike) == 1 else f"{kind}.{alike.index(index)}"
+
+
+def _makes_K(scene: Scene, index: int) -> bool:
+    """Whether K or A depends on an effect."""
+    if isinstance(scene.effects[index], TieEffect):
+        return True
+    others = tuple(effect for i, effect in enumerate(scene.effects) if i != index)
+    return replace(scene, effects=others).assembly_key != scene.assembly_key
+
+
+def _step(scene: Scene, text: str, faults: list[Fault]) -> Step | None:
+    name, equals, values = text.partition("=")
+    numbers = _values(values)
+    if not equals or not numbers:
+        faults.append(Fault("--sweep", "sweep", text, FORM))
+        return None
+    effects = {effect_name(scene, i): i for i in range(len(scene.effects)) if not _makes_K(scene, i)}
+    keys = {
+        f"{prefix}.{'.'.join(path)}": Step(name, i, path, numbers)
+        for prefix, i in effects.items()
+        for path in _numbers(scene.effects[i].model_dump())
+    }
+    if name not in keys:
+        allowed = f"one of {', '.join(keys)}" if keys else "the scene has no force or gap to sweep"
+        faults.append(Fault("--sweep", "key", name, f"{allowed}; what changes K would be another assembly"))
+    return keys.get(name)
+
+
+def _numbers(table: dict[str, Any]) -> list[tuple[str, ...]]:
+    """The paths of the numbers in an effect's table."""
+    found: list[tuple[str, ...]] = []
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found += [(key, *path) for path in _numbers(value)]
+        elif isinstance(value, int | float):
+            found.append((key,))
+    return found
+
+
+def _values(text: str) -> tuple[float, ...]:
+    """The values of 0.1:1.0:10 or of 0.1,0.5,1; none where it is neither."""
+    try:
+        if ":" in text:
+            first, last, count = text.split(":")
+            values = np.linspace(float(first), float(last), int(count)).tolist()
+        else:
+            values = [float(value) for value in text.split(",")]
+    except ValueError:
+        return ()
+    return tuple(values) if np.isfinite(values).all() else ()
+
+
+def _changed(effect: Any, step: Step, value: float) -> Any:
+    """The effect with one number changed, checked as when it is read."""
+    table = copy.deepcopy(effect.model_dump())
+    inner = table
+    for key in step.keys[:-1]:
+        inner = inner[key]
+    inner[step.keys[-1]] = value
+    return type(effect).model_validate(table)

@@ -1,0 +1,201 @@
+"""What an effect is: its parameters, and the one term that it adds.
+
+An effect `kind = "some_effect"` in a scene is the class SomeEffect of problems/effects/some_effect.py.
+Its module is imported only when a scene names it.
+
+    StiffnessEffect   to the stiffness of one part, before condensation
+    ForceEffect       forces on the junction nodes
+    PartLoadEffect    a load anywhere on one part, condensed onto its junction nodes
+    GapEffect         to the initial gap; it may bring the contact that it is about
+    TieEffect         springs between the junction nodes of two parts, and the forces they were set with
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+from pydantic import Field
+
+from problems.fem.plate import Plate
+from problems.forms.assembly import Matrix, Vector
+
+from .joint import TOOL, Joint, Table
+
+Pair = tuple[str, str]
+Range = tuple[float, float]
+
+#: A contact, or None for all. None stays out of a scene's key: it is as if the parameter did not exist.
+Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
+
+#: What somebody may look for, and why the model has no place for it.
+EXCLUDED = {
+    "friction": "assumption 4: friction between the parts is neglected",
+    "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
+    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
+    "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
+    "large_rotation": "assumption 5: linear elasticity, so displacements and rotations are small",
+    "plasticity": "assumption 5: linear elasticity",
+    "creep": "assumption 5: linear elasticity",
+    "dynamics": "the answer is the minimum of a static energy, without inertia or time",
+    "vibration": "the answer is the minimum of a static energy, without inertia or time",
+    "impact": "the answer is the minimum of a static energy, without inertia or time",
+}
+
+
+class Effect(Table):
+    """Parameters of an effect, in mm and N."""
+
+    units: ClassVar[dict[str, str]] = {}
+
+    kind: str
+
+    @property
+    def contacts(self) -> tuple[Pair, ...]:
+        """Pairs that are in contact because of this effect."""
+        return ()
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        """(key, value, what is allowed) of whatever does not fit the joint."""
+        yield from ()
+
+    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+        """The same of whatever contradicts the scene's other effects."""
+        yield from ()
+
+
+class StiffnessEffect(Effect):
+    """Adds a term to the stiffness of one part, before condensation."""
+
+    part: str
+
+    @property
+    def held_points(self) -> tuple[tuple[float, float], ...]:
+        """Where the effect keeps the part from floating away."""
+        return ()
+
+    @property
+    def pad(self) -> tuple[float, Range, Range] | None:
+        """Thickness, range of x and range of y, in mm, of an area that the effect makes as thick as that."""
+        return None
+
+    @abstractmethod
+    def stiffness(self, plate: Plate) -> sp.csr_array:
+        """(plate.size, plate.size) term in N/mm, coupling only neighbouring grid lines y = const."""
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_part(self.part, joint)
+
+
+class ForceEffect(Effect):
+    """Adds nodal forces in the junction."""
+
+    @abstractmethod
+    def force(self, joint: Joint) -> Vector:
+        """(n,) forces in N, positive from the first part of a pair towards the second."""
+
+    def marks(self, joint: Joint) -> Matrix:
+        """(k, 2) points in mm that a picture of the junction should mark."""
+        return np.zeros((0, 2))
+
+
+class GapEffect(Effect):
+    """Adds to the initial gap."""
+
+    @abstractmethod
+    def gap(self, joint: Joint) -> Vector:
+        """(m,) gap in mm."""
+
+
+class TieEffect(ForceEffect):
+    """Adds springs between parts at junction nodes: K += T diag(k) Tᵀ, after condensation."""
+
+    @abstractmethod
+    def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
+        """T (n, r) with a spring's direction in each column, and k (r,) in N/mm."""
+
+
+@dataclass(frozen=True)
+class PartModel:
+    """A part's plate and what stiffens and holds it."""
+
+    plate: Plate
+    effects: tuple[StiffnessEffect, ...]
+
+    def areas(self) -> Iterator[tuple[float, float, Range, Range]]:
+        """(sign, thickness, range of x, range of y) whose sum is the part with its pads."""
+        x, y = ((float(grid[0]), float(grid[-1])) for grid in (self.plate.x, self.plate.y))
+        yield 1.0, self.plate.thickness, x, y
+        for effect in self.effects:
+            if effect.pad:
+                thickness, x, y = effect.pad
+                yield 1.0, thickness, x, y
+                yield -1.0, self.plate.thickness, x, y
+
+
+class PartLoadEffect(Effect):
+    """Adds a load on one part, in the junction or beyond it."""
+
+    part: str
+
+    @abstractmethod
+    def load(self, model: PartModel) -> Vector:
+        """(plate.size,) work of the load on each degree of freedom: N, N·mm, N·mm²."""
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from unknown_part(self.part, joint)
+
+
+def pairs_of(between: Pair | None, joint: Joint) -> tuple[Pair, ...]:
+    """The contacts that an effect acts on."""
+    return joint.pairs if between is None else (between,)
+
+
+def contacts_of(pair: Pair, joint: Joint) -> slice:
+    """Where the contacts of a pair stand in g and λ."""
+    start = joint.pairs.index(pair) * joint.node_count
+    return slice(start, start + joint.node_count)
+
+
+def pressed(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
+    """f (n,) of forces (node_count,) in N that press the two parts of each contact together."""
+    f = np.zeros(joint.size[0])
+    for first, second in pairs_of(between, joint):
+        f[joint.unknowns(first)] += nodal
+        if second != TOOL:
+            f[joint.unknowns(second)] -= nodal
+    return f
+
+
+def unknown_pair(between: Pair | None, joint: Joint) -> Iterator[tuple[str, object, str]]:
+    """What is wrong with the contact of an effect that acts on contacts."""
+    if not joint.pairs:
+        only = joint.part[0].name
+        allowed = f'needs a contact, and part {only} is alone: add a part, a rigid_tool or "tool" in contacts'
+        yield "between", between, allowed
+    elif between is not None and between not in joint.pairs:
+        yield "between", list(between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
+
+
+def unknown_part(part: str, joint: Joint) -> Iterator[tuple[str, object, str]]:
+    names = [p.name for p in joint.part]
+    if part not in names:
+        yield "part", part, f"one of {names}"
+
+
+def effect_kinds() -> list[str]:
+    """The kinds there are: the files of problems/effects."""
+    package = importlib.import_module("problems.effects")
+    return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+
+
+def effect_class(kind: str) -> type[Effect]:
+    """The class of a kind, imported now. Raises ModuleNotFoundError if there is no such kind."""
+    module = importlib.import_module(f"problems.effects.{kind}")
+    return getattr(module, kind.title().replace("_", ""))

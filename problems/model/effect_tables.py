@@ -1,0 +1,87 @@
+"""The tables [[effect]] of a scene, each read into its effect, and everything that is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from problems.errors import Fault
+from problems.input.validation import UNITS, unknown, validation_faults
+
+from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
+from .joint import Joint
+
+if TYPE_CHECKING:
+    from problems.input.csv_table import Rows  # imported by the effects that read a file
+
+
+@dataclass
+class EffectTable:
+    """A table, where it stands, its effect (None if it is none), and the rows of the files that it names.
+
+    A file with bad rows leaves an effect of the good ones: these and the other parameters are checked.
+    """
+
+    where: Path
+    index: int
+    content: dict[str, Any]
+    effect: Effect | None = None
+    files: list[Rows] = field(default_factory=list)
+
+    def read(self) -> Iterator[Fault]:
+        """Make the effect; what is wrong with the table by itself."""
+        kind = self.content.get("kind")
+        if kind not in effect_kinds():
+            allowed = unknown("effect", kind, effect_kinds())
+            for excluded in get_close_matches(str(kind).lower(), EXCLUDED, 1, 0.75):
+                allowed = f"the model excludes {excluded} ({EXCLUDED[excluded]}); {allowed}"
+            yield Fault(str(self.where), f"effect[{self.index}].kind", kind, allowed)
+            return
+        effect = effect_class(kind)
+        try:
+            context = {"folder": self.where.parent, "files": self.files}
+            self.effect = effect.model_validate(self.content, context=context)
+        except ValidationError as error:
+            units = UNITS | effect.units
+            for fault in validation_faults(self.where, effect, error, self._name, units):
+                if not self._follows(fault.key.removeprefix(self._name).lstrip(".")):
+                    yield fault
+        for rows in self.files:
+            yield from rows.faults
+
+    def misfits(self, joint: Joint) -> Iterator[Fault]:
+        """What does not fit the joint."""
+        found: Iterator[tuple[str, object, str]] = iter(())
+        if self.effect is not None:
+            found = self.effect.faults(joint)
+        elif isinstance(part := self.content.get("part"), str):
+            found = unknown_part(part, joint)
+        yield from self._faults(found)
+
+    def conflicts(self, others: Sequence[EffectTable], joint: Joint) -> Iterator[Fault]:
+        """What contradicts the other effects."""
+        if self.effect is not None:
+            effects = [other.effect for other in others if other.effect is not None]
+            yield from self._faults(self.effect.conflicts(effects, joint))
+
+    @property
+    def _name(self) -> str:
+        kind = self.content.get("kind")
+        return f"effect[{self.index}]" + (f" ({kind})" if kind else "")
+
+    def _faults(self, found: Iterator[tuple[str, object, str]]) -> Iterator[Fault]:
+        """The faults of parameters; those of a file's rows by their lines."""
+        for key, value, allowed in found:
+            lines = [line for rows in self.files if (line := rows.line(key))]
+            where, name = lines[0] if lines else (str(self.where), f"{self._name}.{key}")
+            if not self._follows(key):
+                yield Fault(where, name, value, allowed)
+
+    def _follows(self, key: str) -> bool:
+        """Whether a fault of a whole field, or of the whole table, may follow from bad rows of a file."""
+        return any(rows.faults and key in ("", rows.field) for rows in self.files)

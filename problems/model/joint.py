@@ -1,0 +1,152 @@
+"""The joint: the junction strip, the parts that meet there, and which of them touch.
+
+y = width + north.length   ┌──────────────┐   far edge, may be clamped
+                           │   fragment   │
+y = width                  ├──────────────┤
+                           │   junction   │   all parts have nodes here
+y = 0                      ├──────────────┤
+                           │     wing     │
+y = −south.length          └──────────────┘
+                           x = 0 … length
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from pydantic import BaseModel, ConfigDict, Field
+
+from problems.fem.plate import Plate
+from problems.forms.assembly import Matrix
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+TOOL = "tool"  # the second of a contact pair: a rigid surface
+
+
+class Table(BaseModel):
+    """A table of a TOML file: unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Junction(Table):
+    """The strip where the parts meet: length along x and width along y in mm, nodes along each."""
+
+    length: Positive
+    width: Positive
+    nodes: tuple[Annotated[int, Field(ge=2)], Annotated[int, Field(ge=2)]]
+
+
+class Extension(Table):
+    """The part's plate beyond the junction: its length in mm and its elements across that length."""
+
+    length: Positive
+    elements: Annotated[int, Field(ge=1)]
+
+
+class Part(Table):
+    """A plate with the junction strip and an extension to either side.
+
+    thickness in mm, young in N/mm²; clamped names the far edges where the part is built in.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    thickness: Positive
+    young: Positive = 70e3
+    poisson: Annotated[float, Field(ge=0, lt=0.5)] = 0.33
+    south: Extension | None = None
+    north: Extension | None = None
+    clamped: tuple[Literal["south", "north"], ...] = ()
+
+
+class Joint(Table):
+    """Junction, parts and contacts. A contact (a, b) means x_a − x_b ≤ g at every junction node."""
+
+    junction: Junction
+    part: Annotated[tuple[Part, ...], Field(min_length=1)]
+    contacts: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The contacts; where none are given, each part against the next one; none of a part alone."""
+        names = [part.name for part in self.part]
+        return self.contacts or tuple(itertools.pairwise(names))
+
+    @property
+    def node_count(self) -> int:
+        nx, ny = self.junction.nodes
+        return nx * ny
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(n, m) of the quadratic program."""
+        return len(self.part) * self.node_count, len(self.pairs) * self.node_count
+
+    @property
+    def x(self) -> np.ndarray:
+        return np.linspace(0.0, self.junction.length, self.junction.nodes[0])
+
+    @property
+    def y(self) -> np.ndarray:
+        return np.linspace(0.0, self.junction.width, self.junction.nodes[1])
+
+    @property
+    def nodes(self) -> Matrix:
+        """(node_count, 2) coordinates of the junction nodes in mm, x running fastest."""
+        X, Y = np.meshgrid(self.x, self.y)
+        return np.column_stack([X.ravel(), Y.ravel()])
+
+    def unknowns(self, part: str) -> slice:
+        """Where the part's displacements stand in x."""
+        index = [p.name for p in self.part].index(part)
+        return slice(index * self.node_count, (index + 1) * self.node_count)
+
+    def contact_matrix(self) -> sp.csc_array:
+        """A, (n, m): +1 for the first part of a pair, −1 for the second unless that is the tool."""
+        n, m = self.size
+        if m == 0:
+            return sp.csc_array((n, 0))
+        nodes = np.arange(self.node_count)
+        rows, columns, signs = [], [], []
+        for k, pair in enumerate(self.pairs):
+            for part, sign in zip(pair, (1.0, -1.0), strict=True):
+                if part != TOOL:
+                    rows.append(self.unknowns(part).start + nodes)
+                    columns.append(k * self.node_count + nodes)
+                    signs.append(np.full(self.node_count, sign))
+        entries = (np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns)))
+        A = sp.csc_array(sp.coo_array(entries, shape=(n, m)))
+        A.sort_indices()
+        return A
+
+    def plate(self, part: Part) -> Plate:
+        """The finite-element model of a part: the junction's grid lines and those of its extensions."""
+        y = [self.y]
+        if part.south:
+            y.insert(0, np.linspace(-part.south.length, 0.0, part.south.elements + 1)[:-1])
+        if part.north:
+            end = self.junction.width + part.north.length
+            y.append(np.linspace(self.junction.width, end, part.north.elements + 1)[1:])
+        return Plate(self.x, np.concatenate(y), part.thickness, part.young, part.poisson)
+
+    def faults(self) -> Iterator[tuple[str, object, str]]:
+        """(key, value, what is allowed) of everything that the types alone cannot catch."""
+        names = [part.name for part in self.part]
+        if len(set(names)) < len(names) or TOOL in names:
+            yield "part.name", names, f'each part has a name of its own, other than "{TOOL}"'
+        for part in self.part:
+            for edge in part.clamped:
+                if getattr(part, edge) is None:
+                    yield f"part.{part.name}.clamped", edge, f"needs an extension to the {edge}"
+        for pair in self.contacts:
+            if pair[0] not in names or pair[1] not in (*names, TOOL) or pair[0] == pair[1]:
+                yield "contacts", list(pair), f'two different parts of {names}; the second may be "{TOOL}"'
+        # Q = AᵀK⁻¹A is positive definite only if no contact follows from others.
+        sides = [[(name == a) - (name == b) for name in names] for a, b in self.pairs]
+        if self.pairs and np.linalg.matrix_rank(sides) < len(sides):
+            yield "contacts", [list(pair) for pair in self.pairs], "no pair twice, no closed chain of pairs"

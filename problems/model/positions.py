@@ -1,0 +1,77 @@
+"""Where fastening elements sit: points on the junction, each taken to the node nearest to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationInfo, model_validator
+
+from problems.forms.assembly import Matrix, Vector
+from problems.input.csv_table import in_place_of_file
+
+from .joint import Finite, Joint, Table
+
+
+class Pattern(Table):
+    """columns × rows points, evenly spread over the junction up to `edge` mm from its border."""
+
+    columns: Annotated[int, Field(ge=1)]
+    rows: Annotated[int, Field(ge=1)]
+    edge: Annotated[float, Field(ge=0)] = 0.0
+
+
+class Positions(Table):
+    """`points`, a list of (x, y) in mm; or `file`, a CSV with columns x and y; or a `pattern`."""
+
+    points: tuple[tuple[Finite, Finite], ...] = ()
+    pattern: Pattern | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_file(cls, data: Any, info: ValidationInfo) -> Any:
+        return in_place_of_file(data, info, "points", ("x", "y"))
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Positions:
+        if bool(self.points) == bool(self.pattern):
+            raise ValueError("give one of points, file and pattern")
+        return self
+
+    def marks(self, joint: Joint) -> Matrix:
+        """(k, 2) coordinates in mm."""
+        if self.pattern is None:
+            return np.array(self.points)
+        x = _spread(joint.junction.length, self.pattern.edge, self.pattern.columns)
+        y = _spread(joint.junction.width, self.pattern.edge, self.pattern.rows)
+        X, Y = np.meshgrid(x, y)
+        return np.column_stack([X.ravel(), Y.ravel()])
+
+    def misplaced(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        """(key, value, what is allowed) of points that are not on the junction."""
+        length, width = joint.junction.length, joint.junction.width
+        if pattern := self.pattern:
+            spread = [size for size, n in ((length, pattern.columns), (width, pattern.rows)) if n > 1]
+            if 2 * pattern.edge > min(spread, default=np.inf):
+                yield "pattern.edge", pattern.edge, f"at most half the junction, {min(spread) / 2:g} mm"
+            return
+        allowed = f"on the junction, 0 … {length:g} × 0 … {width:g} mm"
+        for k, (x, y) in enumerate(self.points):
+            if not (0 <= x <= length and 0 <= y <= width):
+                yield f"points[{k}]", [x, y], allowed
+
+    def nearest_nodes(self, joint: Joint) -> NDArray[np.intp]:
+        """The junction node nearest to each point, at most half a node spacing away along x and y."""
+        nx, _ = joint.junction.nodes
+        positions = self.marks(joint)
+        ix, iy = (
+            np.abs(positions[:, [axis]] - grid).argmin(axis=1) for axis, grid in enumerate((joint.x, joint.y))
+        )
+        return np.asarray(iy * nx + ix)
+
+
+def _spread(size: float, edge: float, count: int) -> Vector:
+    """count points between edge and size − edge; a single one in the middle."""
+    return np.linspace(edge, size - edge, count) if count > 1 else np.array([size / 2])

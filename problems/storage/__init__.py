@@ -1,0 +1,1 @@
+"""Arrays on disk under a hash of what made them."""

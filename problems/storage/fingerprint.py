@@ -1,0 +1,84 @@
+"""A hash of code by what it does: what rows and cached matrices are known by.
+
+Two states of the code have the same fingerprint if they can only give the same numbers: comments, layout,
+docstrings, annotations of functions, the wording of what is raised, import lines and the places of files do
+not count. The files that a file imports count with it, as far as they lie in the given folders, and what
+those import in turn.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+#: The folder that holds the project's packages.
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def fingerprint(files: Iterable[Path], within: Iterable[str] = (), root: Path = ROOT) -> str:
+    """12 hexadecimal digits of the code in `files` and in what they import, directly or not.
+
+    within : the folders below `root` whose files count when they are imported.
+    """
+    folders = [root / folder for folder in within]
+    todo = list(files)
+    seen: dict[Path, str] = {}
+    while todo:
+        path = todo.pop()
+        if path not in seen:
+            seen[path], imported = _read(path, root, path.stat().st_mtime_ns)
+            todo += [file for file in imported if any(folder in file.parents for folder in folders)]
+    return hashlib.sha256("".join(sorted(seen.values())).encode()).hexdigest()[:12]
+
+
+@cache
+def _read(path: Path, root: Path, changed: int) -> tuple[str, tuple[Path, ...]]:
+    """The hash of one file's code and the files below root that it imports; `changed` renews the cache."""
+    tree = ast.parse(path.read_bytes())
+    imported = tuple(_imported(path, tree, root))
+    code = ast.dump(_WithoutWords().visit(tree))
+    return hashlib.sha256(code.encode()).hexdigest(), imported
+
+
+class _WithoutWords(ast.NodeTransformer):
+    """Takes out of a tree, which holds neither comments nor layout, what cannot change a number."""
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = node.body[ast.get_docstring(node, clean=False) is not None :]
+        return super().generic_visit(node)
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        node.returns = None
+        return self.generic_visit(node)
+
+    def visit_arg(self, node: ast.arg) -> ast.AST:
+        node.annotation = None
+        return node
+
+    def visit_Raise(self, node: ast.Raise) -> ast.AST:
+        return ast.Raise()
+
+    def visit_Import(self, node: ast.Import) -> None:
+        return None
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
+        return None
+
+
+def _imported(path: Path, tree: ast.Module, root: Path) -> Iterator[Path]:
+    """The files below root that the file at `path` imports, anywhere in it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            folder = path.parents[node.level - 1] if node.level else root
+            module = folder.joinpath(*(node.module or "").split("."))
+            names = [module, *(module / each.name for each in node.names)]
+        elif isinstance(node, ast.Import):
+            names = [root.joinpath(*each.name.split(".")) for each in node.names]
+        else:
+            continue
+        files = [file for name in names for file in (name.with_suffix(".py"), name / "__init__.py")]
+        yield from (file for file in files if file.is_file())

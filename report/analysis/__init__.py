@@ -1,0 +1,1 @@
+"""What the rows mean: standings, fits, precision, advice, checks."""

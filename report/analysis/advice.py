@@ -1,0 +1,98 @@
+"""Which solver to use, in sentences computed from the rows."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from report.document.numbers import counted, listed, significant
+from report.results.labels import in_order
+from report.results.reader import Results
+
+from .standings import TIE, geometric_mean, preferred, seconds_within
+
+
+def advice(results: Results, n: int) -> str | None:
+    """A paragraph for one size: the fastest of the lines that are within the limit on all its scenes."""
+    cells = results.of_size(n)
+    if cells.empty:
+        return None
+    seconds = seconds_within(cells)
+    complete = seconds.dropna(axis=1)
+    words = _best(results, cells, complete) if complete.columns.size else _nobody(results, seconds)
+    return f"- **{_range(cells)}:** {' '.join([*words, *_unanswered(cells)])}"
+
+
+def _range(cells: pd.DataFrame) -> str:
+    n, scenes = int(cells["n"].iloc[0]), cells["scene"].nunique()
+    least, most = cells["active"].min(), cells["active"].max()
+    if pd.isna(least):
+        return f"n = {n}, {counted(scenes, 'scene')}"
+    active = f"{least:.0f}" if least == most else f"{least:.0f} to {most:.0f}"
+    return f"n = {n}, {counted(scenes, 'scene')}, {active} active"
+
+
+def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list[str]:
+    scenes = len(complete)
+    means = preferred(complete.apply(geometric_mean), cells)["seconds"]
+    best, time = str(means.index[0]), float(means.iloc[0])
+    every = {1: "the one scene", 2: "both scenes"}.get(scenes, f"all {scenes} scenes")
+    mean = "" if scenes == 1 else " (geometric mean)"
+    once = cells.loc[cells["label"] == best, "once_s"].median()
+    prepared = f", after {significant(once, 2)} s once an assembly" if once >= 0.005 else ""
+    words = [
+        f"use **{best}**: within {results.limit} on {every}, "
+        f"{significant(time)} s a load case{mean}{prepared}."
+    ]
+    ties = [str(label) for label in means.index[1:] if means[label] <= TIE * time]
+    if ties:
+        pairs = [f"{label} ({significant(means[label])} s)" for label in ties]
+        words.append(f"As fast, to within {TIE - 1:.0%}: {listed(pairs)}.")
+    behind = [str(label) for label in means.index if means[label] > TIE * time]
+    if behind:
+        words.append(f"Next is {behind[0]}, {significant(means[behind[0]] / time, 2)} times as long.")
+    elif not ties:
+        words.append("No other is within the limit on every scene.")
+    return words + _beaten(cells, [best, *ties])
+
+
+def _beaten(cells: pd.DataFrame, best: list[str]) -> list[str]:
+    """Where another line is clearly faster than the one recommended."""
+    series = cells.loc[cells["label"].isin(best), "series"]
+    rivals = cells["label"].isin(best) | ~cells["series"].isin(series)  # not the same at other tolerances
+    seconds = seconds_within(cells[rivals])
+    active = cells.drop_duplicates("scene").set_index("scene")["active"]
+    recommended = seconds[best].min(axis=1)
+    fastest = seconds.idxmin(axis=1)
+    faster = recommended > TIE * seconds.min(axis=1)
+    words = []
+    for label in in_order(cells[cells["label"].isin(fastest[faster])]):
+        scenes = fastest.index[faster & (fastest == label)]
+        times = (recommended[scenes] / seconds.loc[scenes, label]).max()
+        at = listed([f"{active[scene]:.0f}" for scene in scenes])
+        upto = "up to " if len(scenes) > 1 else ""
+        words.append(f"At {at} active, {label} is faster ({upto}{significant(times, 2)} times).")
+    return words
+
+
+def _nobody(results: Results, seconds: pd.DataFrame) -> list[str]:
+    counts = seconds.notna().sum()
+    if not counts.size:
+        return [f"no answer is within {results.limit}."]
+    most = [str(label) for label in counts.index[counts == counts.max()]]
+    verb = "is" if len(most) == 1 else "are each"
+    return [
+        f"nothing is within {results.limit} on every scene. "
+        f"{listed(most)} {verb} within it on {counts.max()} of {len(seconds)}."
+    ]
+
+
+def _unanswered(cells: pd.DataFrame) -> list[str]:
+    missed = cells[cells["verdict"] == "no_answer"]
+    if missed.empty:
+        return []
+    return [f"{counted(len(missed), 'run')} of {len(cells)} gave no answer ({_reasons(missed['status'])})."]
+
+
+def _reasons(statuses: pd.Series[str]) -> str:
+    counts = statuses.value_counts()
+    return ", ".join(f"{k} {str(status).replace('_', ' ')}" for status, k in counts.items())

@@ -1,0 +1,112 @@
+"""How the solvers stand: answers within the limit first, then time.
+
+Times of different solvers are averaged only over the same scenes. At each size, the lines that are
+within the limit on more than half of its scenes are compared, by the geometric mean over those
+scenes that all of them answered within the limit. What failed is counted and enters no mean.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from report.results.labels import in_order
+from report.results.reader import Results
+
+#: Lines at most this many times slower than the fastest count as equally fast: single runs on a
+#: shared machine differ by as much.
+TIE = 1.15
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The geometric means of one size: seconds a load case by label, over `common` of `scenes`."""
+
+    n: int
+    scenes: list[str]
+    common: list[str]
+    seconds: dict[str, float]
+
+
+def geometric_mean(values: pd.Series[float]) -> float:
+    return float(np.exp(np.log(values).mean()))
+
+
+def seconds_within(cells: pd.DataFrame) -> pd.DataFrame:
+    """Seconds a load case by scene (rows) and label (columns), missing where not within the limit."""
+    within = cells[(cells["verdict"] == "within") & cells["load_case_s"].notna()]
+    table = within.pivot_table(index="scene", columns="label", values="load_case_s", aggfunc="first")
+    return table.reindex(index=cells.drop_duplicates("scene").sort_values("active")["scene"])
+
+
+def preferred(seconds: pd.Series[float], cells: pd.DataFrame) -> pd.DataFrame:
+    """A line a series with the setting to use, the fastest first: `label` (the index), `series`,
+    `tolerance` and `seconds`.
+
+    It is the tightest tolerance of those that are as fast as the series' fastest: what costs nothing
+    is not given away.
+
+    seconds : by label, of the settings that come into question.
+    """
+    known = cells.drop_duplicates("label").set_index("label")[["series", "tolerance"]].loc[seconds.index]
+    known = known.assign(seconds=seconds)
+    as_fast = known["seconds"] <= TIE * known.groupby("series")["seconds"].transform("min")
+    tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("series")
+    return tightest.sort_values("seconds")
+
+
+def compare(results: Results, n: int) -> Comparison:
+    seconds = seconds_within(results.of_size(n))
+    compared = seconds.loc[:, seconds.notna().sum() * 2 > len(seconds)]
+    common = compared.dropna()
+    means = {str(label): geometric_mean(common[label]) for label in common} if len(common) else {}
+    return Comparison(n, seconds.index.tolist(), common.index.tolist(), means)
+
+
+def standings(results: Results) -> pd.DataFrame:
+    """One line a label, the best first: share of scenes within the limit, then time relative to the
+    fastest on the scenes it did answer.
+    """
+    cells = results.cells[results.cells["status"] != "unsupported"]
+    comparisons = [compare(results, n) for n in results.sizes]
+    seconds = seconds_within(cells)
+    slower = seconds.div(seconds.min(axis=1), axis=0)
+    lines = []
+    for label in in_order(cells):
+        line = cells[cells["label"] == label]
+        verdicts = line["verdict"].value_counts()
+        missed = line[line["verdict"] == "no_answer"]["status"]
+        outside = line[line["verdict"] == "outside"]
+        record = {
+            "label": label,
+            "series": line["series"].iloc[0],
+            "solver": line["solver"].iloc[0],
+            "form": line["form"].iloc[0],
+            "scenes": len(line),
+            "within": int(verdicts.get("within", 0)),
+            "outside": len(outside),
+            "outside_said_solved": int((outside["status"] == "solved").sum()),
+            "cannot_be_judged": int(verdicts.get("cannot_be_judged", 0)),
+            "no_answer": len(missed),
+            "no_answer_because": ", ".join(f"{k} {_words(s)}" for s, k in Counter(missed).most_common()),
+            "worst_error_mm": line["displacement_error_mm"].max(),
+        }
+        for comparison in comparisons:
+            record[f"load_case_s_{comparison.n}"] = comparison.seconds.get(label)
+        record["peak_rss_mib"] = line["peak_rss_mib"].max()
+        record["slower"] = geometric_mean(slower[label].dropna()) if label in slower else np.inf
+        lines.append(record)
+    table = pd.DataFrame(lines)
+    if table.empty:
+        return table
+    table["share"] = table["within"] / table["scenes"]
+    keys = {"share": False, "within": False, "slower": True, "no_answer": True, "worst_error_mm": True}
+    table = table.sort_values([*keys], ascending=[*keys.values()], kind="stable")
+    return table.drop(columns=["share", "slower"]).reset_index(drop=True)
+
+
+def _words(status: str) -> str:
+    return status.replace("_", " ")

@@ -1,0 +1,39 @@
+"""Cells as lines of a table: their seconds, or what is known of them where there is no answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from report.document.numbers import MISSING, significant
+from report.results.reader import ANSWERED
+
+
+def timed(cells: pd.DataFrame) -> pd.DataFrame:
+    """With `at_least`: seconds a load case where the answer is within the limit; for a run that the time
+    limit or an iteration limit ended, what it had taken by then; else missing. `cut`: it is only that
+    lower bound.
+    """
+    within = cells["verdict"] == "within"
+    late = (cells["status"] == "time_limit") & ~within
+    spent = (cells["status"] == "iteration_limit") & ~within
+    at_least = cells["load_case_s"].where(within | spent, cells["time_limit_s"].where(late))
+    return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
+
+
+def seconds_text(cell: Mapping[str, Any]) -> str:
+    """The seconds a load case, or for a run without an answer within the limit, why there is none."""
+    if cell["verdict"] == "within":
+        return significant(cell["load_case_s"])
+    if cell["verdict"] in ANSWERED:
+        return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
+    if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
+        return f"> {cell['time_limit_s']:.4g}"
+    return str(cell["status"]).replace("_", " ") or MISSING
+
+
+def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The lines of a frame as dictionaries."""
+    return frame.to_dict("records")  # type: ignore[return-value]

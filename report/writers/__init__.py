@@ -1,0 +1,1 @@
+"""Pages on disk: Markdown, pictures, CSV, VTU."""

@@ -1,0 +1,190 @@
+"""Writes the report of a series: report.md, a PNG a figure, a CSV beside each figure and table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number
+from report.document.numbers import counted, listed, significant, tidy_power
+from report.figures import style
+from report.figures.maps import draw
+from report.results.series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
+
+from .markdown import save_block, template
+
+MAPPED = (0.5, 0.95, 0.99)
+LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))
+STEPS = {"setup_s": "update or set-up", "solve_s": "solve", "form_s": "x, gaps, residuals, error bound"}
+
+
+def write(directory: Path) -> Path:
+    """Write DIRECTORY/report/report.md anew from the series in DIRECTORY and return its path."""
+    series = read(directory)
+    target = directory / "report"
+    target.mkdir(exist_ok=True)
+    for stale in [*target.glob("*.png"), *target.glob("*.csv")]:
+        stale.unlink()
+    blocks: list[Block] = [Text(_summary(series))]
+    with style.applied():
+        if len(series.cases):
+            blocks.append(_statistics(series))
+        sections = [Section("Summary", blocks)]
+        if len(series.cases):
+            sections.append(Section("The gap that is left", _pictures(series, target)))
+        saved = [Section(s.title, [save_block(block, target) for block in s.blocks]) for s in sections]
+    path = target / "report.md"
+    title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
+    path.write_text(template("series.md.j2").render(title=title, sections=saved), "utf-8")
+    return path
+
+
+def _summary(series: Series) -> str:
+    facts, cases, identity = series.facts, series.cases, series.facts["identity"]
+    counts = ", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in series.counts.items())
+    lines = [
+        f"{facts['title']}. {sum(series.counts.values())} of {facts['cases']} cases solved with "
+        f"`{identity['solver']}` ({identity['form']} form, tolerance {tidy_power(identity['tolerance'])}, "
+        f"{counted(facts['threads'], 'thread')}) on {facts['machine']}: {counts}."
+    ]
+    if len(cases):
+        bound = significant(cases["bound_mm"].max())
+        lines.append(f"Each answer is proven to lie within {bound} mm of the exact one.")
+        checked = cases["displacement_error_mm"].dropna()
+        if len(checked):
+            lines.append(
+                f"Of {counted(len(checked), 'case')} compared with the certified reference the largest error "
+                f"is {significant(checked.max())} mm."
+            )
+        seconds = sum(float(cases[name].sum()) for name in STEPS)
+        told = {name: text for name, text in STEPS.items() if cases[name].notna().any()}
+        steps = (f"{significant(1e3 * cases[name].mean())} ms {text}" for name, text in told.items())
+        lines.append(
+            f"{significant(len(cases) / seconds)} cases a second of work; a case took {listed(list(steps))} "
+            "on average."
+        )
+    return " ".join(lines)
+
+
+def _statistics(series: Series) -> Table:
+    names = {"max_gap_mm": "largest gap of a case", "mean_gap_mm": "mean gap of a case"}
+    rows = [
+        {"figure": text, **{f"q{q:g}": series.cases[name].quantile(q) for q in QUANTILES}}
+        | {"mean": series.cases[name].mean(), "largest": series.cases[name].max()}
+        for name, text in names.items()
+    ]
+    columns = [Column("mm", lambda row: str(row["figure"]), "left"), number("mean", "mean")]
+    columns += [number(f"{100 * q:g} %", f"q{q:g}") for q in QUANTILES] + [number("largest", "largest")]
+    return Table("statistics", "*Quantiles over the cases.*", pd.DataFrame(rows), columns)
+
+
+def _pictures(series: Series, target: Path) -> list[Block]:
+    maps = quantile_maps(series)
+    nodes = series.nodes
+    table = pd.DataFrame(maps.T, columns=[*(f"q{q:g}_mm" for q in QUANTILES), "mean_mm"])
+    case = int(series.cases["case"].iloc[series.cases["max_gap_mm"].to_numpy().argmax()])
+    gap = np.asarray(series.gaps[case], dtype=float)
+    blocks: list[Block] = []
+    if nodes is not None:
+        table.insert(0, "x_mm", nodes[:, 0])
+        table.insert(1, "y_mm", nodes[:, 1])
+        shown = [(f"{100 * q:g} % quantile", maps[QUANTILES.index(q)]) for q in MAPPED]
+        caption = (
+            "*The gap that is left, contact by contact: quantiles over the cases.* One case in twenty leaves "
+            "more than the 95 % quantile at a place. Circles: the fasteners."
+        )
+        blocks.append(_maps("quantile-maps", caption, series, shown))
+        worst_caption = f"*The worst case, number {case}: its largest gap is {significant(gap.max())} mm.*"
+        blocks.append(_maps("worst-case", worst_caption, series, [(f"case {case}", gap)]))
+        pd.DataFrame({"x_mm": nodes[:, 0], "y_mm": nodes[:, 1], "gap_mm": gap}).to_csv(
+            target / "worst-case.csv", index=False
+        )
+    table.to_csv(target / "quantile-maps.csv", index=False)
+    blocks.append(_exceedance(series, target))
+    if series.swept:
+        return blocks + [_swept(series, key, target) for key in series.swept]
+    return [*blocks, _convergence(series, target)]
+
+
+def _maps(name: str, caption: str, series: Series, shown: list[tuple[str, np.ndarray]]) -> Figure:
+    assert series.nodes is not None
+    width, height = np.ptp(series.nodes, axis=0)
+    strip = max(7.6 * height / (width or 1.0), 0.5)
+    drawing = style.figure(len(shown) * (min(strip, 4.0) + 0.36) + 0.36)
+    panels: list[Axes] = list(drawing.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
+    low, high = min(float(v.min()) for _, v in shown), max(float(v.max()) for _, v in shown)
+    norm = Normalize(min(0.0, low), high if high > 0 else 1.0)
+    for axes, (title, values) in zip(panels, shown, strict=True):
+        mapped = draw(axes, series.nodes, values, norm, "viridis")
+        axes.plot(*series.fasteners.T, "o", markersize=3.2, markerfacecolor="none", markeredgecolor="white")
+        axes.set_title(title)
+    panels[-1].set_xlabel("x, mm")
+    drawing.colorbar(mapped, ax=panels, label="gap, mm", aspect=8 * len(shown), pad=0.015, fraction=0.05)
+    return Figure(name, caption, drawing)
+
+
+def _exceedance(series: Series, target: Path) -> Figure:
+    curve = exceedance(series)
+    curve.to_csv(target / "exceedance.csv", index=False)
+    drawing = style.figure(3.2)
+    axes: Axes = drawing.subplots()
+    names = (
+        ("share_of_cases", "cases, by their\nlargest gap"),
+        ("share_of_contacts", "contacts, mean\nof the cases"),
+    )
+    for (name, label), (colour, line) in zip(names, LOOKS, strict=False):
+        shown = curve[curve[name] > 0]
+        axes.plot(shown["gap_mm"], 100 * shown[name], line, color=colour, label=label)
+    axes.set(yscale="log", xlabel="gap t, mm", ylabel="share with more than t, %", xlim=(0, None))
+    style.plain_log(axes.yaxis)
+    drawing.legend(loc="outside right upper")
+    caption = (
+        "*Exceedance: how often more than a gap t is left.* The lowest value that the cases can show is "
+        f"{significant(100 / len(series.cases))} % of them."
+    )
+    return Figure("exceedance", caption, drawing)
+
+
+def _convergence(series: Series, target: Path) -> Figure:
+    table = convergence(series)
+    table.to_csv(target / "convergence.csv", index=False)
+    drawing = style.figure(3.2)
+    axes: Axes = drawing.subplots()
+    for q, (colour, line) in zip(QUANTILES[1:], LOOKS, strict=True):
+        lines = table[table["quantile"] == q]
+        axes.plot(lines["cases"], lines["gap_mm"], line, color=colour, label=f"{100 * q:g} % quantile")
+        axes.fill_between(lines["cases"], lines["low_mm"], lines["high_mm"], color=colour, alpha=0.15, lw=0)
+    axes.set(xscale="log", xlabel="number of cases", ylabel="largest gap of a case, mm")
+    style.plain_log(axes.xaxis)
+    drawing.legend(loc="outside right upper")
+    caption = (
+        "*Are there enough cases? Quantiles of a case's largest gap over the first N cases.* Shaded: the "
+        "distribution-free 95 % interval between order statistics, where N is large enough for one."
+    )
+    return Figure("convergence", caption, drawing)
+
+
+def _swept(series: Series, key: str, target: Path) -> Figure:
+    name = f"sweep-{key}"
+    found = series.cases.groupby(key)[["max_gap_mm", "mean_gap_mm"]].agg(["min", "median", "max"])
+    found.columns = ["_".join(pair) for pair in found.columns.to_flat_index()]
+    found.reset_index().to_csv(target / f"{name}.csv", index=False)
+    drawing = style.figure(3.2)
+    axes: Axes = drawing.subplots()
+    for figure, label, (colour, line) in zip(
+        ("max_gap_mm", "mean_gap_mm"), ("largest", "mean"), LOOKS, strict=False
+    ):
+        axes.plot(
+            found.index, found[f"{figure}_median"], line, color=colour, marker="o", markersize=3, label=label
+        )
+        axes.fill_between(
+            found.index, found[f"{figure}_min"], found[f"{figure}_max"], color=colour, alpha=0.15, lw=0
+        )
+    axes.set(xlabel=key, ylabel="gap that is left, mm")
+    drawing.legend(loc="outside right upper")
+    caption = f"*The largest and the mean gap of a case over {key}.* Shaded: the range over the other keys."
+    return Figure(name, caption, drawing)

@@ -1,0 +1,1 @@
+"""What the active-set methods are made of."""

@@ -1,0 +1,31 @@
+"""Nested subsets of the contacts, for a first guess from a smaller problem.
+
+The contacts are put in square cells; of each cell the contact with the largest overlap p stands for it,
+so that a fastener's contact is in the subset. Without coordinates a cell is a run of numbers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.forms.assembly import Matrix, Vector
+
+Cells = NDArray[np.intp]
+
+
+def cells_of(nodes: Matrix | None, m: int, width: int) -> Cells:
+    """(m,) the number of each contact's cell, of width² contacts on average. nodes : (m, 2) mm, or None."""
+    if nodes is None:
+        return np.arange(m) // width**2
+    low, extent = nodes.min(axis=0), np.ptp(nodes, axis=0)
+    spacing = np.sqrt(np.prod(extent) / m) if extent.all() else extent.max() / m
+    place = np.floor((nodes - low) / (width * spacing or 1.0)).astype(int)
+    return np.unique(place, axis=0, return_inverse=True)[1].ravel()
+
+
+def representatives(cells: Cells, p: Vector) -> NDArray[np.intp]:
+    """The contact with the largest p of each cell, in the order of their numbers."""
+    order = np.lexsort((-p, cells))
+    first = np.r_[True, np.diff(cells[order]) > 0]
+    return np.sort(order[first])

@@ -1,0 +1,1 @@
+"""What the interior-point methods are made of."""

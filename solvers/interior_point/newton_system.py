@@ -1,0 +1,125 @@
+"""Solves the Newton systems (Q + D) v = b of the interior-point method, one D after another.
+
+D is a positive diagonal that changes from system to system, Q stays: what is factored of it once is
+factored in `prepare`, when the system is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.linalg as sla
+
+from problems.forms.assembly import Matrix, Vector
+from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
+
+from .preconditioner import CholeskyFactor, CholeskyPlusRoot, Identity, Preconditioner, Splitting
+
+#: CG iterations after which a factor in a new order pays. One Cholesky factorisation takes m³/3
+#: operations out of the cache, a CG iteration 2m² out of memory.
+REORDER = 25
+
+#: At most so many CG iterations a system, in units of m.
+LIMIT = 10
+
+
+@dataclass(frozen=True)
+class Solved:
+    """v, the CG iterations spent on it, and whether the tolerance was met."""
+
+    v: Vector
+    iterations: int
+    converged: bool
+
+
+class NewtonSystem(Protocol):
+    """What the iterations ask of it. `factorisations` counts those of the present load case."""
+
+    @property
+    def factorisations(self) -> int: ...
+
+    def begin(self) -> None:
+        """A new load case."""
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        """v with (Q + D) v = b to the tolerance, in at most `limit` inner iterations."""
+
+
+class Direct:
+    """A Cholesky factorisation of H = Q + D for every D."""
+
+    def __init__(self, Q: Matrix) -> None:
+        self.Q = Q
+        self.begin()
+
+    def begin(self) -> None:
+        """A new load case."""
+        self.D = np.full(len(self.Q), np.nan)
+        self.factorisations = 0
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        if not np.array_equal(D, self.D):
+            H = np.array(self.Q, order="F")
+            H[np.diag_indices_from(H)] += D
+            self.factor = sla.cho_factor(H, overwrite_a=True, check_finite=False)
+            self.D = D
+            self.factorisations += 1
+        return Solved(sla.cho_solve(self.factor, b, check_finite=False), 0, True)
+
+
+class Pcg:
+    """Conjugate gradients until ‖V⁻ᵀ(b − Hv)‖₂ ≤ tolerance · ‖V⁻ᵀb‖₂."""
+
+    def __init__(self, V: Preconditioner) -> None:
+        self.V = V
+
+        self.begin()
+
+    def begin(self) -> None:
+        """A new load case."""
+        self.factorisations = 0
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        self.factorisations += self.V.update(D)
+        limit = min(limit, LIMIT * len(b))
+        cg = conjugate_gradients(self.V.multiply, self.V.to_transformed(b), tolerance, limit)
+        return Solved(self.V.from_transformed(cg.z), cg.iterations, cg.converged)
+
+
+class OpenLast(Pcg):
+    """PCG with V = U + √D and the nodes in the order of growing D, the open gaps (large D) last.
+
+    The order is made anew, and Q factored in it, for the system that follows one of more than REORDER
+    CG iterations. Each load case begins in the order of the nodes' numbers.
+    """
+
+    def __init__(self, Q: Matrix) -> None:
+        self.Q = Q
+        self.first = CholeskyPlusRoot(Q)
+        super().__init__(self.first)
+
+    def begin(self) -> None:
+        super().begin()
+        self.V = self.first
+        self.late = False
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        if self.late:
+            self.V = CholeskyPlusRoot(self.Q, np.argsort(D, kind="stable"))
+            self.factorisations += 1
+        solved = super().solve(D, b, tolerance, limit)
+        self.late = solved.iterations > REORDER
+        return solved
+
+
+#: The option `preconditioner`, in the order of the nodes' numbers.
+SYSTEMS: dict[str, Callable[[Matrix], NewtonSystem]] = {
+    "V": lambda Q: Pcg(CholeskyPlusRoot(Q)),
+    "U": lambda Q: Pcg(CholeskyFactor(Q)),
+    "none": lambda Q: Pcg(Identity(Q)),
+    "splitting": lambda Q: Pcg(Splitting(Q)),
+    "direct": Direct,
+}

@@ -1,0 +1,84 @@
+"""Feasible starting points of the interior-point method: Algorithms 4 and 5 of the paper.
+
+Contact forces high enough open every gap: λ > 0 with y = Qλ − p > 0. Algorithm 4 finds them by
+displacements, Algorithm 5 by Q; with Q = AᵀK⁻¹A they are the same point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from problems.forms.assembly import LoadCase, Matrix, Prepared, Vector
+
+MULT = 2.0  # the multiplier of λ, > 1
+MAX_STEPS = 200  # multiplications, and sweeps of corrections
+
+
+class NoStart(ValueError):
+    """No feasible starting point was found."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """λ (N) and y (mm), (m,); the corrections below (16) and the multiplications that led there."""
+
+    lam: Vector
+    y: Vector
+    corrections: int = 0
+    multiplications: int = 0
+
+
+def algorithm_5(Q: Matrix, p: Vector, force: float = 1.0) -> Start:
+    """λ = force·e (N), corrected until Qλ > 0 (16), then multiplied until y = Qλ − p ≥ 0.
+
+    And once more, because the interior needs y > 0: mult·Qλ − p > Qλ − p ≥ 0. Raises NoStart where
+    no λ > 0 with Qλ > 0 was found.
+    """
+    return _opened(lambda lam: Q @ lam, lambda i: Q[:, i], p, force)
+
+
+def algorithm_4(prepared: Prepared, load: LoadCase, force: float = 1.0) -> Start:
+    """The same by displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
+    A = prepared.assembly.A
+
+    def response(lam: Vector) -> Vector:
+        return A.T @ prepared.solve_K(A @ lam)
+
+    def column(i: int) -> Vector:
+        return A.T @ prepared.solve_K(A[:, [i]].toarray()[:, 0])
+
+    return _opened(response, column, prepared.dual_load(load), force)
+
+
+def _opened(
+    response: Callable[[Vector], Vector], column: Callable[[int], Vector], p: Vector, force: float
+) -> Start:
+    lam, Qlam, corrections = _positive_response(response, column, np.full(len(p), force))  # step 1
+    for multiplications in range(1, MAX_STEPS + 1):  # step 2
+        y = Qlam - p  # step 3
+        opened = bool((y >= 0).all())  # step 4
+        lam, Qlam = MULT * lam, MULT * Qlam  # step 7, and the margin
+        if opened:
+            return Start(lam, Qlam - p, corrections, multiplications)  # steps 9 and 10, with w = λ
+    raise NoStart(f"the start: y = Qλ − p still has a negative entry after {MAX_STEPS} multiplications")
+
+
+def _positive_response(
+    response: Callable[[Vector], Vector], column: Callable[[int], Vector], lam: Vector
+) -> tuple[Vector, Vector, int]:
+    """λ > 0 with Qλ > 0: the correction λ_i ← −Σ_{j≠i} q_ij λ_j / q_ii + ε below (16), ε the first λ_i."""
+    corrections, epsilon = 0, lam.copy()
+    for _ in range(MAX_STEPS):
+        Qlam = response(lam)
+        negative = np.flatnonzero(Qlam <= 0)
+        if not negative.size:
+            return lam, Qlam, corrections
+        for i in negative:
+            q = column(int(i))
+            others = q @ lam - q[i] * lam[i]
+            lam[i] = max(lam[i], -others / q[i] + epsilon[i])
+            corrections += 1
+    raise NoStart(f"the start: no λ > 0 with Qλ > 0 was found in {MAX_STEPS} sweeps of corrections")

@@ -1,0 +1,1 @@
+"""Solvers from libraries, one file per library."""

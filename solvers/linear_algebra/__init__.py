@@ -1,0 +1,1 @@
+"""Products, factors and inverses that several methods share."""

@@ -1,0 +1,104 @@
+"""M ≈ Q⁻¹ with a narrow band, from the inverses of the small blocks along the diagonal of Q.
+
+Q is a Green's function: what happens at a contact is all but settled by what happens near it, and Q⁻¹, a
+stiffness, is all but zero between contacts that are far from each other. With the contacts in order along
+the joint, the Cholesky factor of Q⁻¹ is found row by row from the contacts just before (L. Yu. Kolotilina
+and A. Yu. Yeremin, SIAM J. Matrix Anal. Appl. 14:45–58, 1993): for a window W of contacts whose last ones
+are the line at hand, Q_WW = LLᵀ and the last rows of L⁻¹ are theirs. M is the sum of the rows' squares,
+positive definite whatever the window, and Q⁻¹ itself where a window holds all contacts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import blas, lapack
+
+from problems.forms.assembly import Matrix, Vector
+from solvers.active_set.bordered_factor import Set
+
+LINES = 4  # of contacts across the joint that a window holds before the line at hand
+ACROSS = 16  # contacts taken for a line where nobody knows where they are
+
+
+@dataclass(frozen=True)
+class BandedInverse:
+    """order : (m,) the contacts along the joint; all vectors are in this order.
+
+    band : (b + 2, m) by columns, M[j + d, j] in row d, the last row zero.
+    """
+
+    order: NDArray[np.intp]
+    band: Matrix
+
+    def product(self, v: Vector) -> Vector:
+        """M v."""
+        return blas.dsbmv(len(self.band) - 1, 1.0, self.band, v, lower=1)
+
+    def factor(self, S: Set) -> BandFactor:
+        """Of M_SS. Raises LinAlgError where rounding leaves it indefinite."""
+        rows, width = np.flatnonzero(S), len(self.band) - 1
+        nearer = np.arange(len(rows)) - np.searchsorted(rows, rows - width)
+        deep = int(nearer.max(initial=0)) + 1
+        far = np.concatenate([rows, np.full(deep, 2 * len(S))])
+        # Entry (i + d, i) of M_SS is entry (rows[i + d], rows[i]) of M, zero beyond the band.
+        apart = np.lib.stride_tricks.sliding_window_view(far, deep)[: len(rows)] - rows[:, None]
+        place = np.minimum(apart, width, out=apart) + rows[:, None] * len(self.band)
+        block = self.band.ravel(order="K").take(place).T
+        L, info = lapack.dpbtrf(block, lower=1, overwrite_ab=1) if rows.size else (block, 0)
+        if info:
+            raise np.linalg.LinAlgError(f"the leading minor {info} of M_SS is not positive definite")
+        return BandFactor(S, rows, L)
+
+
+@dataclass(frozen=True)
+class BandFactor:
+    """M_SS = LLᵀ, rows : the indices in S."""
+
+    S: Set
+    rows: NDArray[np.intp]
+    L: Matrix
+
+    def solve(self, b: Vector) -> Vector:
+        """u (m,) with M_SS u_S = b_S and zero elsewhere."""
+        u = np.zeros(len(b))
+        if self.rows.size:
+            u[self.rows] = lapack.dpbtrs(self.L, b[self.rows], lower=1)[0]
+        return u
+
+
+def banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse:
+    """Q (m, m). nodes : (m, 2) of the contacts, mm, or None where they are unknown.
+
+    Raises LinAlgError where Q is not positive definite.
+    """
+    m = len(Q)
+    order, across = along(nodes, m)
+    band = np.zeros((min((LINES + 1) * across, m) + 1, m), order="F")
+    for start in range(0, m, across):
+        first, stop = max(start - LINES * across, 0), min(start + across, m)
+        window = order[first:stop]
+        L, info = lapack.dpotrf(Q.T[np.ix_(window, window)].T, lower=1, overwrite_a=1)
+        if info:
+            raise np.linalg.LinAlgError(f"the leading minor {info} of Q_WW is not positive definite")
+        rows = lapack.dtrtri(L, lower=1)[0][start - first :]
+        added = rows.T @ rows
+        for j in range(stop - first):
+            band[: stop - first - j, first + j] += added[j:, j]
+    return BandedInverse(order, band)
+
+
+def along(nodes: Matrix | None, m: int) -> tuple[NDArray[np.intp], int]:
+    """The contacts in order along the longer side of the joint, and how many a line across it holds."""
+    if nodes is None:
+        return np.arange(m), min(ACROSS, m)
+    extent = np.ptp(nodes, axis=0)
+    longer, shorter = (0, 1) if extent[0] >= extent[1] else (1, 0)
+    order = np.lexsort((nodes[:, shorter], nodes[:, longer]))
+    places = len(np.unique(nodes, axis=0))
+    spacing = np.sqrt(np.prod(extent) / places) if extent.all() else extent.max() / places
+    x = nodes[order, longer]
+    line = np.arange(m) - np.searchsorted(x, x - spacing * (1 - 1e-9), side="right") + 1
+    return order, int(line.max())

@@ -1,0 +1,1 @@
+"""The solvers of this project, one file per method."""

@@ -1,0 +1,180 @@
+"""Goldfarb–Idnani's dual active-set method with Powell's safeguards, on either form.
+
+Both forms have one shape in the space of the constraints. With u ≥ 0 the multipliers and s the
+slacks, s = s0 + G u, and the method looks for s ≥ 0, uᵀs = 0:
+
+    primal form:  constraints Aᵀx ≤ g   u = λ   s = g − Aᵀx   G = AᵀK⁻¹A = Q   s0 = −p
+    dual form:    constraints λ ≥ 0     u = y   s = λ         G = Q⁻¹          s0 = Q⁻¹p
+
+u = 0 is the unconstrained minimum, where Algorithm 1 starts. The pivots are Goldfarb and Idnani's;
+carried out here they need a factor of G_CC instead of their (n, n) matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.linalg as sla
+from numpy.typing import NDArray
+
+from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Matrix, Vector
+from solvers.active_set.contact_sets import ContactSets
+from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
+from solvers.active_set.growing_factor import GrowingFactor
+from solvers.active_set.solve import solve_from
+from solvers.base import FORMS, Answer, Form, Load, Problem, Solver, failed
+from solvers.kkt import checked
+from solvers.linear_algebra.inverse import inverse_with_factor
+
+FINISHING_SETS = 1000
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    problem: Problem
+    G: Matrix
+    factor: Matrix | None  # of Q, in the dual form
+
+
+class GoldfarbIdnani(Solver):
+    """Goldfarb–Idnani with Powell's safeguards.
+
+    Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) by more than
+    rounding explains. In the dual form the answer is then checked as it is returned: λ ≥ 0 and, with
+    y = Qλ − p, max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Q|λ)) mm make it "solved",
+    anything else "inaccurate". Iterations are changes of the active set. Where the rounding of Q⁻¹ leaves
+    it inaccurate, block principal pivoting goes on from its set (details: finishing_sets).
+
+    Options
+    -------
+    max_pivots : at most max_pivots · m changes of the active set.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = FORMS
+
+    def __init__(self, *, max_pivots: float = 10.0) -> None:
+        if not max_pivots > 0:
+            raise InputError.one("gi", "max_pivots", max_pivots, "must be positive")
+        self.max_pivots = max_pivots
+
+    def prepare(self, data: Problem) -> _Prepared | Answer:
+        """G: Q itself, or Q⁻¹ by the Cholesky factor of Q; where that cannot be, the answer that says so."""
+        if data.form == "primal":
+            return _Prepared(data, data.Q, None)
+        try:
+            inverse, U = inverse_with_factor(data.Q)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+        return _Prepared(data, inverse, U)
+
+    def solve(self, ready: _Prepared | Answer, load: Load, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
+        try:
+            return self._solved(ready, load, tolerance)
+        except np.linalg.LinAlgError as error:
+            return failed(str(error))
+
+    def _solved(self, ready: _Prepared, load: Load, tolerance: float) -> Answer:
+        data = ready.problem
+        slacks = _primal_slacks(ready, load) if ready.factor is None else _dual_slacks(ready, load)
+        limit = int(self.max_pivots * len(ready.G)) + 10
+        result = goldfarb_idnani(ready.G, slacks, tolerance, limit)
+        if not np.isfinite(result.u).all():
+            return failed("rounding: the multipliers are no longer finite", result.pivots)
+        details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
+        if ready.factor is None:
+            x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
+            return Answer(result.status, result.u, x, result.pivots, details=details)
+        if result.status == "inaccurate":
+            return _finished(ready, load, result, tolerance, details)
+        lam = _on_support(ready, load, slacks(result.u)[0], result)
+        status, residual = checked(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
+        if status == "inaccurate" and result.status == "solved":
+            return _finished(ready, load, result, tolerance, details)
+        details["kkt_residual_mm"] = residual
+        status = "solved" if status == "solved" else result.status
+        return Answer(status, lam, None, result.pivots, details=details)
+
+
+def _finished(
+    ready: _Prepared, load: Load, result: GiResult, tolerance: float, details: dict[str, Any]
+) -> Answer:
+    """Where the rounding of Q⁻¹ misleads the pivots: block pivoting from the set that they have reached."""
+    closed = np.ones(len(load.p), dtype=bool)
+    closed[result.active] = False
+    sets = ContactSets(ready.problem.Q, load.p, ready.G)
+    answer = solve_from(closed, sets, tolerance, FINISHING_SETS)
+    details |= {"finishing_sets": answer.iterations, "kkt_residual_mm": answer.details["kkt_residual_mm"]}
+    if answer.status == "solved":
+        details.pop("cause", None)
+    else:
+        details |= {"cause": answer.details["cause"]}
+    return replace(answer, iterations=result.pivots, details=details)
+
+
+def _primal_slacks(ready: _Prepared, load: Load) -> Slacks:
+    prepared, A = ready.problem.prepared, ready.problem.assembly.A
+
+    def slacks(u: Vector) -> tuple[Vector, Vector]:
+        """s = g − Aᵀx with x = K⁻¹(f − Au) refined by δ, and T = |g| + |A|ᵀ(|x| + max|δ|/ε).
+
+        δ, the rounding of the first solution, tells what that of the refined one may still be.
+        """
+        b = load.f - A @ u
+        x = prepared.solve_K(b)
+        delta = prepared.solve_K(b - prepared.assembly.multiply_K(x))
+        x = x + delta
+        return load.g - A.T @ x, abs(load.g) + abs(A).T @ (abs(x) + abs(delta).max() / EPS)
+
+    return slacks
+
+
+def _dual_slacks(ready: _Prepared, load: Load) -> Slacks:
+    Q, factor = ready.problem.Q, (ready.factor, False)
+
+    def slacks(u: Vector) -> tuple[Vector, Vector]:
+        """s = λ with Qλ = p + u, refined once.
+
+        εT with T = |Q⁻¹| (|p + u| + |Q| |λ|) bounds what the rounding of the residual moves it by.
+        """
+        lam = sla.cho_solve(factor, load.p + u, check_finite=False)
+        lam += sla.cho_solve(factor, load.p + u - Q @ lam, check_finite=False)
+        return lam, abs(ready.G) @ (abs(load.p + u) + abs(Q) @ abs(lam))
+
+    return slacks
+
+
+def _on_support(ready: _Prepared, load: Load, lam: Vector, result: GiResult) -> Vector:
+    """λ with λ_C = 0 exactly and Q_SS λ_S = p_S refined on the rest S, so that no rounding of λ_C is left.
+
+    With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). What is then negative, where a
+    contact is closed without a force, goes over to C.
+    """
+    C = result.active
+    while True:
+        lam = _refined(ready, load, lam, C, result.factor)
+        negative = np.flatnonzero(lam < 0)
+        if not negative.size:
+            return lam
+        for k in negative:
+            d = result.factor.solve_transposed(ready.G[C, k])
+            result.factor.append(d, float(np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))))
+            C = np.append(C, k)
+
+
+def _refined(ready: _Prepared, load: Load, lam: Vector, C: NDArray[np.intp], factor: GrowingFactor) -> Vector:
+    lam = lam.copy()
+    for _ in range(2):
+        lam[C] = 0.0
+        r = load.p - ready.problem.Q @ lam
+        r[C] = 0.0
+        v = sla.cho_solve((ready.factor, False), r, check_finite=False)
+        u = np.zeros_like(v)
+        u[C] = factor.solve(factor.solve_transposed(v[C]))
+        lam += v - ready.G @ u
+    lam[C] = 0.0
+    return lam

@@ -1,0 +1,232 @@
+"""The paper's primal–dual interior-point method on the dual form min ½λᵀQλ − pᵀλ, λ ≥ 0.
+
+As it comes: Algorithm 3 as printed (a full predictor step, then a second Newton system at the new
+point; so two matrices H an iteration), the systems solved by conjugate gradients preconditioned with
+V = U + √D (eq. 15), from the start of Algorithm 5. The options change one ingredient at a time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, get_args
+
+import numpy as np
+
+from problems.errors import Fault, InputError
+from problems.forms.assembly import LoadCase, Vector
+from solvers.base import Answer, Form, Load, Problem, Solver, Status, failed
+from solvers.interior_point.infeasible_start import mehrotra_start, stp1, stp2
+from solvers.interior_point.newton_system import SYSTEMS, NewtonSystem, OpenLast
+from solvers.interior_point.schemes import SCHEMES, CgExhausted, Newton, Point
+from solvers.interior_point.start import NoStart, Start, algorithm_4, algorithm_5
+
+STALLED = 10  # iterations without progress before the method gives up
+RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
+TOUCH = 0.1  # mm/N
+FEASIBLE = 1e-3  # mm/√(N·mm)
+EPS = float(np.finfo(float).eps)
+
+StartName = Literal["algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra"]
+Ordering = Literal["lexicographic", "open_last"]
+
+
+@dataclass(frozen=True)
+class _Ready:
+    """units : (m,) max_j |a_ji|, what a displacement of 1 mm is in the gap of contact i."""
+
+    problem: Problem
+    system: NewtonSystem
+    units: Vector
+
+
+class Ipm(Solver):
+    """Primal–dual interior point.
+
+    Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ feasibility with
+    s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance asked for; the paper tests μ alone, because it
+    solves its systems exactly. No feasibility is asked for below the rounding of Qλ − p, which is at most
+    4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). And it goes on until each contact is closed or open,
+    min(y_i, q_ii λ_i) / max_j |a_ji|, to that or √(0.1 mm/N · ε_μ): one that touches without a force
+    stands off by √(μ q_ii), which is more than ε_μ vouches for where the contact is soft; and a gap of
+    y_i is y_i / max_j |a_ji| of displacement, in whatever unit the contact is written.
+
+    Where the iteration stalls, because what inexact systems leave in s1 outlasts y or because a step ended
+    too near to the boundary, it begins anew with a smaller cg_tolerance and theta (details: restarts).
+
+    Options
+    -------
+    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra. Where the first two find no
+        feasible point, Mehrotra's, which need not be one (details: start_instead).
+    scheme : algorithm_3 as printed; algorithm_2, with a fixed σ; mehrotra, the textbook's.
+    preconditioner : V, U, none, splitting; direct is a Cholesky factorisation of every H instead.
+    ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by growing D.
+    theta : share of the step to the boundary, in (0, 1).
+    sigma : the centring of algorithm_2, in [0, 1].
+    rho : of stp1 and stp2, the residual allowed as a share of λᵀy. epsilon : of stp2, its least gap, mm.
+    cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
+    feasibility : mm; what inexact systems may leave in y = Qλ − p. By default 1e-3 √ε_μ: the error that μ
+        leaves goes with √μ as well.
+    max_iterations : of the scheme, each time it begins. max_cg : of the conjugate gradients in all.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+
+    def __init__(
+        self,
+        *,
+        start: StartName = "algorithm_5",
+        scheme: str = "algorithm_3",
+        preconditioner: str = "V",
+        ordering: Ordering = "lexicographic",
+        theta: float = 0.995,
+        sigma: float = 0.1,
+        rho: float = 0.1,
+        epsilon: float = 0.01,
+        cg_tolerance: float = 1e-3,
+        feasibility: float | None = None,
+        max_iterations: int = 200,
+        max_cg: float = np.inf,
+    ) -> None:
+        one_of = "one of "
+        rules: list[tuple[str, Any, bool, str]] = [
+            ("start", start, start in get_args(StartName), one_of + ", ".join(get_args(StartName))),
+            ("scheme", scheme, scheme in SCHEMES, one_of + ", ".join(SCHEMES)),
+            ("preconditioner", preconditioner, preconditioner in SYSTEMS, one_of + ", ".join(SYSTEMS)),
+            ("ordering", ordering, ordering in get_args(Ordering), one_of + ", ".join(get_args(Ordering))),
+            ("ordering", ordering, ordering != "open_last" or preconditioner == "V", "open_last is for V"),
+            ("theta", theta, 0 < theta < 1, "must lie in (0, 1)"),
+            ("sigma", sigma, 0 <= sigma <= 1, "must lie in [0, 1]"),
+            ("rho", rho, rho > 0, "must be positive"),
+            ("epsilon", epsilon, epsilon > 0, "must be positive, mm"),
+            ("cg_tolerance", cg_tolerance, 0 < cg_tolerance < 1, "must lie in (0, 1)"),
+            ("feasibility", feasibility, feasibility is None or feasibility > 0, "must be positive, mm"),
+            ("max_iterations", max_iterations, max_iterations >= 1, "must be at least 1"),
+            ("max_cg", max_cg, max_cg >= 1, "must be at least 1"),
+        ]
+        faults = [Fault("ipm", key, value, allowed) for key, value, holds, allowed in rules if not holds]
+        if faults:
+            raise InputError(faults)
+        self.start = start
+        self.scheme = SCHEMES[scheme]
+        self.make_system = OpenLast if ordering == "open_last" else SYSTEMS[preconditioner]
+        self.theta = theta
+        self.sigma = sigma
+        self.rho = rho
+        self.epsilon = epsilon
+        self.cg_tolerance = cg_tolerance
+        self.feasibility = feasibility
+        self.max_iterations = max_iterations
+        self.max_cg = max_cg
+
+    def prepare(self, data: Problem) -> _Ready | Answer:
+        """What is factored of Q once; where that cannot be, the answer that says so."""
+        units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
+        try:
+            return _Ready(data, self.make_system(data.Q), units)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+
+    def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
+        Q, system = ready.problem.Q, ready.system
+        system.begin()
+        newton = Newton(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
+        details: dict[str, Any] = {"cg": newton.counts}
+        try:
+            start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
+        except (NoStart, np.linalg.LinAlgError) as error:
+            return failed(str(error), iterations=0)
+        first = newton.at(start.lam, start.y)  # step 3
+        details["start"] = _about(start, first)
+        status, cause, point = self._iterate(newton, first, tolerance, ready.units)
+        for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
+            if status != "inaccurate":
+                break
+            newton.cg_tolerance = min(newton.cg_tolerance, cg_tolerance)
+            newton.theta = min(newton.theta, theta)
+            status, cause, point = self._iterate(newton, first, tolerance, ready.units)
+            details["restarts"] = restart
+        if newton.unconverged:
+            details["cg_unconverged"] = newton.unconverged
+        details |= {"mu": point.mu, "infeasibility": point.infeasibility}
+        details |= {"factorisations": system.factorisations} | ({"cause": cause} if cause else {})
+        return Answer(
+            status,
+            point.lam if status != "failed" else None,
+            iterations=len(newton.counts["predictor"]),
+            inner_iterations=sum(map(sum, newton.counts.values())),
+            details=details,
+        )
+
+    def _start(self, problem: Problem, load: Load, details: dict[str, Any]) -> Start:
+        match self.start:
+            case "stp1":
+                return stp1(problem.Q, load.p, self.rho)
+            case "stp2":
+                return stp2(problem.Q, load.p, self.rho, self.epsilon)
+            case "mehrotra":
+                return mehrotra_start(problem.Q, load.p)
+        try:
+            if self.start == "algorithm_4":
+                return algorithm_4(problem.prepared, LoadCase(load.f, load.g))
+            return algorithm_5(problem.Q, load.p)
+        except NoStart as error:
+            details["start_instead"] = f"mehrotra, because {error}"
+            return mehrotra_start(problem.Q, load.p)
+
+    def _iterate(
+        self, newton: Newton, point: Point, tolerance: float, units: Vector
+    ) -> tuple[Status, str, Point]:
+        """Algorithm 3, steps 4 to 8; the last finite point with what is to be said of it."""
+        feasibility = self.feasibility or FEASIBLE * np.sqrt(tolerance)
+        smallest, stalled = np.inf, 0
+        for _ in range(self.max_iterations):  # step 4
+            rounding = _rounding(newton, point.lam)
+            measure = max(
+                point.mu / tolerance,
+                point.infeasibility / max(feasibility, rounding),
+                _undecided(newton, point, units) / max(np.sqrt(TOUCH * tolerance), rounding),
+            )
+            if measure <= 1:
+                return "solved", "", point
+            stalled = 0 if measure < smallest else stalled + 1
+            smallest = min(smallest, measure)
+            if stalled == STALLED or point.mu == 0.0:
+                why = f"{newton.unconverged} systems of unconverged CG" if newton.unconverged else "rounding"
+                return "inaccurate", f"{why}: {smallest:.1e} × what was asked for, and no less", point
+            try:
+                following = self.scheme(newton, point)  # steps 5 to 7
+            except CgExhausted:
+                return "iteration_limit", f"all of max_cg = {self.max_cg:g} CG iterations are spent", point
+            except np.linalg.LinAlgError as error:
+                return "inaccurate", f"Q + D is no longer positive definite: {error}", point
+            if not _is_inside(following):
+                return "failed", "λ or y is no longer finite and positive", point
+            point = following
+        return "iteration_limit", f"max_iterations = {self.max_iterations}", point
+
+
+def _about(start: Start, point: Point) -> dict[str, float]:
+    return {
+        "mu": point.mu,
+        "infeasibility_mm": float(abs(point.s1).max()),
+        "corrections": start.corrections,
+        "multiplications": start.multiplications,
+    }
+
+
+def _undecided(newton: Newton, point: Point, units: Vector) -> float:
+    """max min(y_i, q_ii λ_i) / max_j |a_ji|: how far from closed and from open a contact may be, mm."""
+    return float((np.minimum(point.y, np.diag(newton.Q) * point.lam) / units).max())
+
+
+def _rounding(newton: Newton, lam: Vector) -> float:
+    """What rounding may leave in Qλ − p, mm."""
+    root = np.sqrt(np.diag(newton.Q))
+    return 4 * EPS * float((abs(newton.p) + root * (root @ lam)).max())
+
+
+def _is_inside(point: Point) -> bool:
+    values: Vector = np.concatenate([point.lam, point.y])
+    return bool(np.isfinite(values).all() and (values > 0).all())
