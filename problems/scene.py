@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -22,11 +21,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from problems.input.validation import UNITS, unknown, validation_faults
-from problems.manufactured.ladder import PREFIX, Made, Rung, make_rung, rung_names
+from problems.manufactured.ladder import PREFIX, make_rung, rung_names
 from problems.model.effect import Effect, Pair, StiffnessEffect
 from problems.model.effect_tables import EffectTable
-from problems.model.joint import Joint, Table
-from problems.storage.cache import digest
+from problems.model.joint import Joint
+from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 
 from .errors import Fault, InputError
 
@@ -35,60 +34,6 @@ SCENES = HERE / "scenes"
 ASSEMBLIES = HERE / "assemblies"
 KEYS = ("title", "assembly", "joint", "effect", "matrices")
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A checked scene: a joint with effects, the files of a user's own matrices, or a ladder's rung."""
-
-    name: str
-    title: str
-    joint: Joint | None = None
-    effects: tuple[Effect, ...] = ()
-    matrices: tuple[tuple[str, Path], ...] = ()
-    rung: Rung | None = None
-
-    @property
-    def made(self) -> Made | None:
-        """The matrices of a rung that no plates make."""
-        return self.rung.made if self.rung else None
-
-    @property
-    def refused(self) -> str:
-        """Words of the InputError that building a rung is to end with, "" where it is not."""
-        return self.rung.refused if self.rung else ""
-
-    @property
-    def stiffness_effects(self) -> list[StiffnessEffect]:
-        return [effect for effect in self.effects if isinstance(effect, StiffnessEffect)]
-
-    @property
-    def assembly_key(self) -> str:
-        """Hash of everything that determines K and A."""
-        if self.made:
-            assembly = self.made.assembly
-            A = assembly.A
-            arrays = (*assembly.blocks, A.data, A.indices, A.indptr)
-            return digest([assembly.n, assembly.m], *(array.tobytes() for array in arrays))
-        if self.joint is None:
-            keys = [key for key, _ in self.matrices]
-            return digest(keys, *(path.read_bytes() for _, path in self.matrices))
-        return digest(plain(self.joint), [plain(effect) for effect in self.stiffness_effects])
-
-    @property
-    def key(self) -> str:
-        """Hash of everything that determines K, A, f and g."""
-        if self.made:
-            return digest(self.assembly_key, self.made.load.f.tobytes(), self.made.load.g.tobytes())
-        loads = [plain(effect) for effect in self.effects if not isinstance(effect, StiffnessEffect)]
-        return digest(self.assembly_key, loads)
-
-    @property
-    def expected_size(self) -> tuple[int, int] | None:
-        """(n, m) without building anything; None for a user's own matrices."""
-        if self.made:
-            return self.made.assembly.n, self.made.assembly.m
-        return self.joint.size if self.joint else None
 
 
 def scene_names() -> list[str]:
@@ -108,7 +53,7 @@ def read_scene(name_or_path: str) -> Scene:
     if path.suffix == ".npz":
         if not path.is_file():
             raise InputError.one(path, "scene", name_or_path, "no such file")
-        return Scene(path.stem, f"own matrices {path.name}", matrices=(("problem", path),))
+        return MatricesScene(path.stem, f"own matrices {path.name}", (("problem", path),))
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
@@ -122,7 +67,10 @@ def _rung_scene(name: str) -> Scene:
     if name not in rung_names():
         raise _no_such(name, rung_names())
     rung = make_rung(name)
-    return Scene(name, rung.title, rung.joint, rung.effects, rung=rung)
+    if rung.made:
+        return MadeScene(name, rung.title, rung.made, on_ladder=True, refused=rung.refused)
+    assert rung.joint is not None
+    return JointScene(name, rung.title, rung.joint, rung.effects, on_ladder=True, refused=rung.refused)
 
 
 def _no_such(name: str, known: list[str]) -> InputError:
@@ -164,7 +112,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
             faults += _floating(joint_path, joint, effects)
     if faults or joint is None:
         raise InputError(faults)
-    return Scene(name, title, joint, effects)
+    return JointScene(name, title, joint, effects)
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:
@@ -255,9 +203,4 @@ def _matrices_scene(name: str, title: str, path: Path, data: dict[str, Any]) -> 
         faults.append(Fault(str(path), "matrices", sorted(table), "K, A, f and g, or problem alone"))
     if faults:
         raise InputError(faults)
-    return Scene(name, title, matrices=tuple(files))
-
-
-def plain(table: Table) -> dict[str, Any]:
-    """What a key is made of."""
-    return table.model_dump(mode="json")
+    return MatricesScene(name, title, tuple(files))

@@ -1,18 +1,18 @@
 """What a solver is: up to five steps from the problem's data to an answer.
 
-    convert(problem)             once an assembly   data into the library's own format
-    prepare(data)                once an assembly   factorisations
-    setup(state, load, tol)      once a load case   the library's own set-up
-    solve(ready, load, tol)      once a load case   the answer
+    convert(problem)             once per assembly    data into the library's own format
+    prepare(data)                once per assembly    factorisations
+    setup(state, load, tol)      once per load case   the library's own set-up
+    solve(ready, load, tol)      once per load case   the answer
 
 In a series of load cases on one assembly the first is set up so, and each that follows by
 
-    update(state, ready, load, tol, near)           in the place of setup: the library's own way to the
-                                                    next load case, a warm start
+    update(state, ready, load, tol, start)          instead of setup: the library's own way to the next
+                                                    load case, a warm start
 
-or, where a solver has `together(state)`, some at a time by what that returns.
+or, if a solver has `batched(state)`, several at a time by the function that it returns.
 
-Only `solve` must be written; each of the others hands on what it was given, and `update` sets up anew.
+Only `solve` must be written; each of the others passes on what it was given, and `update` sets up anew.
 The harness calls and times them; a solver never reads a clock, scores itself or knows of limits.
 """
 
@@ -23,44 +23,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
-from problems.forms.assembly import Assembly, Matrix, Prepared, Vector
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.names import FORMS, Form
+from problems.forms.problem import Problem
 
-Form = Literal["primal", "dual"]
-FORMS: tuple[Form, Form] = ("primal", "dual")
+__all__ = [
+    "FORMS",
+    "Answer",
+    "Batch",
+    "Form",
+    "LoadCase",
+    "Problem",
+    "Solver",
+    "Status",
+    "WarmStart",
+    "failed",
+]
 
 #: What a solver may say of its own answer.
 Status = Literal["solved", "inaccurate", "iteration_limit", "failed"]
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A prepared assembly in one of its two forms.
-
-    primal: min ½xᵀKx − fᵀx, Aᵀx ≤ g    K = blockdiag(assembly.blocks), A sparse
-    dual:   min ½λᵀQλ − pᵀλ, λ ≥ 0       Q dense
-
-    The arrays are memory-mapped and read-only.
-    """
-
-    prepared: Prepared
-    form: Form
-
-    @property
-    def assembly(self) -> Assembly:
-        return self.prepared.assembly
-
-    @property
-    def Q(self) -> Matrix:
-        return self.prepared.Q
-
-
-@dataclass(frozen=True)
-class Load:
-    """One load case: f (n,) in N, g (m,) in mm, and p = AᵀK⁻¹f − g (m,) in mm for the dual form."""
-
-    f: Vector
-    g: Vector
-    p: Vector
 
 
 @dataclass(frozen=True)
@@ -89,18 +70,18 @@ def failed(cause: str, iterations: int | None = None) -> Answer:
     return Answer("failed", None, iterations=iterations, details={"cause": cause})
 
 
-#: Takes many load cases of one assembly at once, and a tolerance: an answer to each load, in their order.
-Together = Callable[[Sequence[Load], float], list[Answer]]
+#: Takes several load cases of one assembly, and a tolerance: an answer to each, in their order.
+Batch = Callable[[Sequence[LoadCase], float], list[Answer]]
 
 
 @dataclass(frozen=True)
-class Near:
-    """The answer of the solved load case that is nearest to the one to come.
+class WarmStart:
+    """The answer of the solved load case that is nearest to the next one.
 
     load : that case. lam : (m,) N. gap : (m,) mm, y = g − Aᵀx = Qλ − p. x : (n,) mm; None in the dual form.
     """
 
-    load: Load
+    load: LoadCase
     lam: Vector
     gap: Vector
     x: Vector | None = None
@@ -111,6 +92,8 @@ class Solver(ABC):
 
     #: The forms that the solver takes.
     forms: ClassVar[tuple[Form, ...]] = FORMS
+    #: The distribution that solves, if it has another name than the solver.
+    distribution: ClassVar[str | None] = None
 
     def convert(self, problem: Problem) -> Any:
         return problem
@@ -118,23 +101,23 @@ class Solver(ABC):
     def prepare(self, data: Any) -> Any:
         return data
 
-    def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+    def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
         return state
 
-    def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+    def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """What `solve` takes for a further load case of the same assembly and tolerance.
 
         state : from `prepare`. ready : from `setup` or `update` for the case solved before this one, which
-        may be changed and returned. near : where a warm start may begin; the case before is another one.
+        may be changed and returned. start : where a warm start may begin; the case before is another one.
         """
         return self.setup(state, load, tolerance)
 
-    def together(self, state: Any) -> Together | None:
-        """What takes many load cases of the assembly at once; None where there is no such way.
+    def batched(self, state: Any) -> Batch | None:
+        """What takes several load cases of the assembly at once; None if there is no such way.
 
         state : from `prepare`.
         """
         return None
 
     @abstractmethod
-    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer: ...
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer: ...

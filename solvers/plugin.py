@@ -7,6 +7,7 @@ import inspect
 import sys
 import traceback
 from pathlib import Path
+from types import ModuleType
 
 from problems.errors import InputError
 
@@ -36,10 +37,18 @@ def load_plugin(path: Path) -> type[Solver]:
         line = traceback.extract_tb(error.__traceback__)[-1].lineno
         message = f"importing the file failed with {type(error).__name__}: {error}"
         raise InputError.one(path, f"line {line}", type(error).__name__, message) from error
+    return solver_class(module, path)
+
+
+def solver_class(module: ModuleType, path: Path) -> type[Solver]:
+    """The one subclass of Solver that a module defines; imported and abstract classes do not count.
+
+    Raises InputError if there is none, or more than one.
+    """
     own = [
         cls
         for cls in vars(module).values()
-        if inspect.isclass(cls) and issubclass(cls, Solver) and cls.__module__ == name
+        if inspect.isclass(cls) and issubclass(cls, Solver) and cls.__module__ == module.__name__
     ]
     complete = [cls for cls in own if not inspect.isabstract(cls)]
     if len(complete) == 1:

@@ -1,7 +1,7 @@
-"""The solvers by name. A new one is one file and one line in SOLVERS.
+"""The solvers by name. A new one is one file: in methods if the method is written here, else in libraries.
 
-What qpsolvers finds besides comes by its name there, and a user's own solver from a file (plugin.py),
-under the name of that file without `.py`.
+The file's name, with - for _, is the solver's; its one subclass of Solver is the solver. What qpsolvers finds
+besides has its name there, and a user's own solver from a file (plugin.py) is called like that file.
 """
 
 from __future__ import annotations
@@ -9,8 +9,10 @@ from __future__ import annotations
 import hashlib
 import importlib
 import inspect
+import pkgutil
 from collections.abc import Callable
 from difflib import get_close_matches
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -18,28 +20,32 @@ from typing import Any
 from problems.errors import Fault, InputError
 
 from .base import Solver
-from .plugin import load_plugin
+from .plugin import load_plugin, solver_class
 
-#: name → module:class, imported when asked for.
-SOLVERS = {
-    "ipm": "solvers.methods.ipm:Ipm",
-    "gi": "solvers.methods.gi:GoldfarbIdnani",
-    "newton": "solvers.methods.newton:ActiveSetNewton",
-    "ipm-fast": "solvers.methods.ipm_fast:FastIpm",
-    "osqp": "solvers.libraries.osqp:Osqp",
-    "clarabel": "solvers.libraries.clarabel:Clarabel",
-    "proxqp": "solvers.libraries.proxqp:ProxQp",
-    "piqp": "solvers.libraries.piqp:Piqp",
-}
+METHODS, LIBRARIES = "solvers.methods", "solvers.libraries"
+#: The one file that stands for many solvers: all that qpsolvers finds.
+MANY = "qpsolvers"
 
-IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
-#: Where the distribution that is installed has another name than the solver.
-DISTRIBUTIONS = dict.fromkeys(IN_HOUSE, "rivetbench") | {"proxqp": "proxsuite", "highs": "highspy"}
+
+@cache
+def modules() -> dict[str, str]:
+    """Solver → module, not yet imported: the methods of this project, then the libraries."""
+    found: dict[str, str] = {}
+    for package in (METHODS, LIBRARIES):
+        path = importlib.import_module(package).__path__
+        names = sorted(module.name for module in pkgutil.iter_modules(path) if module.name != MANY)
+        found |= {name.replace("_", "-"): f"{package}.{name}" for name in names}
+    return found
+
+
+def in_house(name: str) -> bool:
+    """Whether the method is written in this project."""
+    return modules().get(name, "").startswith(METHODS)
 
 
 def solver_names() -> list[str]:
     """In-house solvers, libraries, then the others that qpsolvers finds."""
-    return [*SOLVERS, *_found_by_qpsolvers()]
+    return [*modules(), *_found_by_qpsolvers()]
 
 
 def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) -> Solver:
@@ -66,30 +72,37 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
     if plugin is not None and name == plugin.stem:
         return "sha256:" + hashlib.sha256(plugin.read_bytes()).hexdigest()[:12]
     try:
-        return version(DISTRIBUTIONS.get(name, name))
+        return version(_distribution(name))
     except PackageNotFoundError:
         return "unknown"
+
+
+def _distribution(name: str) -> str:
+    """What the package that solves is called where it is installed."""
+    if in_house(name):
+        return "rivetbench"
+    if name in modules():
+        return _class_of(name).distribution or name
+    from .libraries.qpsolvers import DISTRIBUTIONS
+
+    return DISTRIBUTIONS.get(name, name)
 
 
 def _found_by_qpsolvers() -> list[str]:
     import qpsolvers  # imports every solver that there is, which takes its time
 
-    return sorted(set(qpsolvers.available_solvers) - set(SOLVERS))
+    return sorted(set(qpsolvers.available_solvers) - set(modules()))
 
 
 def _factory(name: str, plugin: Path | None) -> Callable[..., Solver]:
     if plugin is not None and name == plugin.stem:
-        if name in SOLVERS:
+        if name in modules():
             raise InputError.one(plugin, "name", name, "is taken by a solver of the package: rename the file")
         return load_plugin(plugin)
-    if name in SOLVERS:
-        module, _, attribute = SOLVERS[name].partition(":")
-        try:
-            return getattr(importlib.import_module(module), attribute)
-        except ImportError as error:
-            raise InputError.one("solvers", "name", name, f"cannot be imported here ({error})") from error
+    if name in modules():
+        return _class_of(name)
     if name in _found_by_qpsolvers():
-        from solvers.libraries.qpsolvers import QpSolvers
+        from .libraries.qpsolvers import QpSolvers
 
         def by_name() -> Solver:
             return QpSolvers(name)
@@ -99,6 +112,14 @@ def _factory(name: str, plugin: Path | None) -> Callable[..., Solver]:
     close = get_close_matches(name, known, 1)
     hint = f"did you mean {close[0]!r}? " if close else ""
     raise InputError.one("solvers", "name", name, f"no such solver: {hint}there are {', '.join(known)}")
+
+
+def _class_of(name: str) -> type[Solver]:
+    try:
+        module = importlib.import_module(modules()[name])
+    except ImportError as error:
+        raise InputError.one("solvers", "name", name, f"cannot be imported here ({error})") from error
+    return solver_class(module, Path(str(module.__file__)))
 
 
 def _unknown_options(where: str, factory: Callable[..., Solver], options: dict[str, Any]) -> list[Fault]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from problems.model.effect import Effect
+from problems.model.effect import Effect, TieEffect
 from problems.model.joint import Joint
-from problems.scene import Scene
+from problems.model.scene import JointScene
 
 
 def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> Joint:
@@ -18,8 +20,23 @@ def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> J
     return Joint.model_validate({"junction": data, "part": part, "contacts": contacts})
 
 
-def make_scene(joint: Joint, *effects: Effect) -> Scene:
-    return Scene("small", "small", joint, effects)
+def make_scene(joint: Joint, *effects: Effect) -> JointScene:
+    return JointScene("small", "small", joint, effects)
+
+
+def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From here on every matrix has to come from the cache."""
+    for stage in (
+        "condensation.condense.condense",
+        "forms.factorisation.factor",
+        "forms.factorisation.schur",
+    ):
+        monkeypatch.setattr(f"problems.{stage}", lambda *_: pytest.fail("built a second time"))
+
+
+def untied(scene: JointScene) -> JointScene:
+    """The scene without its springs between parts."""
+    return replace(scene, effects=tuple(e for e in scene.effects if not isinstance(e, TieEffect)))
 
 
 def dof(nx: int, ix: int, iy: int, dx: int = 0, dy: int = 0) -> int:

@@ -10,32 +10,32 @@ import scipy.linalg as sla
 import scipy.optimize
 import scipy.sparse as sp
 
-from harness.conformance.trials import contact_rows, prepared_from, stiffness
-from problems.forms.assembly import LoadCase, Prepared, Vector
-from solvers.base import Load
+from harness.conformance.trials import contact_rows, stiffness
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import Prepared
 
 
 def make_prepared(seed: int, pairs: int, tools: int = 0) -> Prepared:
     """Two parts in contact at `pairs` nodes, the first one also with `tools` rigid supports."""
     random = np.random.default_rng(seed)
     blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
-    return prepared_from(blocks, contact_rows(pairs, tools))
+    return Prepared(Assembly(blocks, contact_rows(pairs, tools)))
 
 
 def make_strips(elements: int) -> Prepared:
     """Two strings under tension on elastic beds (N/mm), a contact at each node: condition number ≈ 1e3."""
     main, side = np.full(elements, 2e3 + 2.0), np.full(elements - 1, -1e3)
     K = np.diag(main) + np.diag(side, 1) + np.diag(side, -1)
-    return prepared_from((K, 0.5 * K), contact_rows(elements, 0))
+    return Prepared(Assembly((K, 0.5 * K), contact_rows(elements, 0)))
 
 
-def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, Load]:
+def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, LoadCase]:
     """Random forces (N) and gaps (mm)."""
     random = np.random.default_rng(seed)
     f = random.normal(0, force, prepared.assembly.n)
     g = random.uniform(0.01, 0.5, prepared.assembly.m)
     case = LoadCase(f, g)
-    return case, Load(f, g, prepared.dual_load(case))
+    return case, LoadCase(f, g, prepared.dual_load(case))
 
 
 def solve_by_nnls(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.forms.assembly import LoadCase, Prepared, Vector
-from solvers.base import Answer, Form, Load, Problem
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.base import Answer, Form
 from solvers.registry import make_solver, solver_names
 
 CASES: list[tuple[str, Form]] = [
@@ -23,8 +25,8 @@ ACTIVE_SET = ("gi", "newton", "ipm-fast", "quadprog", "daqp")
 def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Answer, Vector | None]:
     """The solver's answer, and its displacements where it has any."""
     solver, tolerance = make_solver(name, {}), TOLERANCES.get(name, 1e-9)
-    load = Load(case.f, case.g, prepared.dual_load(case))
-    state = solver.prepare(solver.convert(Problem(prepared, form)))
+    load = LoadCase(case.f, case.g, prepared.dual_load(case))
+    state = solver.prepare(solver.convert(in_form(prepared, form)))
     answer = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
     if answer.lam is None or form == "primal":
         return answer, answer.x

@@ -13,8 +13,9 @@ import scipy.sparse as sp
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.conformance.check import run
-from solvers.base import FORMS, Form, Problem
-from solvers.libraries.adapter import Converted, answer, dense, upper_triangle
+from problems.forms.problem import in_form
+from solvers.adapter import Converted, answer, dense, upper_triangle
+from solvers.base import FORMS, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
 from solvers.libraries.clarabel import Clarabel
 from solvers.libraries.osqp import Osqp
@@ -55,7 +56,7 @@ def test_agrees_with_nnls(name: str, options: dict[str, Any], form: Form, kind: 
         "strips": lambda: make_strips(40),
     }[kind]()
     solver = make_solver(name, options)
-    state = solver.prepare(solver.convert(Problem(prepared, form)))
+    state = solver.prepare(solver.convert(in_form(prepared, form)))
     for seed in (3, 4):
         case, load = make_load(seed, prepared)
         expected_x, expected_lam = solve_by_nnls(prepared, case)
@@ -109,7 +110,7 @@ def test_nnls_agrees_with_trying_every_active_set() -> None:
 def library_of(solver: Any, form: Form, tolerance: float) -> Any:
     prepared = make_prepared(9, 4)
     _, load = make_load(10, prepared)
-    return solver.setup(solver.prepare(solver.convert(Problem(prepared, form))), load, tolerance)[1]
+    return solver.setup(solver.prepare(solver.convert(in_form(prepared, form))), load, tolerance)[1]
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -158,7 +159,7 @@ def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy(name: str, form:
     errors, iterations = [], []
     for tolerance in (1e-1, 1e-9):
         solver = make_solver(name, {})
-        state = solver.prepare(solver.convert(Problem(prepared, form)))
+        state = solver.prepare(solver.convert(in_form(prepared, form)))
         got = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
         assert got.lam is not None
         x = got.x if form == "primal" else prepared.recover(got.lam, case)
@@ -181,7 +182,7 @@ def test_tolerance_reaches_qpsolvers(name: str, monkeypatch: pytest.MonkeyPatch)
     prepared = make_prepared(12, 4)
     _, load = make_load(13, prepared)
     solver = QpSolvers(name)
-    got = solver.solve(solver.setup(solver.convert(Problem(prepared, "dual")), load, 3e-7), load, 3e-7)
+    got = solver.solve(solver.setup(solver.convert(in_form(prepared, "dual")), load, 3e-7), load, 3e-7)
     assert 3e-7 in seen.values()
     assert "tolerance" not in got.details
 
@@ -190,7 +191,7 @@ def test_a_solver_that_takes_no_tolerance_says_so() -> None:
     prepared = make_prepared(12, 4)
     _, load = make_load(13, prepared)
     solver = QpSolvers("quadprog")
-    ready = solver.setup(solver.convert(Problem(prepared, "primal")), load, 1e-9)
+    ready = solver.setup(solver.convert(in_form(prepared, "primal")), load, 1e-9)
     assert solver.solve(ready, load, 1e-9).details["tolerance"] == "not taken"
 
 
@@ -245,14 +246,15 @@ def test_a_stopped_solver_does_not_say_solved(
     prepared = make_strips(40)
     _, load = make_load(15, prepared)
     solver = make_solver(name, {})
-    got = solver.solve(solver.setup(solver.convert(Problem(prepared, "primal")), load, 1e-300), load, 1e-300)
+    got = solver.solve(solver.setup(solver.convert(in_form(prepared, "primal")), load, 1e-300), load, 1e-300)
     assert got.status != "solved"
 
 
 def test_linear_term_has_the_sign_of_the_libraries() -> None:
-    _, load = make_load(16, make_prepared(16, 3))
-    np.testing.assert_array_equal(Converted("primal", None).q(load), -load.f)
-    np.testing.assert_array_equal(Converted("dual", None).q(load), -load.p)
+    prepared = make_prepared(16, 3)
+    _, load = make_load(16, prepared)
+    np.testing.assert_array_equal(Converted(in_form(prepared, "primal"), None).q(load), -load.f)
+    np.testing.assert_array_equal(Converted(in_form(prepared, "dual"), None).q(load), -load.p)
 
 
 def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
@@ -263,7 +265,7 @@ def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
     answers = {}
     for polishing in (False, True):
         solver = Osqp(polishing=polishing)
-        ready = solver.setup(solver.convert(Problem(prepared, "dual")), load, 1e-9)
+        ready = solver.setup(solver.convert(in_form(prepared, "dual")), load, 1e-9)
         answers[polishing] = solver.solve(ready, load, 1e-9)
     polished = answers[True]
     assert polished.details == {"status": "solved", "polish": "accepted"}
@@ -275,6 +277,6 @@ def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
 
 def test_sparse_rows_have_the_orientation_of_the_libraries() -> None:
     prepared = make_prepared(17, 3, 2)
-    rows = Clarabel().convert(Problem(prepared, "primal")).rows
+    rows = Clarabel().convert(in_form(prepared, "primal")).G
     assert sp.issparse(rows)
     assert rows.shape == (prepared.assembly.m, prepared.assembly.n)

@@ -12,9 +12,9 @@ from joints import make_joint, make_scene
 from numpy.typing import NDArray
 from skfem.helpers import dd, ddot, eye, trace
 
+from problems.build import load_case, prepared
 from problems.effects.self_weight import SelfWeight
 from problems.effects.supports import Supports
-from problems.prepare import load_case, prepared
 
 LENGTH, SOUTH, NORTH, THICKNESS = 300.0, -200.0, 200.0, 3.0  # mm
 SPRINGS = {(0.0, SOUTH): 50.0, (LENGTH, SOUTH): 200.0, (0.0, NORTH): 120.0, (LENGTH, NORTH): 80.0}  # N/mm
@@ -31,7 +31,7 @@ def ours() -> NDArray[np.float64]:
     ]
     scene = make_scene(joint, SelfWeight(kind="self_weight", part="a"), *springs)
     data = prepared(scene)
-    x = data.solve_K(load_case(scene, data).f)
+    x = data.solve_K(load_case(scene).f)
     at = [int(np.flatnonzero((joint.nodes == point).all(axis=1))[0]) for point in POINTS]
     return np.asarray(x[at])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,11 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints import make_joint, make_scene
+from joints import forbid_building, make_joint, make_scene
 
 from problems import build
 from problems.effects.supports import Supports
 from problems.errors import InputError
+from problems.scene import read_scene
 from problems.storage import cache, fingerprint
 from problems.storage.fingerprint import ROOT
 
@@ -120,12 +120,9 @@ def test_what_a_killed_writer_leaves_is_not_seen(root: Path, monkeypatch: pytest
 def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     steps: list[str] = []
     first = build.prepared(SCENE, lambda text, _: steps.append(text))
+    assert first.Q.shape == (20, 20)
     assert len(steps) > 3
-
-    def fail(*_: object) -> None:
-        pytest.fail("built a second time")
-
-    monkeypatch.setattr(build, "_build", fail)
+    forbid_building(monkeypatch)
     second = build.prepared(SCENE, lambda text, _: pytest.fail(text))
     for one, other in zip(first.assembly.blocks, second.assembly.blocks, strict=True):
         np.testing.assert_array_equal(one, other)
@@ -152,34 +149,45 @@ def test_prepared_holds_what_it_says() -> None:
 
 
 def test_a_truncated_part_of_a_scene_stops_the_run(root: Path) -> None:
-    build.prepared(SCENE)
-    path = root / build.cache_key(SCENE) / "Q.npy"
+    made = build.prepared(SCENE)
+    assert made.Q.size
+    path = root / made.Q_key / "Q.npy"
     path.write_bytes(path.read_bytes()[:-16])
     with pytest.raises(InputError, match=r"Q\.npy"):
-        build.prepared(SCENE)
+        _ = build.prepared(SCENE).Q
+
+
+def with_more(text: str, edited: Path) -> Callable[[Path], bytes]:
+    """Path.read_bytes, as if that text stood at the end of one file."""
+    read = Path.read_bytes
+    return lambda path: read(path) + text.encode() if path == edited else read(path)
+
+
+OWN = "input.user_matrices"  # makes a user's matrices, no joint's
 
 
 @pytest.mark.parametrize(
     "module",
     [
-        *("fem.hermite", "fem.plate", "condensation.condense", "model.joint", "input.user_matrices"),
-        *("forms.assembly", "build", "effects.supports"),
+        *("fem.hermite", "fem.plate", "condensation.condense", "condensation.condensed_part"),
+        *("model.joint", "model.part", "forms.factorisation", "forms.stages", "effects.supports", OWN),
     ],
 )
 def test_a_change_of_the_code_that_builds_changes_the_key(
-    module: str, monkeypatch: pytest.MonkeyPatch
+    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    parse, key = ast.parse, build.cache_key(SCENE)
-    edited = (ROOT / "problems" / module.replace(".", "/")).with_suffix(".py").read_bytes()
+    np.savez(tmp_path / "own.npz", K=np.eye(2), A=np.eye(2)[:, :1], f=np.ones(2), g=np.ones(1))
+    scene = read_scene(str(tmp_path / "own.npz")) if module == OWN else SCENE
+    edited = (ROOT / "problems" / module.replace(".", "/")).with_suffix(".py")
+    key = build.prepared(scene).key
     monkeypatch.setattr(fingerprint, "_read", fingerprint._read.__wrapped__)
-
-    def with_more(text: str) -> Callable[[bytes], ast.Module]:
-        return lambda code: parse(code + text.encode() if code == edited else code)
-
-    monkeypatch.setattr(ast, "parse", with_more("\n# words\n"))
-    assert build.cache_key(SCENE) == key
-    monkeypatch.setattr(ast, "parse", with_more("\nMORE = 1\n"))
-    assert build.cache_key(SCENE) != key
+    monkeypatch.setattr(Path, "read_bytes", with_more("\n# words\n", edited))
+    assert build.prepared(scene).key == key
+    monkeypatch.undo()
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(fingerprint, "_read", fingerprint._read.__wrapped__)
+    monkeypatch.setattr(Path, "read_bytes", with_more("\nMORE = 1\n", edited))
+    assert build.prepared(scene).key != key
 
 
 def test_a_folder_that_cannot_be_made(root: Path) -> None:

@@ -15,7 +15,8 @@ from harness.verification.certificate import certify
 from harness.verification.definite import smallest_eigenvalue
 from harness.verification.exact_residual import Double
 from harness.verification.reference import refined_active_set
-from problems.forms.assembly import Assembly, LoadCase, Prepared
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
 
 GROUPS, EACH = 40, 75  # random problems in all: their product
 

@@ -13,7 +13,7 @@ from small import make_prepared
 from harness.conformance.check import run
 from harness.conformance.trials import known_case, trials
 from problems.forms.assembly import LoadCase
-from solvers.base import Answer, Form, Load, Near, Problem, Solver
+from solvers.base import Answer, Form, Problem, Solver, WarmStart
 from solvers.registry import make_solver
 
 
@@ -29,19 +29,19 @@ class Sound(Solver):
         self.problem = problem
         return self.inner.convert(problem)
 
-    def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+    def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
         return self.inner.setup(state, load, tolerance)
 
-    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
         return self.spoil(self.inner.solve(ready, load, tolerance), load)
 
-    def spoil(self, answer: Answer, load: Load) -> Answer:
+    def spoil(self, answer: Answer, load: LoadCase) -> Answer:
         return answer
 
 
 def spoiling(change: Callable[[Answer], Any]) -> type[Sound]:
     class Spoilt(Sound):
-        def spoil(self, answer: Answer, load: Load) -> Answer:
+        def spoil(self, answer: Answer, load: LoadCase) -> Answer:
             return change(answer)
 
     return Spoilt
@@ -110,7 +110,7 @@ def test_an_error_within_the_limit_is_not_a_finding() -> None:
 
 def test_a_tolerance_that_is_ignored() -> None:
     class Deaf(Sound):
-        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
             return self.inner.setup(state, load, 1e-1)
 
     words = words_of(Deaf, ("dual",))
@@ -120,7 +120,7 @@ def test_a_tolerance_that_is_ignored() -> None:
 
 def test_arrays_that_are_changed() -> None:
     class Writes(Sound):
-        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
             load.p[0] += 1.0
             return super().setup(state, load, tolerance)
 
@@ -129,7 +129,7 @@ def test_arrays_that_are_changed() -> None:
     class WritesByForce(Sound):
         """As a compiled extension would, which does not look at the read-only flag."""
 
-        def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
+        def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
             answer = super().solve(ready, load, tolerance)
             load.f.flags.writeable = True
             load.f[-1] += 1e-13 * max(1.0, abs(load.f[-1]))
@@ -143,7 +143,7 @@ def test_an_answer_that_is_not_repeatable() -> None:
     random = np.random.default_rng(1)
 
     class Jitter(Sound):
-        def spoil(self, answer: Answer, load: Load) -> Answer:
+        def spoil(self, answer: Answer, load: LoadCase) -> Answer:
             lam = lam_of(answer)
             return replace(answer, lam=lam * (1 + 1e-7 * random.uniform(0.5, 1)))
 
@@ -155,10 +155,10 @@ def test_a_second_load_case_on_one_state() -> None:
         """Solves every load case on a state as if it were the first one."""
 
         def prepare(self, data: Any) -> Any:
-            self.first: Load | None = None
+            self.first: LoadCase | None = None
             return data
 
-        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
             self.first = self.first or load
             return self.inner.setup(state, self.first, tolerance)
 
@@ -167,17 +167,17 @@ def test_a_second_load_case_on_one_state() -> None:
 
 def test_an_update_that_keeps_the_case_before() -> None:
     class Stale(Sound):
-        def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+        def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, near: WarmStart) -> Any:
             return ready
 
     class TakesTheNearAnswer(Sound):
-        near: Near | None = None
+        near: WarmStart | None = None
 
-        def update(self, state: Any, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+        def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, near: WarmStart) -> Any:
             self.near = near
             return super().update(state, ready, load, tolerance, near)
 
-        def spoil(self, answer: Answer, load: Load) -> Answer:
+        def spoil(self, answer: Answer, load: LoadCase) -> Answer:
             return replace(answer, lam=self.near.lam) if self.near else answer
 
     for solver in (Stale, TakesTheNearAnswer):
@@ -188,7 +188,7 @@ def test_an_update_that_keeps_the_case_before() -> None:
 
 def test_a_step_that_raises_is_named_with_its_line() -> None:
     class Raises(Sound):
-        def setup(self, state: Any, load: Load, tolerance: float) -> Any:
+        def setup(self, state: Any, load: LoadCase, tolerance: float) -> Any:
             raise RuntimeError("no licence")
 
     words = words_of(Raises, ("dual",))
@@ -215,7 +215,7 @@ def test_one_fault_is_reported_once_a_form() -> None:
 
 def test_load_cases_at_once_in_another_order() -> None:
     class Turned(Sound):
-        def together(self, state: Any) -> Any:
+        def batched(self, state: Any) -> Any:
             def answers(loads: Any, tolerance: float) -> list[Answer]:
                 ready = [self.setup(state, load, tolerance) for load in loads]
                 return [self.solve(*each, tolerance) for each in zip(ready, loads, strict=True)][::-1]
@@ -223,16 +223,16 @@ def test_load_cases_at_once_in_another_order() -> None:
             return answers
 
     class Short(Sound):
-        def together(self, state: Any) -> Any:
+        def batched(self, state: Any) -> Any:
             return lambda loads, tolerance: []
 
     class Raising(Sound):
-        def together(self, state: Any) -> Any:
+        def batched(self, state: Any) -> Any:
             return lambda loads, tolerance: loads.pop(9)
 
-    assert "wrong when solved at once by `together`" in words_of(Turned, ("dual",))
+    assert "wrong when solved at once by `batched`" in words_of(Turned, ("dual",))
     assert "0 answers to" in words_of(Short, ("dual",))
-    assert "together: raised IndexError" in words_of(Raising, ("dual",))
+    assert "batched: raised IndexError" in words_of(Raising, ("dual",))
 
 
 def test_known_answers_fulfil_the_optimality_conditions() -> None:

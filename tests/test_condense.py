@@ -21,9 +21,10 @@ from problems.effects.ribs import Ribs
 from problems.effects.stringers import Stringers
 from problems.effects.supports import Supports
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
 from problems.model.effect import StiffnessEffect
-from problems.scene import Scene
+from problems.model.scene import Scene
 
 SHORT, LONG = {"length": 90.0, "elements": 2}, {"length": 250.0, "elements": 4}
 PARTS: list[dict[str, Any]] = [
@@ -127,7 +128,7 @@ def test_a_part_that_floats_is_refused(points: tuple[tuple[float, float], ...]) 
     joint = make_joint({"south": LONG}, contacts=[["a", "tool"]])
     effects = [Supports(kind="supports", part="a", points=points)] if points else []
     with pytest.raises(InputError, match="held against every rigid motion"):
-        prepared(make_scene(joint, *effects))
+        _ = prepared(make_scene(joint, *effects)).factors
 
 
 # --- A narrow clamped strip along y, pressed on a flat obstacle -----------------------------------------
@@ -212,7 +213,7 @@ def test_two_equal_parts_are_one_part_on_a_tool_at_half_the_gap() -> None:
 
 def solve(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     made = prepared(scene)
-    load = load_case(scene, made)
+    load = load_case(scene)
     p = made.dual_load(load)
     active = contact_set(made.Q, p)
     lam = np.zeros(len(p))

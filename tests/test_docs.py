@@ -15,10 +15,10 @@ from rich.console import Console
 
 from harness.scene.solve import solve
 from problems import effects
+from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.formats import WRITERS
 from problems.model.effect import Effect, effect_class, effect_kinds
-from problems.prepare import load_case, prepared
 from problems.scene import SCENES, read_scene
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -53,8 +53,8 @@ def test_the_new_effect_of_the_page_is_one_short_file(
     (tmp_path / "bare.toml").write_text(JOINT[1])
     (tmp_path / "scene.toml").write_text(JOINT[1] + table + points)
     bare, scene = (read_scene(str(tmp_path / name)) for name in ("bare.toml", "scene.toml"))
-    data = prepared(scene)
-    added = load_case(scene, data).f - load_case(bare, data).f
+    prepared(scene)
+    added = load_case(scene).f - load_case(bare).f
     second = 41 * 9  # where the skin's unknowns begin
     assert {int(i): float(added[i]) for i in np.flatnonzero(added)} == {second + 1: 7.5, second + 368: 7.5}
     (tmp_path / "bad.toml").write_text(JOINT[1] + table + points.replace("600", "601"))

@@ -56,7 +56,7 @@ def test_fastener_closes_the_gap() -> None:
     """The sign: without contact the parts come closer, x_a − x_b > 0."""
     scene = make_scene(JOINT, Fasteners(kind="fasteners", preload=10.0, points=((200.0, 60.0),)))
     made = prepared(scene)
-    approach = made.assembly.A.T @ made.solve_K(load_case(scene, made).f)
+    approach = made.assembly.A.T @ made.solve_K(load_case(scene).f)
     assert (approach > 0).all()
 
 
@@ -155,7 +155,7 @@ def test_terms_add_up() -> None:
     )
     gap = InitialGap(kind="initial_gap", mean=0.25)
     scene = make_scene(JOINT, press, gap, rivets, gap)
-    load = load_case(scene, prepared(scene))
+    load = load_case(scene)
     np.testing.assert_array_equal(load.f, press.force(JOINT) + rivets.force(JOINT))
     assert load.g.tolist() == 45 * [0.5]
 
@@ -181,7 +181,7 @@ clamped = ["north"]
 """)
     code = (
         "import sys; from problems.build import load_case, prepared; from problems.scene import read_scene;"
-        "s = read_scene(sys.argv[1]); load_case(s, prepared(s));"
+        "s = read_scene(sys.argv[1]); load_case(s);"
         "print(*[m for m in sys.modules if m.startswith('problems.effects.')])"
     )
     done = subprocess.run(

@@ -12,20 +12,22 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from joints import untied
 from rich.console import Console
 from scipy.io import FortranFile
 from small import make_load, make_prepared, solve_by_nnls
 from typer.testing import CliRunner
 
 from harness.cli.app import app
-from harness.conformance.trials import prepared_from
 from harness.scene.exchange import export, import_, matrices
 from harness.scene.solve import solve
-from problems import build, formats
+from problems import formats
+from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
 from problems.input.digits import apparent_digits, expected_error
-from problems.prepare import load_case, prepared
+from problems.model.scene import JointScene
 from problems.scene import read_scene
 
 QUIET = Console(file=StringIO())
@@ -44,7 +46,7 @@ def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, A
     import_(files_of(form, folder / PATHS[form]), folder / "back.npz", QUIET)
     scene = read_scene(SCENE)
     data = prepared(scene)
-    wanted = matrices(data, load_case(scene, data))
+    wanted = matrices(data, load_case(scene))
     return wanted, dict(np.load(folder / "back.npz"))
 
 
@@ -142,7 +144,7 @@ def test_the_imported_problem_has_the_scenes_answer(tmp_path: Path) -> None:
     np.testing.assert_array_equal(two.Q, one.Q)
     for K, L in zip(one.assembly.blocks, two.assembly.blocks, strict=True):
         np.testing.assert_array_equal(K, L)
-    np.testing.assert_array_equal(load_case(own, two).f, load_case(scene, one).f)
+    np.testing.assert_array_equal(load_case(own).f, load_case(scene).f)
 
 
 def test_qpsolvers_reads_its_file(tmp_path: Path) -> None:
@@ -153,7 +155,7 @@ def test_qpsolvers_reads_its_file(tmp_path: Path) -> None:
     x = qpsolvers.solve_problem(qpsolvers.Problem.load(str(tmp_path / "q.npz")), solver="quadprog").x
     scene = read_scene("gallery/sheet-over-former")
     data = prepared(scene)
-    np.testing.assert_allclose(x, solve_by_nnls(data, load_case(scene, data))[0], atol=1e-6)
+    np.testing.assert_allclose(x, solve_by_nnls(data, load_case(scene))[0], atol=1e-6)
 
 
 @pytest.mark.parametrize("shape", ["lower", "upper", "both"])
@@ -315,12 +317,14 @@ def test_the_expected_error_is_that_of_rounding(digits: int) -> None:
     one of nine units of force, in each of which K is rounded differently."""
     scene = read_scene("gallery/sheet-over-former")
     data = prepared(scene)
-    load = load_case(scene, data)
+    load = load_case(scene)
     x, lam = solve_by_nnls(data, load)
     assert 3 < (lam > 0).sum() < 150
     errors = []
     for unit in 1.17 ** np.arange(9):
-        coarse = prepared_from((rounded(data.assembly.blocks[0] * unit, digits) / unit,), data.assembly.A)
+        coarse = Prepared(
+            Assembly((rounded(data.assembly.blocks[0] * unit, digits) / unit,), data.assembly.A)
+        )
         errors.append(abs(solve_by_nnls(coarse, load)[0] - x).max())
     expected = expected_error(data, x, lam, digits)
     assert np.median(errors) / 5 < expected < 5 * np.median(errors)
@@ -328,7 +332,7 @@ def test_the_expected_error_is_that_of_rounding(digits: int) -> None:
 
 def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     scene = read_scene("gallery/sheet-over-former")
-    data = matrices(prepared(scene), load_case(scene, prepared(scene)))
+    data = matrices(prepared(scene), load_case(scene))
     K = data["K"].toarray()
     data["K"] = sp.csr_array(rounded(K, 7))
     formats.write("npz", tmp_path / "seven.npz", data)
@@ -347,7 +351,9 @@ def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
 def test_a_built_problem_is_exported_with_all_its_terms(tmp_path: Path) -> None:
     """Springs and loads beyond the junction are in the file, not only what build.py makes."""
     wanted, found = there_and_back("npz", tmp_path)
-    base = build.prepared(read_scene(SCENE))
+    scene = read_scene(SCENE)
+    assert isinstance(scene, JointScene)
+    base = prepared(untied(scene))
     bare = sla.block_diag(*base.assembly.blocks)
     assert abs(found["K"] - bare).max() == pytest.approx(5.0)
     assert abs(wanted["f"]).max() == pytest.approx(2.5)

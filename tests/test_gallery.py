@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from small import solve_by_nnls
 
 from harness.verification.reference import reference
-from problems.forms.assembly import LoadCase, Prepared
+from problems.build import load_case, prepared
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
 from problems.model.joint import Joint
-from problems.prepare import load_case, prepared
+from problems.model.scene import JointScene
 from problems.scene import Scene, read_scene, scene_names
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
@@ -22,13 +24,13 @@ def opened(name: str) -> tuple[Scene, Joint, Prepared, LoadCase]:
     scene = read_scene(f"gallery/{name}")
     assert scene.joint is not None
     data = prepared(scene)
-    return scene, scene.joint, data, load_case(scene, data)
+    return scene, scene.joint, data, load_case(scene)
 
 
 def solved(name: str) -> tuple[Joint, Array, Array]:
     """Displacements and contact forces."""
-    scene, joint, data, load = opened(name)
-    found = reference(scene.key, data, load)
+    _, joint, data, load = opened(name)
+    found = reference(data, load)
     assert found.bound_mm < 1e-9
     return joint, found.x, found.lam
 
@@ -107,7 +109,7 @@ def test_measured_gap() -> None:
     """Two equal parts with the gap 2g are one part on an obstacle at g, node for node."""
     _, joint, _, load = opened("measured-gap")
     half = joint.model_copy(update={"part": joint.part[:1], "contacts": (("upper", "tool"),)})
-    one = prepared(Scene("half", "half", half))
+    one = prepared(JointScene("half", "half", half))
     n = half.size[0]
     x, _ = solve_by_nnls(one, LoadCase(load.f[:n], load.g / 2))
     _, both, lam = solved("measured-gap")
@@ -121,7 +123,7 @@ def test_three_part_stack() -> None:
     _, joint, _, load = opened("three-part-stack")
     skin = joint.model_copy(update={"part": joint.part[:1], "contacts": (("upper", "tool"),)})
     n = skin.size[0]
-    x, force = solve_by_nnls(prepared(Scene("skin", "skin", skin)), LoadCase(load.f[:n], load.g[:n]))
+    x, force = solve_by_nnls(prepared(JointScene("skin", "skin", skin)), LoadCase(load.f[:n], load.g[:n]))
     _, stack, lam = solved("three-part-stack")
     assert set(np.round(load.g, 12)) == {0.3, 0.8}
     assert (force > 0).sum() > 10

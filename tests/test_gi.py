@@ -11,11 +11,13 @@ import scipy.sparse as sp
 from scipy.optimize import nnls
 from small import make_load, make_prepared, solve_by_nnls
 
-from problems.forms.assembly import Assembly, LoadCase, Prepared
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from solvers.active_set.gi_border import Border
 from solvers.active_set.goldfarb_idnani import _State, goldfarb_idnani
 from solvers.active_set.growing_factor import BLOCK, GrowingFactor
-from solvers.base import Answer, Form, Load, Problem
+from solvers.base import Answer, Form
 from solvers.methods.gi import GoldfarbIdnani
 
 
@@ -175,9 +177,9 @@ def two_contacts_of_one_node(Q: np.ndarray, form: Form) -> Answer:
     A = sp.csc_array(np.array([[1.0, 1.0]]))
     prepared = Prepared(Assembly((np.eye(1),), A), (np.eye(1),), Q)
     f, g = np.array([1.0]), np.array([0.5, 0.25])
-    load = Load(f, g, prepared.dual_load(LoadCase(f, g)))
+    load = LoadCase(f, g, prepared.dual_load(LoadCase(f, g)))
     solver = GoldfarbIdnani()
-    return solver.solve(solver.prepare(Problem(prepared, form)), load, 1e-10)
+    return solver.solve(solver.prepare(in_form(prepared, form)), load, 1e-10)
 
 
 def test_contacts_that_say_the_same_are_no_hindrance_in_the_primal_form() -> None:
@@ -201,7 +203,7 @@ def test_pivots_that_a_rough_inverse_misleads_are_finished_by_others(noise: floa
     prepared = make_prepared(3, 40)
     case, load = make_load(3, prepared)
     solver = GoldfarbIdnani()
-    ready = solver.prepare(Problem(prepared, "dual"))
+    ready = solver.prepare(in_form(prepared, "dual"))
     assert not isinstance(ready, Answer)
     rough = np.random.default_rng(0).uniform(1 - noise, 1 + noise, ready.G.shape)
     answer = solver.solve(replace(ready, G=np.asfortranarray(ready.G * (rough + rough.T) / 2)), load, 1e-10)

@@ -12,7 +12,8 @@ import scipy.sparse as sp
 
 from harness.verification.judge import Judgement, conditioned_limit, judge
 from harness.verification.reference import Reference
-from problems.forms.assembly import Assembly, LoadCase, Prepared
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
 
 X, LAM = np.array([0.75, 0.25]), np.array([1.5])
 

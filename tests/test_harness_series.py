@@ -22,9 +22,9 @@ from harness.planning.plan import expand
 from harness.planning.suite import read_suite, to_toml, validated
 from harness.results import records
 from harness.verification.gate import gate
+from problems.build import prepared
 from problems.errors import InputError
 from problems.load_cases.random_gaps import random_gaps
-from problems.prepare import prepared
 from problems.scene import read_scene
 from report.sections.series import compared
 
@@ -54,13 +54,13 @@ tolerances = [1e-11]
 cases = 2
 [[solver]]
 name = "newton"
-variant = "together"
-together = 3
+variant = "batched"
+batched = 3
 tolerances = [1e-11]
 [[solver]]
 name = "faulty"
-variant = "together"
-together = 2
+variant = "batched"
+batched = 2
 """
 )
 FAULTY = (
@@ -116,9 +116,9 @@ def test_each_case_has_a_row_and_an_answer_of_its_own() -> None:
     assert {(row["status"], row["verdict"]) for row in rows} == {("solved", "within")}
     scene = read_scene("strip.toml")
     data = prepared(scene)
-    cases = random_gaps(scene, data, 4, 9)
+    cases = random_gaps(scene, 4, 9)
     for row in rows:
-        case = cases.load(row["case"], data)
+        case = cases.load(row["case"])
         x, lam = solve_by_nnls(data, case)
         with np.load(Path("two") / row["answer"]) as saved:
             np.testing.assert_allclose(saved["x"], x, atol=1e-8)
@@ -175,11 +175,11 @@ def test_cases_solved_together_share_the_seconds() -> None:
     """A row a case, each judged for itself; the second call begins with what the first has found."""
     _, rows = made("together.toml", "together")
     alone, together, faulty = rows[:2], rows[2:6], rows[6:]
-    assert [(row["case"], row["warm"], row["together"]) for row in alone] == [
+    assert [(row["case"], row["warm"], row["batched"]) for row in alone] == [
         (0, False, None),
         (1, True, None),
     ]
-    assert [(row["case"], row["warm"], row["together"]) for row in together] == [
+    assert [(row["case"], row["warm"], row["batched"]) for row in together] == [
         *((k, False, 3) for k in range(3)),
         (3, True, 1),
     ]
@@ -191,9 +191,9 @@ def test_cases_solved_together_share_the_seconds() -> None:
     assert len({row["prepare_s"] for row in together}) == 1
     scene = read_scene("strip.toml")
     data = prepared(scene)
-    cases = random_gaps(scene, data, 4, 9)
+    cases = random_gaps(scene, 4, 9)
     for row in together:
-        case = cases.load(row["case"], data)
+        case = cases.load(row["case"])
         x, lam = solve_by_nnls(data, case)
         with np.load(Path("together") / row["answer"]) as saved:
             np.testing.assert_allclose(saved["x"], x, atol=1e-8)
@@ -214,14 +214,14 @@ def test_other_gaps_are_another_series() -> None:
 
 
 def test_what_is_for_a_series_is_refused_elsewhere_and_two_ways_need_two_names() -> None:
-    without = TOGETHER.replace("[series]\ncases = 4\nseed = 9\n", "").replace('variant = "together"\n', "")
+    without = TOGETHER.replace("[series]\ncases = 4\nseed = 9\n", "").replace('variant = "batched"\n', "")
     with pytest.raises(InputError) as caught:
         read_suite(write("without.toml", without))
     faults = {fault.key: fault.allowed for fault in caught.value.faults}
     assert {key for key, why in faults.items() if "with [series]" in why} == {
-        *("solver.0.cases", "solver.1.together", "solver.2.together")
+        *("solver.0.cases", "solver.1.batched", "solver.2.batched")
     }
-    assert "other `together`" in faults["solver.1.variant"]
+    assert "other `batched`" in faults["solver.1.variant"]
 
 
 def test_repeats_of_a_series_stay_together(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import tiny
 
-from harness.measurement.run import refuse_what_cannot_fit
+from harness.planning.estimate import refuse_limits_too_low
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, checked, read_suite, suite_names, to_toml, validated
@@ -179,10 +179,10 @@ class TestOverrides:
 def test_what_cannot_fit_is_refused(tmp_path: Path) -> None:
     suite = read_suite(str(tiny.write_suite(tmp_path, scenes=["4386/0052"], memory_limit_mib=100)))
     with pytest.raises(InputError, match=r"matrices of scene 4386/0052 alone take 18\d MiB"):
-        refuse_what_cannot_fit(expand(suite))
+        refuse_limits_too_low(expand(suite))
     with pytest.raises(InputError, match="this machine has"):
-        refuse_what_cannot_fit(expand(overridden(suite, Overrides(memory_limit_mib=10**9))))
-    refuse_what_cannot_fit(expand(overridden(suite, Overrides(memory_limit_mib=400))))
+        refuse_limits_too_low(expand(overridden(suite, Overrides(memory_limit_mib=10**9))))
+    refuse_limits_too_low(expand(overridden(suite, Overrides(memory_limit_mib=400))))
 
 
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:

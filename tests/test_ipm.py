@@ -12,8 +12,10 @@ from small import make_load, make_prepared, solve_by_nnls
 from test_gi import by_nnls, definite
 
 from problems.errors import InputError
-from problems.forms.assembly import Prepared
-from solvers.base import Answer, Load, Problem
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.base import Answer
 from solvers.interior_point.newton_system import SYSTEMS
 from solvers.interior_point.schemes import Newton, Point, algorithm_2, algorithm_3, mehrotra
 from solvers.interior_point.start import algorithm_5
@@ -30,7 +32,7 @@ class Given:
 
 def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = 1e-14, **options: Any) -> Answer:
     solver = Ipm(**options)
-    return solver.solve(solver.prepare(Given(Q)), Load(np.zeros(0), np.zeros(0), p), tolerance)  # type: ignore[arg-type]
+    return solver.solve(solver.prepare(Given(Q)), LoadCase(np.zeros(0), np.zeros(0), p), tolerance)  # type: ignore[arg-type]
 
 
 def newton(Q: np.ndarray, p: np.ndarray, sigma: float = 0.3) -> tuple[Newton, Point]:
@@ -65,7 +67,7 @@ def test_every_start_scheme_and_system_leads_to_the_same_answer(start: str, sche
     options: dict[str, Any] = {"start": start, "scheme": scheme, "cg_tolerance": 1e-10}
     options |= {"ordering": system} if system == "open_last" else {"preconditioner": system}
     solver = Ipm(**options)
-    answer = solver.solve(solver.prepare(Problem(prepared, "dual")), load, 1e-14)
+    answer = solver.solve(solver.prepare(in_form(prepared, "dual")), load, 1e-14)
     if system == "none" and answer.status != "solved":
         # In the norm without V the large D hide the rest of the residual: it may not get there, but says so.
         assert answer.status == "inaccurate"

@@ -8,7 +8,7 @@ from small import make_load, make_prepared, solve_by_nnls
 from test_gi import definite
 
 from problems.errors import InputError
-from solvers.base import Problem
+from problems.forms.problem import in_form
 from solvers.linear_algebra.single_precision import SinglePrecision
 from solvers.methods.ipm_fast import FastIpm
 
@@ -54,7 +54,7 @@ def test_answers_against_nnls(seed: int, options: dict[str, bool]) -> None:
     prepared = make_prepared(seed, 5 + 6 * seed, tools=seed % 3)
     case, load = make_load(seed, prepared)
     solver = FastIpm(**options)
-    answer = solver.solve(solver.prepare(Problem(prepared, "dual")), load, 1e-11)
+    answer = solver.solve(solver.prepare(in_form(prepared, "dual")), load, 1e-11)
     x, _ = solve_by_nnls(prepared, case)
     assert answer.status == "solved"
     assert (answer.lam >= 0).all()
@@ -67,7 +67,7 @@ def test_the_finish_saves_newton_matrices() -> None:
     counts = {}
     for finish in (True, False):
         solver = FastIpm(finish=finish)
-        counts[finish] = solver.solve(solver.prepare(Problem(prepared, "dual")), load, 1e-11).iterations
+        counts[finish] = solver.solve(solver.prepare(in_form(prepared, "dual")), load, 1e-11).iterations
     assert counts[True] < counts[False]
 
 

@@ -16,10 +16,12 @@ from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
 from problems.build import prepared
 from problems.errors import InputError
+from problems.forms.assembly import LoadCase
+from problems.forms.problem import in_form
 from problems.manufactured.exact import spectrum
 from problems.manufactured.ladder import Made, make_rung, rung_names
 from problems.scene import read_scene, scene_names
-from solvers.base import Form, Load, Problem
+from solvers.base import Form
 from solvers.registry import make_solver
 
 RUNGS = rung_names()
@@ -106,7 +108,7 @@ def test_cond_grows_along_the_ladders_that_say_so() -> None:
 def test_what_the_model_cannot_take_is_refused_in_words(name: str) -> None:
     scene = read_scene(name)
     with pytest.raises(InputError) as error:
-        prepared(scene)
+        _ = prepared(scene).Q
     assert scene.refused in str(error.value)
     assert name in str(error.value)
 
@@ -134,8 +136,8 @@ def test_in_house_solvers_hold(name: str, solver: str, form: Form, tolerance: fl
     base = opened(name)
     data, case = base.prepared, base.load
     made = make_solver(solver, {})
-    state = made.prepare(made.convert(Problem(data, form)))
-    load = Load(case.f, case.g, data.dual_load(case))
+    state = made.prepare(made.convert(in_form(data, form)))
+    load = LoadCase(case.f, case.g, data.dual_load(case))
     answer = made.solve(made.setup(state, load, tolerance), load, tolerance)
     assert answer.lam is not None
     assert np.isfinite(answer.lam).all()

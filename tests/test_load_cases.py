@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from strip import write_strip
 
+from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.assembly import Prepared
+from problems.forms.prepared import Prepared
 from problems.load_cases.base import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.sweep import sweep
-from problems.prepare import load_case, prepared
-from problems.scene import Scene, read_scene
+from problems.model.scene import Scene
+from problems.scene import read_scene
 
 RANDOM = "random = { sd = 0.2, correlation_length = 100.0, seed = 7 }"
 
@@ -36,37 +37,37 @@ def said(error: pytest.ExceptionInfo[InputError]) -> str:
 
 
 def gaps_of(cases: LoadCases, data: Prepared) -> np.ndarray:
-    return np.array([cases.load(k, data).g for k in range(cases.count)])
+    return np.array([cases.load(k).g for k in range(cases.count)])
 
 
 def test_a_random_case_is_a_scene_with_the_seed_of_its_row(
     scene: Scene, data: Prepared, tmp_path: Path
 ) -> None:
-    cases = random_gaps(scene, data, 20, seed=3)
+    cases = random_gaps(scene, 20, seed=3)
     for k in (0, 7, 19):
         seed = cases.parameters(k)["gap_seed"]
         written = write_strip(tmp_path, ("seed = 7", f"seed = {seed}"))
-        wanted = load_case(read_scene(str(written)), data)
-        np.testing.assert_array_equal(cases.load(k, data).g, wanted.g)
-        np.testing.assert_array_equal(cases.load(k, data).f, wanted.f)
+        wanted = load_case(read_scene(str(written)))
+        np.testing.assert_array_equal(cases.load(k).g, wanted.g)
+        np.testing.assert_array_equal(cases.load(k).f, wanted.f)
 
 
 def test_a_random_case_depends_on_seed_and_number_alone(scene: Scene, data: Prepared) -> None:
-    few, many = random_gaps(scene, data, 3, seed=3), random_gaps(scene, data, 300, seed=3)
-    many.load(250, data)
-    np.testing.assert_array_equal(gaps_of(few, data)[2], many.load(2, data).g)
-    np.testing.assert_array_equal(many.load(250, data).g, pickle.loads(pickle.dumps(many)).load(250, data).g)
-    assert few.key == many.key != random_gaps(scene, data, 3, seed=4).key
-    drawn = {many.load(k, data).g.tobytes() for k in range(300)}
-    others = {random_gaps(scene, data, 300, seed=4).load(k, data).g.tobytes() for k in range(300)}
+    few, many = random_gaps(scene, 3, seed=3), random_gaps(scene, 300, seed=3)
+    many.load(250)
+    np.testing.assert_array_equal(gaps_of(few, data)[2], many.load(2).g)
+    np.testing.assert_array_equal(many.load(250).g, pickle.loads(pickle.dumps(many)).load(250).g)
+    assert few.key == many.key != random_gaps(scene, 3, seed=4).key
+    drawn = {many.load(k).g.tobytes() for k in range(300)}
+    others = {random_gaps(scene, 300, seed=4).load(k).g.tobytes() for k in range(300)}
     assert len(drawn | others) == 600
-    assert many.load(0, data).f is many.load(1, data).f
+    assert many.load(0).f is many.load(1).f
 
 
 def test_the_statistics_of_the_random_gaps(scene: Scene, data: Prepared) -> None:
     """Mean, standard deviation and correlation over 2000 cases, each within four standard errors."""
     count, sd, length = 2000, 0.3, 80.0
-    gaps = gaps_of(random_gaps(scene, data, count, 1, mean=0.5, sd=sd, correlation_length=length), data)
+    gaps = gaps_of(random_gaps(scene, count, 1, mean=0.5, sd=sd, correlation_length=length), data)
     assert abs(gaps.mean(axis=0) - 0.5).max() < 4 * sd / np.sqrt(count)
     assert abs(gaps.std(axis=0) / sd - 1).max() < 4 / np.sqrt(2 * count)
     nodes = data.assembly.contact_nodes
@@ -80,18 +81,13 @@ def test_the_statistics_of_the_random_gaps(scene: Scene, data: Prepared) -> None
 def test_the_field_comes_from_the_options_where_the_scene_has_none(tmp_path: Path) -> None:
     bare = read_scene(str(write_strip(tmp_path, (RANDOM, ""))))
     with pytest.raises(InputError) as error:
-        random_gaps(bare, prepared(bare), 5, 0)
+        random_gaps(bare, 5, 0)
     assert "--sd" in said(error)
     assert "--correlation-length" in said(error)
     assert "--mean" not in said(error)
-    assert (
-        random_gaps(bare, prepared(bare), 5, 0, sd=0.1, correlation_length=50.0)
-        .load(3, prepared(bare))
-        .g.std()
-        > 0
-    )
+    assert random_gaps(bare, 5, 0, sd=0.1, correlation_length=50.0).load(3).g.std() > 0
     with pytest.raises(InputError, match="greater than 0"):
-        random_gaps(bare, prepared(bare), 5, 0, sd=-0.1, correlation_length=50.0)
+        random_gaps(bare, 5, 0, sd=-0.1, correlation_length=50.0)
 
 
 def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
@@ -99,10 +95,10 @@ def test_own_matrices_have_no_random_field(tmp_path: Path) -> None:
 
     own = read_scene(str(tiny.write_problem(tmp_path / "own.npz")))
     with pytest.raises(InputError, match="--gaps"):
-        random_gaps(own, prepared(own), 5, 0)
+        random_gaps(own, 5, 0)
     table = tmp_path / "gaps.csv"
     np.savetxt(table, np.full((2, 10), 0.25), delimiter=",")
-    case = measured_gaps(own, prepared(own), table).load(1, prepared(own))
+    case = measured_gaps(own, table).load(1)
     np.testing.assert_array_equal(case.g, np.full(10, 0.25))
     np.testing.assert_array_equal(case.f, np.load(tmp_path / "own.npz", data)["f"])
 
@@ -118,13 +114,13 @@ def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, data: Prep
             np.savez(path, gaps=gaps, other=np.zeros(3))
         case "npy":
             np.save(path, gaps)
-    cases = measured_gaps(scene, data, path)
+    cases = measured_gaps(scene, path)
     assert cases.count == 30
     np.testing.assert_array_equal(gaps_of(cases, data), gaps)
-    np.testing.assert_array_equal(cases.load(0, data).f, load_case(scene, data).f)
-    assert measured_gaps(scene, data, path, 4).count == 4
+    np.testing.assert_array_equal(cases.load(0).f, load_case(scene).f)
+    assert measured_gaps(scene, path, 4).count == 4
     with pytest.raises(InputError, match="has 30 rows"):
-        measured_gaps(scene, data, path, 31)
+        measured_gaps(scene, path, 31)
 
 
 def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_path: Path) -> None:
@@ -135,7 +131,7 @@ def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_pat
     gaps[499, 0] = np.inf
     np.save(path, gaps)
     with pytest.raises(InputError) as error:
-        measured_gaps(scene, data, path)
+        measured_gaps(scene, path)
     lines = said(error).splitlines()
     assert len(lines) == 2
     assert "gaps.npy: case 412, contact 7 and 1 more = nan: every gap must be a finite number" in lines[0]
@@ -143,7 +139,7 @@ def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_pat
     gaps[:, 3] = np.nan
     np.save(path, gaps)
     with pytest.raises(InputError) as error:
-        measured_gaps(scene, data, path)
+        measured_gaps(scene, path)
     assert len(error.value.faults) == 11
     assert "490 more" in said(error)
 
@@ -160,16 +156,16 @@ def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_pat
 def test_a_csv_that_is_no_table(text: str, words: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
     (tmp_path / "gaps.csv").write_text(text)
     with pytest.raises(InputError, match=words):
-        measured_gaps(scene, data, tmp_path / "gaps.csv")
+        measured_gaps(scene, tmp_path / "gaps.csv")
 
 
 @pytest.mark.parametrize("name", ["gaps.csv", "gaps.npz", "gaps.npy", "gaps.txt"])
 def test_a_table_that_cannot_be_read(name: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=name):
-        measured_gaps(scene, data, tmp_path / name)
+        measured_gaps(scene, tmp_path / name)
     np.savez(tmp_path / "two.npz", a=np.zeros(3), b=np.zeros(3))
     with pytest.raises(InputError, match=r"two\.npz"):
-        measured_gaps(scene, data, tmp_path / "two.npz")
+        measured_gaps(scene, tmp_path / "two.npz")
 
 
 def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, data: Prepared, tmp_path: Path) -> None:
@@ -179,9 +175,9 @@ def test_a_sweep_is_the_scene_with_its_keys_changed(scene: Scene, data: Prepared
     for k in (0, 5):
         sd, preload = cases.parameters(k).values()
         changes = (("sd = 0.2", f"sd = {sd}"), ("preload = 60.0", f"preload = {preload}"))
-        wanted = load_case(read_scene(str(write_strip(tmp_path, *changes))), data)
-        np.testing.assert_array_equal(cases.load(k, data).f, wanted.f)
-        np.testing.assert_array_equal(cases.load(k, data).g, wanted.g)
+        wanted = load_case(read_scene(str(write_strip(tmp_path, *changes))))
+        np.testing.assert_array_equal(cases.load(k).f, wanted.f)
+        np.testing.assert_array_equal(cases.load(k).g, wanted.g)
 
 
 @pytest.mark.parametrize(
@@ -213,11 +209,11 @@ def test_a_load_beyond_the_junction_is_swept(data: Prepared, tmp_path: Path) -> 
     change = ('[[effect]]\nkind = "ribs"', weight.format(2700))
     with_weight = read_scene(str(write_strip(tmp_path, change)))
     cases = sweep(with_weight, ["self_weight.density=2700,5400"])
-    without = load_case(read_scene(str(write_strip(tmp_path))), data).f
-    once, twice = (cases.load(k, data).f - without for k in (0, 1))
+    without = load_case(read_scene(str(write_strip(tmp_path)))).f
+    once, twice = (cases.load(k).f - without for k in (0, 1))
     assert abs(once).max() > 0
     np.testing.assert_allclose(twice, 2 * once, rtol=1e-9)
-    np.testing.assert_allclose(once + without, load_case(with_weight, data).f)
+    np.testing.assert_allclose(once + without, load_case(with_weight).f)
 
 
 def test_a_key_swept_twice_and_two_effects_of_a_kind(data: Prepared, tmp_path: Path) -> None:
@@ -228,7 +224,7 @@ def test_a_key_swept_twice_and_two_effects_of_a_kind(data: Prepared, tmp_path: P
     first, second = (
         sweep(scene, [f"pressure.{text}"]) for text in ("0.value=1e-4,2e-4", "1.value=2e-4,4e-4")
     )
-    np.testing.assert_array_equal(first.load(0, data).f, load_case(scene, data).f)
-    moved, twice = (cases.load(1, data).f - cases.load(0, data).f for cases in (first, second))
+    np.testing.assert_array_equal(first.load(0).f, load_case(scene).f)
+    moved, twice = (cases.load(1).f - cases.load(0).f for cases in (first, second))
     assert abs(moved).max() > 0
     np.testing.assert_allclose(twice, 2 * moved, atol=1e-12)

@@ -13,7 +13,8 @@ import scipy.sparse as sp
 
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
 from problems.scene import read_scene
 
 RNG = np.random.default_rng(11)
@@ -30,7 +31,8 @@ DATA: dict[str, Any] = {
 def opened(path: Path) -> tuple[Prepared, LoadCase]:
     scene = read_scene(str(path))
     made = prepared(scene)
-    return made, load_case(scene, made)
+    assert made.Q.shape == (made.assembly.m,) * 2
+    return made, load_case(scene)
 
 
 def write_npz(folder: Path, **changes: Any) -> Path:

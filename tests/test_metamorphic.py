@@ -15,8 +15,8 @@ import scipy.sparse as sp
 from small import make_load, make_prepared
 from solving import CASES, IN_HOUSE, allowed, eigenvalues, solve
 
-from harness.conformance.trials import prepared_from
-from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import Prepared
 from problems.manufactured.ladder import make_rung
 from solvers.base import Form
 
@@ -39,7 +39,7 @@ def permuted(prepared: Prepared, case: LoadCase) -> Changed:
     blocks = tuple(K[np.ix_(order, order)] for K, order in zip(assembly.blocks, orders, strict=True))
     rows = np.concatenate([s.start + order for s, order in zip(assembly.slices, orders, strict=True)])
     columns = random.permutation(assembly.m)
-    made = prepared_from(blocks, sp.csc_array(assembly.A.toarray()[np.ix_(rows, columns)]))
+    made = Prepared(Assembly(blocks, sp.csc_array(assembly.A.toarray()[np.ix_(rows, columns)])))
     x_back, lam_back = np.argsort(rows), np.argsort(columns)
     load = LoadCase(case.f[rows], case.g[columns])
     return Changed(made, load, lambda x: x[x_back], lambda lam: lam[lam_back])
@@ -50,7 +50,7 @@ def in_other_units(prepared: Prepared, case: LoadCase) -> Changed:
     length, force = 4.0, 0.5
     blocks = tuple(K * length / force for K in prepared.assembly.blocks)
     load = LoadCase(case.f / force, case.g / length)
-    made = prepared_from(blocks, prepared.assembly.A)
+    made = Prepared(Assembly(blocks, prepared.assembly.A))
     return Changed(made, load, lambda x: x * length, lambda lam: lam * force, length)
 
 
@@ -59,7 +59,7 @@ def with_a_redundant_contact(prepared: Prepared, case: LoadCase) -> Changed:
     assembly = prepared.assembly
     normal = np.zeros((assembly.n, 1))
     normal[-1] = 1.0
-    made = prepared_from(assembly.blocks, sp.csc_array(sp.hstack([assembly.A, normal])))
+    made = Prepared(Assembly(assembly.blocks, sp.csc_array(sp.hstack([assembly.A, normal]))))
     return Changed(made, LoadCase(case.f, np.append(case.g, 100.0)), lam=lambda lam: lam[:-1])
 
 
@@ -67,7 +67,7 @@ def with_the_parts_swapped(prepared: Prepared, case: LoadCase) -> Changed:
     """The second part first, and all displacements counted the other way."""
     assembly, size = prepared.assembly, len(prepared.assembly.blocks[0])
     order = np.roll(np.arange(assembly.n), -size)
-    made = prepared_from(assembly.blocks[::-1], sp.csc_array(-assembly.A.toarray()[order]))
+    made = Prepared(Assembly(assembly.blocks[::-1], sp.csc_array(-assembly.A.toarray()[order])))
     return Changed(made, LoadCase(-case.f[order], case.g), lambda x: -np.roll(x, size))
 
 
@@ -80,7 +80,7 @@ def shifted(prepared: Prepared, case: LoadCase) -> Changed:
 
 def doubled(prepared: Prepared, case: LoadCase) -> Changed:
     """K and f twice as large: the same displacements under twice the forces."""
-    made = prepared_from(tuple(2 * K for K in prepared.assembly.blocks), prepared.assembly.A)
+    made = Prepared(Assembly(tuple(2 * K for K in prepared.assembly.blocks), prepared.assembly.A))
     return Changed(made, LoadCase(2 * case.f, case.g), lam=lambda lam: lam / 2)
 
 
@@ -95,7 +95,7 @@ def problem(kind: str) -> tuple[Prepared, LoadCase]:
         return prepared, make_load(22, prepared)[0]
     made = make_rung(kind).made
     assert made is not None
-    return prepared_from(made.assembly.blocks, made.assembly.A), made.load
+    return Prepared(Assembly(made.assembly.blocks, made.assembly.A)), made.load
 
 
 TRIED = [("plain", *case) for case in CASES]

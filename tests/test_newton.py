@@ -8,12 +8,13 @@ import scipy.linalg as sla
 from scipy.optimize import nnls
 from small import make_load, make_prepared, solve_by_nnls
 
-from problems.forms.assembly import Prepared
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from solvers.active_set.block_pivoting import FORCES_FIRST, block_pivoting
 from solvers.active_set.bordered_factor import BorderedFactor
 from solvers.active_set.contact_sets import ContactSets, gaps
 from solvers.active_set.nested import cells_of, representatives
-from solvers.base import Load, Problem
 from solvers.linear_algebra.inverse import BLOCK, inverse_with_factor
 from solvers.linear_algebra.product import product
 from solvers.methods.newton import ActiveSetNewton
@@ -135,9 +136,9 @@ def test_cells_of_whatever_coordinates(nodes: np.ndarray | None) -> None:
     assert 1 <= len(np.unique(cells)) <= 10
 
 
-def solved(prepared: Prepared, load: Load, tolerance: float = 1e-11, **options):
+def solved(prepared: Prepared, load: LoadCase, tolerance: float = 1e-11, **options):
     solver = ActiveSetNewton(**options)
-    return solver.solve(solver.prepare(Problem(prepared, "dual")), load, tolerance)
+    return solver.solve(solver.prepare(in_form(prepared, "dual")), load, tolerance)
 
 
 @pytest.mark.parametrize("nested", [True, False])

@@ -7,7 +7,7 @@ import pytest
 
 from harness.verification.principal_pivoting import contact_set
 from problems.build import load_case, prepared
-from problems.forms.assembly import Prepared
+from problems.forms.prepared import Prepared
 from problems.scene import read_scene, scene_names
 
 TABLE_2 = (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592)
@@ -58,7 +58,7 @@ def test_condition_of_the_smallest_problem(smallest: Prepared) -> None:
 @pytest.mark.parametrize("count", TABLE_2)
 def test_active_constraints_of_the_paper(smallest: Prepared, count: int) -> None:
     scene = read_scene(f"4386/{count:04}")
-    p = smallest.dual_load(load_case(scene, smallest))
+    p = smallest.dual_load(load_case(scene))
     active = contact_set(smallest.Q, p)
     assert abs(int(active.sum()) - count) <= 22  # 1 % of m
     lam = np.zeros(len(p))

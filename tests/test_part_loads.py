@@ -10,6 +10,7 @@ from joints import degrees, dof, make_joint, make_scene
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
+from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.local_thickness import LocalThickness
 from problems.effects.ribs import Ribs
@@ -17,10 +18,10 @@ from problems.effects.self_weight import SelfWeight
 from problems.effects.support_shift import SupportShift
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
-from problems.forms.assembly import Prepared
-from problems.model.effect import Effect, PartLoadEffect, PartModel, StiffnessEffect
+from problems.forms.prepared import Prepared
+from problems.model.effect import Effect, PartLoadEffect, StiffnessEffect
 from problems.model.joint import Joint
-from problems.prepare import load_case, prepared
+from problems.model.part import PartModel
 
 E, T = 70e3, 6.0
 #: A strip along y, clamped at y = −200, free at y = 150, bending like a beam since ν = 0.
@@ -40,7 +41,7 @@ FREE_JOINT = make_joint(OVERHANG, contacts=[["a", "tool"]])
 def solved(joint: Joint, *effects: Effect) -> tuple[NDArray[np.float64], Prepared]:
     scene = make_scene(joint, *effects)
     made = prepared(scene)
-    return made.solve_K(load_case(scene, made).f), made
+    return made.solve_K(load_case(scene).f), made
 
 
 def strip(*effects: Effect) -> NDArray[np.float64]:
@@ -74,7 +75,9 @@ def test_work_of_heat_on_a_part_with_a_pad() -> None:
     """On w = a x² + c y²: −(1 + ν) D κ (2a + 2c) times the area, with the pad's D and κ on the pad."""
     plate = FREE_JOINT.plate(FREE_JOINT.part[0])
     pad = LocalThickness(kind="local_thickness", part="a", thickness=9.0, x=(30, 333), y=(-111, 95))
-    f = ThermalBending(kind="thermal_bending", part="a", difference=30.0).load(PartModel(plate, (pad,)))
+    f = ThermalBending(kind="thermal_bending", part="a", difference=30.0).load(
+        PartModel(plate, (pad,), range(0))
+    )
     a, c = 1e-4, -3e-5
     fields = degrees(plate.x, plate.y, lambda x, y: (a * x**2 + c * y**2, 2 * a * x, 2 * c * y, 0.0))
     moment = [E * t**3 / 12 / (1 - 0.33**2) * 1.33 * 23e-6 * 30.0 / t for t in (6.0, 9.0)]
@@ -176,7 +179,7 @@ def test_junction_moves_as_in_the_whole_plate(load: PartLoadEffect, part: dict[s
 
     plate = joint.plate(joint.part[0])
     K = plate.stiffness() + sum(effect.stiffness(plate) for effect in stiff)  # type: ignore[operator]
-    f = load.load(PartModel(plate, tuple(stiff)))
+    f = load.load(PartModel(plate, tuple(stiff), range(0)))
     held = {"south": 0, "north": len(plate.y) - 1}
     clamped = [held[edge] for edge in part.get("clamped", [])]
     lines = [iy for iy in range(len(plate.y)) if iy not in clamped]
@@ -194,10 +197,10 @@ def test_a_condensed_load_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     from problems.condensation import condensed_load
 
     scene = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1234.0))
-    made = prepared(scene)
-    first = load_case(scene, made)
+    prepared(scene)
+    first = load_case(scene)
     monkeypatch.setattr(condensed_load, "_condensed", lambda *_: pytest.fail("condensed a second time"))
-    np.testing.assert_array_equal(load_case(scene, made).f, first.f)
+    np.testing.assert_array_equal(load_case(scene).f, first.f)
     heavier = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1235.0))
     with pytest.raises(pytest.fail.Exception, match="second time"):
-        load_case(heavier, made)
+        load_case(heavier)

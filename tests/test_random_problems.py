@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 from solving import CASES, IN_HOUSE, allowed, solve
 from test_reference import exact_solution
 
-from harness.conformance.trials import contact_rows, prepared_from, stiffness
+from harness.conformance.trials import contact_rows, stiffness
 from harness.verification.judge import conditioned_limit
 from harness.verification.principal_pivoting import contact_set
 from harness.verification.reference import refined_active_set
-from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import Prepared
 from problems.ladders.units import rescaled
 from problems.manufactured.exact import Shares, frame, solved, spectrum
 
@@ -41,7 +42,7 @@ def problem(seed: int, pairs: int, tools: int) -> tuple[Prepared, LoadCase]:
     random = np.random.default_rng(seed)
     sizes = [pairs + tools, *([pairs] if pairs else [])]
     blocks = tuple(rounded(stiffness(random, size), 64) for size in sizes)
-    prepared = prepared_from(blocks, contact_rows(pairs, tools)[: sum(sizes)])
+    prepared = Prepared(Assembly(blocks, contact_rows(pairs, tools)[: sum(sizes)]))
     n, m = prepared.assembly.n, prepared.assembly.m
     if seed % 2:
         f, g = random.normal(0, 500, n), random.uniform(0, 0.5, m)
@@ -119,7 +120,7 @@ def test_in_house_solvers_hold_or_say_so(
     made = solved(frame(*d), seed, Shares(closed, weak * (1 - closed)))
     C = np.exp2(np.random.default_rng(seed).integers(-contact_bits, contact_bits + 1, 2**bits))
     made = rescaled(made, 1.0, C, 2.0**force_bits)
-    prepared = prepared_from(made.assembly.blocks, made.assembly.A)
+    prepared = Prepared(Assembly(made.assembly.blocks, made.assembly.A))
     assert made.x is not None
     condition = max(part.max() for part in d)
     limit = conditioned_limit(1e-7, condition, abs(made.x).max())

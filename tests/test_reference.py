@@ -15,12 +15,13 @@ from joints import make_joint, make_scene
 from numpy.typing import NDArray
 from small import make_load, make_prepared, solve_by_nnls
 
-from harness.conformance.trials import contact_rows, prepared_from
+from harness.conformance.trials import contact_rows
 from harness.verification import reference as module
 from harness.verification.principal_pivoting import contact_set
 from harness.verification.reference import reference, refined_active_set
 from problems.build import prepared
-from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import Prepared
 
 Exact = list[Fraction]
 
@@ -47,7 +48,7 @@ def conditioned(condition: float, seed: int, pairs: int = 5) -> tuple[Prepared, 
         K = (basis * np.geomspace(1, condition, pairs)) @ basis.T
         blocks.append((K + K.T) / 2)
     load = LoadCase(random.normal(0, 100, 2 * pairs), random.uniform(0.01, 0.5, pairs))
-    return prepared_from(tuple(blocks), contact_rows(pairs, 0)), load
+    return Prepared(Assembly(tuple(blocks), contact_rows(pairs, 0))), load
 
 
 def exact_solution(made: Prepared, load: LoadCase, active: NDArray[np.bool_]) -> tuple[Exact, Exact, Exact]:
@@ -130,7 +131,7 @@ def test_recovered_displacements_are_refined_once() -> None:
     """Factors that are wrong by 1e-4 leave an error of its square."""
     made = make_prepared(1, 25)
     load, x, lam = chosen(made, 1, 0.4, 0.0)
-    blunt = replace(made, factors=tuple(U * (1 + 1e-4) for U in made.factors))
+    blunt = Prepared(made.assembly, tuple(U * (1 + 1e-4) for U in made.factors))
     error = abs(blunt.recover(lam, load) - x).max() / abs(x).max()
     assert 1e-9 < error < 1e-7
 
@@ -269,10 +270,11 @@ def test_no_infeasibility_is_left_where_full_exchanges_alone_cycle(seed: int) ->
 def test_reference_is_computed_once(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
     made = make_prepared(1, 12)
+    made.key = "these matrices"
     case, _ = make_load(2, made)
-    first = reference("scene", made, case)
+    first = reference(made, case)
     monkeypatch.setattr(module, "refined_active_set", lambda *_: pytest.fail("computed a second time"))
-    second = reference("scene", made, case)
+    second = reference(made, case)
     for name in ("x", "lam", "active"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
     assert second.active.dtype == bool
@@ -280,12 +282,13 @@ def test_reference_is_computed_once(tmp_path: object, monkeypatch: pytest.Monkey
 
 
 def test_another_load_has_another_reference(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Even under the same scene key, as after a change in the code of an effect."""
+    """With the same matrices, as after a change in the code of an effect."""
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
     made = make_prepared(1, 12)
+    made.key = "these matrices"
     case, _ = make_load(2, made)
-    first = reference("scene", made, case)
-    more = reference("scene", made, replace(case, f=2 * case.f))
-    wider = reference("scene", made, replace(case, g=case.g + 0.1))
+    first = reference(made, case)
+    more = reference(made, replace(case, f=2 * case.f))
+    wider = reference(made, replace(case, g=case.g + 0.1))
     assert abs(first.x - more.x).max() > 1e-3
     assert abs(first.x - wider.x).max() > 1e-3

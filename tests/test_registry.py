@@ -8,25 +8,21 @@ from typing import Any
 import pytest
 
 from problems.errors import InputError
-from report.results import labels
 from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
-from solvers.registry import IN_HOUSE, SOLVERS, make_solver, solver_names, solver_version
+from solvers.registry import in_house, make_solver, modules, solver_names, solver_version
 
 NAMES = solver_names()
 LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")
 
 
-def test_registry_names_in_house_libraries_and_what_qpsolvers_finds() -> None:
-    assert NAMES[: len(SOLVERS)] == list(SOLVERS)
+def test_solvers_are_found_by_their_files() -> None:
+    """In-house ones first, then the libraries, then what qpsolvers finds."""
+    assert list(modules()) == ["gi", "ipm", "ipm-fast", "newton", *sorted(LIBRARIES)]
+    assert NAMES[: len(modules())] == list(modules())
     assert {"quadprog", "daqp"} <= set(NAMES)
     assert len(NAMES) == len(set(NAMES))
-
-
-def test_the_report_counts_the_same_solvers_as_in_house() -> None:
-    """It reads results alone, so it has the names a second time."""
-    assert labels.IN_HOUSE == IN_HOUSE
-    assert set(SOLVERS) == {*IN_HOUSE, *LIBRARIES} <= {*labels.ORDER}
+    assert [name for name in NAMES if in_house(name)] == ["gi", "ipm", "ipm-fast", "newton"]
 
 
 @pytest.mark.parametrize("name", LIBRARIES)

@@ -37,7 +37,6 @@ from harness.series.session import Job
 from problems.errors import InputError
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
-from problems.prepare import prepared
 from problems.scene import read_scene
 
 CASES = 60
@@ -49,7 +48,7 @@ needs_dask = pytest.mark.skipif(not DASK, reason="needs Dask")
 @pytest.fixture
 def job(tmp_path: Path) -> Job:
     scene = read_scene(str(write_strip(tmp_path)))
-    return Job(scene, random_gaps(scene, prepared(scene), CASES, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)
+    return Job(scene, random_gaps(scene, CASES, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)
 
 
 @pytest.fixture(scope="module")
@@ -244,7 +243,7 @@ def test_a_table_is_solved_on_workers_a_case_each_row(cluster: Any, tmp_path: Pa
     """Each block is sent with its own rows of the table; a resumed series has blocks with gaps in them."""
     scene = read_scene(str(write_strip(tmp_path)))
     np.save(tmp_path / "gaps.npy", np.random.default_rng(0).uniform(0, 0.5, (30, 45)))
-    table = measured_gaps(scene, prepared(scene), tmp_path / "gaps.npy")
+    table = measured_gaps(scene, tmp_path / "gaps.npy")
     job = Job(scene, table, "newton", "dual", 1e-11, 1e-7, 0, 1)
     alone, out = tmp_path / "alone", tmp_path / "out"
     assert run(job, {}, alone, quiet()) == 0

@@ -14,15 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
-from harness.conformance.trials import known_case, prepared_from, stiffness
+from harness.conformance.trials import known_case, stiffness
 from harness.verification.batched.bound import Bound, gaps, independence
 from harness.verification.batched.compliance import largest_compliance
 from harness.verification.batched.residual import Split, bits, refined, residual, split
 from harness.verification.batched.vouch import Vouched, vouch
 from harness.verification.exact_residual import gamma
 from harness.verification.reference import refined_active_set
-from problems.forms.assembly import Assembly, LoadCase, Prepared
-from solvers.base import Load
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
 
 
 def exact(assembly: Assembly, f: np.ndarray, x: np.ndarray, lam: np.ndarray) -> list[Fraction]:
@@ -141,7 +141,7 @@ def test_the_largest_compliance_is_above_and_close(make: Callable[[], Prepared])
 
 
 def answer(prepared: Prepared, case: LoadCase, lam: np.ndarray, x: np.ndarray | None = None) -> Vouched:
-    load = Load(case.f, case.g, prepared.dual_load(case))
+    load = LoadCase(case.f, case.g, prepared.dual_load(case))
     return vouch(Bound.of(prepared), [load], [lam], [x])[0]
 
 
@@ -232,7 +232,7 @@ def test_weakly_active_contacts_do_not_widen_the_bound() -> None:
 
 def test_nothing_is_vouched_for_where_K_is_not_proven_definite() -> None:
     blocks = (stiffness(np.random.default_rng(0), 3),)
-    prepared = prepared_from(blocks, sp.csc_array(np.eye(3)))
+    prepared = Prepared(Assembly(blocks, sp.csc_array(np.eye(3))))
     found = Bound.of(prepared)
     none = replace(found, kappa=0.0).bound(*(np.zeros((3, 2)) for _ in range(5)))
     assert np.isinf(none).all()

@@ -20,11 +20,12 @@ from strip import write_strip
 from typer.testing import CliRunner
 
 from harness.cli.app import app
-from harness.series import session as desk_module
+from harness.series import session as session_module
 from harness.series import store
-from harness.series.session import Desk, Job
+from harness.series.session import Job, SeriesSession
+from problems.build import load_case, prepared
+from problems.forms.dual import Dual
 from problems.load_cases.random_gaps import random_gaps
-from problems.prepare import load_case, prepared
 from problems.scene import read_scene
 
 ROOT = Path(__file__).parent.parent
@@ -69,7 +70,7 @@ def test_rows_and_gaps_against_nnls_on_scenes_of_their_own(tmp_path: Path) -> No
     for row in rows[::9]:
         scene = read_scene(str(write_strip(tmp_path, ("seed = 7", f"seed = {row['gap_seed']}"))))
         data = prepared(scene)
-        case = load_case(scene, data)
+        case = load_case(scene)
         x, lam = solve_by_nnls(data, case)
         gap = case.g - data.assembly.A.T @ x
         np.testing.assert_allclose(gaps[row["case"]], gap, rtol=1e-7, atol=1e-9)
@@ -110,16 +111,16 @@ def test_a_torn_row_is_solved_again() -> None:
 
 
 def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = Desk._try
+    solve = SeriesSession._try
 
-    def interrupted(self: Desk, case: int, load: Any) -> Any:
+    def interrupted(self: SeriesSession, case: int, load: Any) -> Any:
         if case == 50:
             raise KeyboardInterrupt
         return solve(self, case, load)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Desk, "_try", interrupted)
-        patch.setattr(desk_module, "BLOCK", 32)
+        patch.setattr(SeriesSession, "_try", interrupted)
+        patch.setattr(session_module, "BLOCK", 32)
         some = ("--cases", "60", "--solver", "gi", "--out", "stopped")
         assert "the same command goes on" in series(*some, code=130).output
     assert [row["case"] for row in rows_of("stopped")] == list(range(32))  # whole blocks
@@ -179,7 +180,7 @@ def test_a_sweep_starts_from_its_neighbour(tmp_path: Path) -> None:
     assert rows[7]["initial_gap.mean"] == pytest.approx(0.1 + 7 * 0.9 / 39)
     scene = read_scene(str(write_strip(tmp_path, ("mean = 0.4", f"mean = {rows[7]['initial_gap.mean']}"))))
     data = prepared(scene)
-    case = load_case(scene, data)
+    case = load_case(scene)
     gap = case.g - data.assembly.A.T @ solve_by_nnls(data, case)[0]
     np.testing.assert_allclose(gaps_of("swept")[7], gap, rtol=1e-7, atol=1e-9)
 
@@ -218,9 +219,9 @@ def test_other_solvers_and_forms(solver: str, form: str) -> None:
 def test_a_solver_that_fails_is_a_row(fault: str) -> None:
     Path("faulty.py").write_text(tiny.FAULTY)
     scene = read_scene("strip.toml")
-    job = Job(scene, random_gaps(scene, prepared(scene), 3, 0), "faulty", "dual", 1e-9, 1e-7, 0, 1,
+    job = Job(scene, random_gaps(scene, 3, 0), "faulty", "dual", 1e-9, 1e-7, 0, 1,
               {"fault": fault}, Path("faulty.py"))  # fmt: skip
-    (results,) = Desk(job).solve([0, 1, 2])
+    (results,) = SeriesSession(job).solve([0, 1, 2])
     assert [result.row["verdict"] for result in results] == ["no_answer"] * 3
     assert all(result.gap is None for result in results)
     if fault == "raises":
@@ -230,28 +231,25 @@ def test_a_solver_that_fails_is_a_row(fault: str) -> None:
 def test_a_wrong_answer_is_not_vouched_for() -> None:
     scene = read_scene("strip.toml")
     Path("faulty.py").write_text(tiny.FAULTY)
-    job = Job(scene, random_gaps(scene, prepared(scene), 4, 0), "faulty", "dual", 1e-9, 1e-7, 2, 1,
+    job = Job(scene, random_gaps(scene, 4, 0), "faulty", "dual", 1e-9, 1e-7, 2, 1,
               {"fault": "big_details"}, Path("faulty.py"))  # fmt: skip
-    (results,) = Desk(job).solve([0, 1, 2, 3])  # its λ is zero
+    (results,) = SeriesSession(job).solve([0, 1, 2, 3])  # its λ is zero
     assert [result.row["verdict"] for result in results] == ["outside", "cannot_be_judged"] * 2
 
 
 def test_what_p_has_lost_in_rounding_is_made_good(monkeypatch: pytest.MonkeyPatch) -> None:
     """p is off by 1e-6 mm: the gaps that were found say so, and a second answer is within 1e-8 mm."""
     scene, rng = read_scene("strip.toml"), np.random.default_rng(0)
-    loads = Desk._loads
+    loads = Dual.loads
 
-    def spoilt(self: Desk, numbers: Any) -> Any:
-        return [
-            (case, replace(load, p=load.p + 1e-6 * rng.standard_normal(45)))
-            for case, load in loads(self, numbers)
-        ]
+    def spoilt(self: Dual, cases: Any) -> Any:
+        return [replace(load, p=load.p + 1e-6 * rng.standard_normal(45)) for load in loads(self, cases)]
 
-    monkeypatch.setattr(Desk, "_loads", spoilt)
+    monkeypatch.setattr(Dual, "loads", spoilt)
     found = {}
     for limit in (1e-3, 1e-8):
-        job = Job(scene, random_gaps(scene, prepared(scene), 9, 0), "newton", "dual", 1e-11, limit, 1, 1)
-        (results,) = Desk(job).solve(range(9))
+        job = Job(scene, random_gaps(scene, 9, 0), "newton", "dual", 1e-11, limit, 1, 1)
+        (results,) = SeriesSession(job).solve(range(9))
         found[limit] = [result.row for result in results]
         assert {row["verdict"] for row in found[limit]} == {"within"}
         for row in found[limit]:
@@ -263,32 +261,32 @@ def test_what_p_has_lost_in_rounding_is_made_good(monkeypatch: pytest.MonkeyPatc
 
 def test_memory_does_not_grow_with_the_cases() -> None:
     scene = read_scene("strip.toml")
-    job = Job(scene, random_gaps(scene, prepared(scene), 10**9, 0), "gi", "dual", 1e-9, 1e-7, 0, 1)
-    desk = Desk(job)
-    for _ in desk.solve(range(10**8, 10**8 + 5 * desk_module.NEARS)):
-        assert len(desk.starts.kept) <= desk_module.NEARS
+    job = Job(scene, random_gaps(scene, 10**9, 0), "gi", "dual", 1e-9, 1e-7, 0, 1)
+    desk = SeriesSession(job)
+    for _ in desk.solve(range(10**8, 10**8 + 5 * session_module.STARTS)):
+        assert len(desk.session.solved) <= session_module.STARTS
 
 
 @pytest.mark.parametrize("fault", ["raise RuntimeError", "return answers[:-1]", "return [None] * len(loads)"])
 def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault: str) -> None:
-    """A plugin whose `together` fails on one block."""
+    """A plugin whose `batched` fails on one block."""
     text = (
         tiny.EXACT
         + f"""
-    def together(self, state):
+    def batched(self, state):
         def answers(loads, tolerance):
             answers = [self.solve(state, load, tolerance) for load in loads]
-            if len(loads) < {desk_module.BLOCK}:
+            if len(loads) < {session_module.BLOCK}:
                 {fault}
             return answers
         return answers
 """
     )
     Path("atonce.py").write_text(text)
-    scene, count = read_scene("strip.toml"), desk_module.BLOCK + 5
-    job = Job(scene, random_gaps(scene, prepared(scene), count, 0), "atonce", "dual", 1e-9, 1e-7, 0, 1,
+    scene, count = read_scene("strip.toml"), session_module.BLOCK + 5
+    job = Job(scene, random_gaps(scene, count, 0), "atonce", "dual", 1e-9, 1e-7, 0, 1,
               {}, Path("atonce.py"))  # fmt: skip
-    rows = [result.row for results in Desk(job).solve(range(count)) for result in results]
+    rows = [result.row for results in SeriesSession(job).solve(range(count)) for result in results]
     assert [row["case"] for row in rows] == list(range(count))
     assert {row["status"] for row in rows} == {"solved"}
-    assert [("setup_s" in row) for row in rows] == [False] * desk_module.BLOCK + [True] * 5
+    assert [("setup_s" in row) for row in rows] == [False] * session_module.BLOCK + [True] * 5

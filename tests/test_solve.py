@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from joints import forbid_building
 from matplotlib.image import imread
 from rich.console import Console
 from small import solve_by_nnls
@@ -21,12 +22,10 @@ from harness.cli.app import app
 from harness.scene.ledger import ledger
 from harness.scene.solve import solve
 from harness.scene.validate import estimated
-from problems import build
-from problems.build import cache_key
+from problems.build import built, load_case, prepared
 from problems.errors import InputError
-from problems.prepare import load_case, prepared
+from problems.model.scene import JointScene
 from problems.scene import read_scene
-from problems.storage.cache import root
 from report.writers.vtu import grid_with_fields, write_vtu
 
 ROOT = Path(__file__).parents[1]
@@ -112,7 +111,7 @@ def test_the_answer_is_that_of_another_method(tmp_path: Path) -> None:
     record = run(tmp_path)
     scene = read_scene(str(tmp_path / "scene.toml"))
     data = prepared(scene)
-    x, lam = solve_by_nnls(data, load_case(scene, data))
+    x, lam = solve_by_nnls(data, load_case(scene))
     found = arrays(tmp_path)
     assert record["code"] == 0
     assert record["qp"]
@@ -158,7 +157,7 @@ def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: 
     found = arrays(tmp_path)
     assert not found["lam"].any()
     data = prepared(read_scene(str(tmp_path / "scene.toml")))
-    f = load_case(read_scene(str(tmp_path / "scene.toml")), data).f
+    f = load_case(read_scene(str(tmp_path / "scene.toml"))).f
     for K, own in zip(data.assembly.blocks, data.assembly.slices, strict=True):
         np.testing.assert_allclose(found["x"][own], np.linalg.solve(K, f[own]), atol=1e-12)
     assert record["closest_mm"] == pytest.approx(found["gap_after"].min(), rel=1e-9)
@@ -227,10 +226,9 @@ def test_effects_of_the_ledger_add_up_to_the_load_case(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SCENE.replace("PRELOAD", "80"))
     scene = read_scene(str(path))
-    data = prepared(scene)
-    load = load_case(scene, data)
+    load = load_case(scene)
     alone = [
-        load_case(replace(scene, effects=(*scene.stiffness_effects, effect)), data)
+        load_case(replace(scene, effects=(*scene.stiffness_effects, effect)))
         for effect in scene.effects
         if effect not in scene.stiffness_effects
     ]
@@ -241,7 +239,7 @@ def test_effects_of_the_ledger_add_up_to_the_load_case(tmp_path: Path) -> None:
 def test_a_change_of_loads_alone_reuses_the_assembly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(tmp_path)
     before = arrays(tmp_path)
-    monkeypatch.setattr(build, "_build", lambda *_: pytest.fail("built the matrices again"))
+    forbid_building(monkeypatch)
     record = run(tmp_path, preload=160.0)
     assert any("came from the cache" in line for line in record["skipped"])
     (ribs,) = (entry for entry in record["ledger"] if entry["effect"] == "ribs a")
@@ -380,8 +378,8 @@ def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
     assert first.exit_code == 0
     for said in ("n = 110", "m = 110", "contact b – tool", "has to be built", "self_weight"):
         assert said in first.output
-    assert not (root() / cache_key(read_scene(str(path)))).exists()
-    prepared(read_scene(str(path)))
+    assert not built(read_scene(str(path)))
+    _ = prepared(read_scene(str(path))).Q
     assert "stands in the cache" in CliRunner().invoke(app, ["validate", str(path)]).output
 
 
@@ -389,13 +387,13 @@ def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> No
     path = tmp_path / "scene.toml"
     path.write_text(APART)
     scene = read_scene(str(path))
-    assert scene.joint is not None
+    assert isinstance(scene, JointScene)
     made = prepared(scene)
     stored = sum(a.nbytes for a in (*made.assembly.blocks, *made.factors, made.Q))
-    estimate = estimated(scene, scene.joint, 1e9)
+    estimate = estimated(scene, 1e9)
     assert estimate.stored_mib == pytest.approx(stored / 2**20)
     assert (estimate.n, estimate.m) == (made.assembly.n, made.assembly.m)
-    slower = estimated(scene, scene.joint, 1e8)
+    slower = estimated(scene, 1e8)
     assert slower.build_s == pytest.approx(10 * estimate.build_s)
 
 
@@ -414,7 +412,7 @@ def test_validate_looks_at_given_matrices(tmp_path: Path) -> None:
 def test_a_scene_of_own_matrices_has_no_ledger(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", K=np.eye(2), A=np.eye(2)[:, :1], f=np.ones(2), g=np.ones(1))
     scene = read_scene(str(tmp_path / "mine.npz"))
-    assert ledger(scene, prepared(scene), built=True) == []
+    assert ledger(scene, built=True) == []
     said = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")]).output
     assert "n = 2, m = 1, blocks of 1, 1" in said
     assert "seem to have 1 digits" in said

@@ -9,7 +9,7 @@ import pytest
 
 from harness.measurement.solver_code import code_of
 from problems.storage.fingerprint import ROOT, fingerprint
-from solvers.registry import IN_HOUSE, SOLVERS, make_solver
+from solvers.registry import in_house, make_solver, modules
 
 
 @pytest.fixture
@@ -29,9 +29,7 @@ def change(file: Path, old: str, new: str) -> None:
 
 
 def hashes(package: Path) -> dict[str, str]:
-    files = {
-        name: place.partition(":")[0].partition(".")[2].replace(".", "/") for name, place in SOLVERS.items()
-    }
+    files = {name: module.partition(".")[2].replace(".", "/") for name, module in modules().items()}
     return {name: hash_of(package / f"{file}.py", package) for name, file in files.items()}
 
 
@@ -41,7 +39,7 @@ def changed(package: Path, before: dict[str, str]) -> set[str]:
 
 def test_a_copy_elsewhere_has_the_same_hash(package: Path) -> None:
     assert hashes(package)["newton"] == code_of(make_solver("newton", {}))
-    assert len(set(hashes(package).values())) == len(SOLVERS)
+    assert len(set(hashes(package).values())) == len(modules())
 
 
 def test_words_and_layout_do_not_count(package: Path) -> None:
@@ -50,7 +48,7 @@ def test_words_and_layout_do_not_count(package: Path) -> None:
         text = file.read_text("utf-8")
         file.write_text(f'{text}\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n')
     added = hashes(package)
-    assert changed(package, before) == set(SOLVERS)  # a function is code
+    assert changed(package, before) == set(modules())  # a function is code
     for file in package.rglob("*.py"):
         change(file, '\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n', (
             '\n# another comment\ndef _unused() -> None:  # more\n    """Other\n    words."""\n'
@@ -76,7 +74,7 @@ def test_a_constant_two_imports_down_counts_for_those_who_use_it(package: Path) 
 def test_what_all_are_made_of_counts_for_all(package: Path) -> None:
     before = hashes(package)
     change(package / "base.py", 'Answer("failed", None,', 'Answer("inaccurate", None,')
-    assert changed(package, before) == set(SOLVERS)
+    assert changed(package, before) == set(modules())
 
 
 def test_a_library_does_not_depend_on_the_solvers_of_the_house(package: Path) -> None:
@@ -84,8 +82,8 @@ def test_a_library_does_not_depend_on_the_solvers_of_the_house(package: Path) ->
     (package / "libraries/osqp.py").write_text("OTHER = 1\n")
     (package / "methods/newton.py").write_text("OTHER = 1\n")
     assert changed(package, before) == {"osqp", "newton"}
-    (package / "libraries/adapter.py").write_text("OTHER = 1\n")
-    assert changed(package, before) == {*SOLVERS} - {*IN_HOUSE} | {"newton"}
+    (package / "adapter.py").write_text("OTHER = 1\n")
+    assert changed(package, before) == {name for name in modules() if not in_house(name)} | {"newton"}
 
 
 @pytest.mark.parametrize(

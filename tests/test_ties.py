@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as sla
-from joints import make_joint, make_scene
+from joints import make_joint, make_scene, untied
 
-from problems import build
+from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.pressure import Pressure
 from problems.effects.supports import Supports
-from problems.prepare import load_case, prepared
 
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 TWO = make_joint(PART, PART | {"name": "b"})
@@ -28,9 +27,9 @@ def test_one_fastener_draws_two_equal_parts_together(stiffness: float) -> None:
     """Each part has the compliance c at the node: x_a = −x_b = c k d / (1 + 2 c k)."""
     scene = make_scene(TWO, fastener((200.0, 40.0), stiffness=stiffness, approach=0.6))
     made = prepared(scene)
-    x = made.solve_K(load_case(scene, made).f)
+    x = made.solve_K(load_case(scene).f)
     node = 7  # (200, 40) on the 5 × 4 grid
-    c = np.linalg.inv(build.prepared(scene).assembly.blocks[0])[node, node]
+    c = np.linalg.inv(prepared(untied(scene)).assembly.blocks[0])[node, node]
     u = c * stiffness * 0.6 / (1 + 2 * c * stiffness)
     assert x[node] == pytest.approx(u, rel=1e-9)
     np.testing.assert_allclose(x[:20], -x[20:], atol=1e-12)
@@ -40,7 +39,7 @@ def test_fasteners_without_approach_let_equal_parts_move_as_one() -> None:
     """The same load on both: no spring is stretched, and the parts do what they do without them."""
     loads = [Pressure(kind="pressure", part=name, value=1e-3) for name in "ab"]
     bare, tied = make_scene(TWO, *loads), make_scene(TWO, *loads, fastener((100.0, 0.0), (300.0, 80.0)))
-    x = [made.solve_K(load_case(s, made).f) for s in (bare, tied) for made in [prepared(s)]]
+    x = [made.solve_K(load_case(s).f) for s in (bare, tied) for made in [prepared(s)]]
     np.testing.assert_allclose(x[0], x[1], rtol=1e-8)
 
 
@@ -56,7 +55,7 @@ def test_blocks_are_those_of_the_dense_sum() -> None:
         ([fastener((100.0, 0.0))], ["a + b + c + d"]),
     ):
         scene = make_scene(FOUR, *effects)
-        made, base = prepared(scene), build.prepared(scene)
+        made, base = prepared(scene), prepared(untied(scene))
         assert list(made.assembly.parts) == names
         K = sla.block_diag(*base.assembly.blocks)
         for effect in effects:
@@ -77,8 +76,9 @@ def test_blocks_are_those_of_the_dense_sum() -> None:
 
 def test_installing_a_fastener_condenses_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     effect = Supports(kind="supports", part="a", points=((0.0, 0.0),), stiffness_per_point=123.0)
-    build.prepared(make_scene(TWO, effect))
-    monkeypatch.setattr(build, "_build", lambda *_: pytest.fail("built the parts again"))
+    prepared(make_scene(TWO, effect))
+    condense = "problems.condensation.condense.condense"
+    monkeypatch.setattr(condense, lambda *_: pytest.fail("condensed the parts again"))
     first = prepared(make_scene(TWO, effect, fastener((100.0, 0.0))))
     again = prepared(
         make_scene(TWO, effect, fastener((100.0, 0.0)), Pressure(kind="pressure", part="a", value=1.0))

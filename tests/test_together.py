@@ -10,15 +10,17 @@ import pytest
 from small import make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
-from harness.conformance.trials import contact_rows, prepared_from
-from problems.forms.assembly import LoadCase, Vector
+from harness.conformance.trials import contact_rows
+from problems.build import load_case, prepared
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from problems.load_cases.random_gaps import random_gaps
-from problems.prepare import load_case, prepared
 from problems.scene import read_scene
-from solvers.active_set.batched import Together
+from solvers.active_set.batched import BatchedSweeps
 from solvers.active_set.bordered_factor import Set
 from solvers.active_set.contact_sets import Trial
-from solvers.base import Answer, Load, Problem
+from solvers.base import Answer
 from solvers.linear_algebra.banded_inverse import BandedInverse, along, banded_inverse
 from solvers.methods.newton import ActiveSetNewton
 
@@ -96,7 +98,7 @@ def test_what_is_not_positive_definite_is_said() -> None:
 def test_answers_against_nnls(tools: int) -> None:
     data = make_prepared(3, 25, tools)
     pairs = [make_load(seed, data) for seed in range(20)]
-    solve = ActiveSetNewton().together(ActiveSetNewton().prepare(Problem(data, "dual")))
+    solve = ActiveSetNewton().batched(ActiveSetNewton().prepare(in_form(data, "dual")))
     assert solve is not None
     for (case, _), answer in zip(pairs, solve([load for _, load in pairs], TOLERANCE), strict=True):
         x, lam = solve_by_nnls(data, case)
@@ -106,22 +108,22 @@ def test_answers_against_nnls(tools: int) -> None:
         np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-9)
 
 
-def strip_loads(folder: Path, count: int) -> tuple[Any, list[Any], list[Load]]:
+def strip_loads(folder: Path, count: int) -> tuple[Any, list[Any], list[LoadCase]]:
     scene = read_scene(str(write_strip(folder)))
     data = prepared(scene)
-    series = random_gaps(scene, data, count, 3)
-    cases = [load_case(scene, data), *(series.load(k, data) for k in range(count - 1))]
-    return data, cases, [Load(case.f, case.g, data.dual_load(case)) for case in cases]
+    series = random_gaps(scene, count, 3)
+    cases = [load_case(scene), *(series.load(k) for k in range(count - 1))]
+    return data, cases, [LoadCase(case.f, case.g, data.dual_load(case)) for case in cases]
 
 
 def test_a_strip_with_random_gaps_in_blocks_of_any_size(tmp_path: Path) -> None:
     """Sweeps settle all of them, as NNLS does, whatever was solved before."""
     data, cases, loads = strip_loads(tmp_path, 24)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
-    at_once = Together(data.Q, M, alone)(loads, TOLERANCE)
-    in_threes = Together(data.Q, M, alone)
+    at_once = BatchedSweeps(data.Q, M, alone)(loads, TOLERANCE)
+    in_threes = BatchedSweeps(data.Q, M, alone)
     three = [answer for k in range(0, 24, 3) for answer in in_threes(loads[k : k + 3], TOLERANCE)]
-    backwards = Together(data.Q, M, alone)(loads[::-1], TOLERANCE)[::-1]
+    backwards = BatchedSweeps(data.Q, M, alone)(loads[::-1], TOLERANCE)[::-1]
     closed = set()
     for case, *answers in zip(cases, at_once, three, backwards, strict=True):
         x, lam = solve_by_nnls(data, case)
@@ -137,10 +139,10 @@ def test_a_strip_with_random_gaps_in_blocks_of_any_size(tmp_path: Path) -> None:
 def test_contacts_that_all_open_or_all_close(tmp_path: Path) -> None:
     data, _, loads = strip_loads(tmp_path, 2)
     spread = np.full(45, 100.0)  # N at each contact
-    closed = Load(loads[0].f, loads[0].g, data.Q @ spread)
-    opened = Load(loads[0].f, loads[0].g, -spread)
+    closed = LoadCase(loads[0].f, loads[0].g, data.Q @ spread)
+    opened = LoadCase(loads[0].f, loads[0].g, -spread)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
-    shut, free = Together(data.Q, M, alone)([closed, opened], TOLERANCE)
+    shut, free = BatchedSweeps(data.Q, M, alone)([closed, opened], TOLERANCE)
     np.testing.assert_allclose(shut.lam, spread, rtol=1e-6)
     assert free.lam is not None
     assert not free.lam.any()
@@ -151,13 +153,13 @@ def test_what_sweeps_do_not_settle_is_solved_alone_and_soon_at_once() -> None:
     rng = np.random.default_rng(5)
     W, _ = np.linalg.qr(rng.standard_normal((120, 120)))
     K = (W * np.geomspace(1.0, 1e4, 120)) @ W.T
-    data = prepared_from((np.asfortranarray((K + K.T) / 2),), contact_rows(0, 120))
+    data = Prepared(Assembly((np.asfortranarray((K + K.T) / 2),), contact_rows(0, 120)))
     pairs = [make_load(seed, data) for seed in range(6)]
     solver = ActiveSetNewton()
-    together = solver.together(solver.prepare(Problem(data, "dual")))
-    assert together is not None
+    batch = solver.batched(solver.prepare(in_form(data, "dual")))
+    assert batch is not None
     for again in range(2):
-        answers = together([load for _, load in pairs], TOLERANCE)
+        answers = batch([load for _, load in pairs], TOLERANCE)
         alone = ["factorisations" in answer.details for answer in answers]
         assert sum(alone) >= (6 if again else 3)
         for (case, _), answer in zip(pairs, answers, strict=True):
@@ -165,7 +167,7 @@ def test_what_sweeps_do_not_settle_is_solved_alone_and_soon_at_once() -> None:
             assert answer.lam is not None
             assert answer.details["closed"] == (lam > 0).sum()
             np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-8)
-        assert not together.of_use
+        assert not batch.of_use
 
 
 def test_a_near_case_is_where_the_next_one_begins() -> None:
@@ -174,9 +176,9 @@ def test_a_near_case_is_where_the_next_one_begins() -> None:
     first = make_load(1, data)[1]
     closed = solve_by_nnls(data, LoadCase(first.f, first.g))[1] > 0
     change = data.Q @ np.where(closed, 1.0, 0.0)  # N more on each closed contact
-    second = Load(first.f, first.g, first.p + change)
-    together = Together(data.Q, banded_inverse(data.Q, None), alone)
-    one, two = (together([load], TOLERANCE)[0] for load in (first, second))
+    second = LoadCase(first.f, first.g, first.p + change)
+    batch = BatchedSweeps(data.Q, banded_inverse(data.Q, None), alone)
+    one, two = (batch([load], TOLERANCE)[0] for load in (first, second))
     assert one.lam is not None
     assert two.iterations == 1
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
@@ -195,11 +197,11 @@ def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
         return Answer("solved", np.zeros(45))
 
     monkeypatch.setattr("solvers.active_set.batched.SWEEPS", 4)  # not enough to be done, but for the set
-    together = Together(data.Q, M, told)
-    together(loads[:1], TOLERANCE)
+    batch = BatchedSweeps(data.Q, M, told)
+    batch(loads[:1], TOLERANCE)
     starts.clear()
-    together.of_use = True
-    together(loads[1:], TOLERANCE)
+    batch.of_use = True
+    batch(loads[1:], TOLERANCE)
     assert len(starts) == 5
     for C, case in zip(starts, cases[1:], strict=True):
         assert C is not None
@@ -210,13 +212,13 @@ def test_an_answer_is_worth_what_its_own_forces_say(tmp_path: Path) -> None:
     """A force below zero is cut off, and the gaps are looked at again."""
     data, _, loads = strip_loads(tmp_path, 1)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
-    together = Together(data.Q, M, alone)
-    together(loads, TOLERANCE)
-    (case,) = together.last
+    batch = BatchedSweeps(data.Q, M, alone)
+    batch(loads, TOLERANCE)
+    (case,) = batch.last
     lam = case.trial.lam.copy()
     lam[case.C.argmax()] = -1e-3
     case.trial = Trial(lam, case.trial.y, 0.0)
-    answer = together._answer(case, loads[0], TOLERANCE)
+    answer = batch._answer(case, loads[0], TOLERANCE)
     assert answer.status == "inaccurate"
     assert answer.lam is not None
     assert answer.lam.min() == 0
@@ -230,16 +232,16 @@ def test_few_closed_contacts_are_solved_one_case_after_another(tmp_path: Path) -
     wide = [LoadCase(case.f, case.g + 6.0) for case in cases[1:]]  # one or two of 45 contacts close
     asked: list[Set | None] = []
     solver = ActiveSetNewton()
-    together = solver.together(solver.prepare(Problem(data, "dual")))
-    assert together is not None
-    own = together.alone
+    batch = solver.batched(solver.prepare(in_form(data, "dual")))
+    assert batch is not None
+    own = batch.alone
 
     def counted(C: Set | None, p: Vector, tolerance: float) -> Answer:
         asked.append(C)
         return own(C, p, tolerance)
 
-    together.alone = counted
-    answers = together([Load(c.f, c.g, data.dual_load(c)) for c in wide], TOLERANCE)
+    batch.alone = counted
+    answers = batch([LoadCase(c.f, c.g, data.dual_load(c)) for c in wide], TOLERANCE)
     assert asked == [None] * 4
     for case, answer in zip(wide, answers, strict=True):
         x, lam = solve_by_nnls(data, case)
@@ -252,4 +254,4 @@ def test_newton_has_no_such_way_without_a_factor() -> None:
     data = make_prepared(1, 5)
     broken = type(data)(data.assembly, data.factors, -data.Q)
     solver = ActiveSetNewton()
-    assert solver.together(solver.prepare(Problem(broken, "dual"))) is None
+    assert solver.batched(solver.prepare(in_form(broken, "dual"))) is None

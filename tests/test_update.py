@@ -8,27 +8,29 @@ import numpy as np
 import pytest
 from small import make_load, make_prepared, solve_by_nnls
 
-from problems.forms.assembly import LoadCase, Prepared
-from solvers.base import FORMS, Form, Load, Near, Problem, Solver
-from solvers.registry import SOLVERS, make_solver
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.base import FORMS, Form, Solver, WarmStart
+from solvers.registry import make_solver, modules
 
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
-    *((name, {}) for name in SOLVERS),
+    *((name, {}) for name in modules()),
     ("piqp", {"backend": "sparse"}),
 ]
 CASES = [(name, options, form) for name, options in VARIANTS for form in make_solver(name, options).forms]
 TOLERANCE = 1e-9
 
 
-def near_of(prepared: Prepared, case: LoadCase, form: Form) -> Near:
+def near_of(prepared: Prepared, case: LoadCase, form: Form) -> WarmStart:
     x, lam = solve_by_nnls(prepared, case)
-    load = Load(case.f, case.g, prepared.dual_load(case))
-    return Near(load, lam, case.g - prepared.assembly.A.T @ x, x if form == "primal" else None)
+    load = LoadCase(case.f, case.g, prepared.dual_load(case))
+    return WarmStart(load, lam, case.g - prepared.assembly.A.T @ x, x if form == "primal" else None)
 
 
 def started(name: str, options: dict[str, Any], prepared: Prepared, form: Form) -> tuple[Solver, Any]:
     solver = make_solver(name, options)
-    return solver, solver.prepare(solver.convert(Problem(prepared, form)))
+    return solver, solver.prepare(solver.convert(in_form(prepared, form)))
 
 
 @pytest.mark.parametrize(("name", "options", "form"), CASES, ids=str)
@@ -44,7 +46,7 @@ def test_a_series_agrees_with_nnls(name: str, options: dict[str, Any], form: For
     for k in range(5):
         g = first.g + rng.uniform(0, 0.1, len(first.g)) if k != 1 else first.g
         case = LoadCase(first.f * (1 + 0.1 * k), g)
-        load = Load(case.f, case.g, prepared.dual_load(case))
+        load = LoadCase(case.f, case.g, prepared.dual_load(case))
         ready = solver.update(state, ready, load, TOLERANCE, nears[max(len(nears) - 2, 0)])
         got = solver.solve(ready, load, TOLERANCE)
         x, lam = solve_by_nnls(prepared, case)
@@ -67,7 +69,7 @@ def test_a_warm_start_is_taken(name: str, form: Form) -> None:
     taken = {}
     for near in (case, other):
         solver, state = started(name, {}, prepared, form)
-        before = Load(near.f, near.g, prepared.dual_load(near))
+        before = LoadCase(near.f, near.g, prepared.dual_load(near))
         ready = solver.setup(state, before, TOLERANCE)
         solver.solve(ready, before, TOLERANCE)
         ready = solver.update(state, ready, load, TOLERANCE, near_of(prepared, near, form))

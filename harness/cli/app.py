@@ -218,9 +218,9 @@ def check(
     """
     with reported() as console:
         from harness.conformance.check import run as check_solver
-        from solvers.registry import SOLVERS, make_solver
+        from solvers.registry import make_solver, modules
 
-        names = solver or ([plugin.stem] if plugin else list(SOLVERS))
+        names = solver or ([plugin.stem] if plugin else list(modules()))
         faulty = False
         for name in names:
             make_solver(name, {}, plugin)

@@ -8,7 +8,7 @@ from harness.planning.suite import read_suite, suite_names
 from problems.errors import InputError
 from problems.manufactured.ladder import rung_names
 from problems.scene import read_scene, scene_names
-from solvers.registry import SOLVERS, make_solver, solver_names, solver_version
+from solvers.registry import make_solver, modules, solver_names, solver_version
 
 
 def listing(what: str) -> Table:
@@ -23,7 +23,7 @@ def _solvers() -> Table:
             forms = " ".join(make_solver(name, {}).forms)
         except InputError as error:
             forms = error.faults[0].allowed
-        table.add_row(name, forms, solver_version(name), "" if name in SOLVERS else "qpsolvers")
+        table.add_row(name, forms, solver_version(name), "" if name in modules() else "qpsolvers")
     return table
 
 

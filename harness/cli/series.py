@@ -79,7 +79,7 @@ def series(
         from harness.series.session import Job
         from harness.series.store import CASES
         from problems.errors import Fault, InputError
-        from problems.prepare import prepared
+        from problems.forms.names import usual
         from problems.scene import read_scene
         from solvers.registry import make_solver, solver_version
 
@@ -94,7 +94,7 @@ def series(
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has as many as it has values"))
         made = make_solver(solver, {}, plugin)
-        taken = form or ("dual" if "dual" in made.forms else made.forms[0])
+        taken = form or usual(made.forms)
         if taken not in made.forms:
             faults.append(Fault("--form", "form", taken, f"{solver} takes {' and '.join(made.forms)}"))
         if tolerance <= 0 or limit <= 0:
@@ -103,12 +103,10 @@ def series(
             raise InputError(faults)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         read = read_scene(scene)
-        with console.status("opening the assembly"):
-            data = prepared(read)
         if gaps:
             from problems.load_cases.measured_gaps import measured_gaps
 
-            chosen: LoadCases = measured_gaps(read, data, gaps, cases)
+            chosen: LoadCases = measured_gaps(read, gaps, cases)
         elif sweep:
             from problems.load_cases.sweep import sweep as swept
 
@@ -116,7 +114,7 @@ def series(
         else:
             from problems.load_cases.random_gaps import random_gaps
 
-            chosen = random_gaps(read, data, cases or 100, seed or SEED, mean, sd, correlation_length)
+            chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin)  # type: ignore[arg-type]
         facts = {
             "solver_version": solver_version(solver, plugin),

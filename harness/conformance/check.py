@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
+from harness.measurement.solver_session import SolverSession
 from harness.verification.judge import LIMIT_MM
-from problems.forms.assembly import LoadCase, Vector
-from solvers.base import FORMS, Answer, Form, Near, Problem, Solver
+from problems.forms.assembly import Vector
+from problems.forms.problem import in_form
+from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 
 from .inspection import TOLERANCE, Finding, distance, inspect
 from .trials import Case, Trial, trials
@@ -40,7 +42,7 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] | None = Non
 
 def _check_trial(factory: Callable[[], Solver], trial: Trial, form: Form) -> Iterator[Finding]:
     """The cases one after another on one state, then the first one again, then by a fresh solver."""
-    problem = Problem(trial.prepared, form)
+    problem = in_form(trial.prepared, form)
     before = _fingerprint(trial)
     first_case, *other_cases = trial.cases
     steps = _Steps(factory(), problem)
@@ -64,8 +66,8 @@ def _check_trial(factory: Callable[[], Solver], trial: Trial, form: Form) -> Ite
         words = f"right when each is set up, wrong as a series by `update` ({wrong_in_series})"
         fix = "Let update renew all that depends on the load case; near is a start, not the answer"
         yield Finding(form, trial.name, words, fix)
-    if wrong_together := _together(factory, problem, trial):
-        words = f"right when each is set up, wrong when solved at once by `together` ({wrong_together})"
+    if wrong_batched := _batched(factory, problem, trial):
+        words = f"right when each is set up, wrong when solved at once by `batched` ({wrong_batched})"
         fix = "An answer to each load, in the order of the loads"
         yield Finding(form, trial.name, words, fix)
     if _differ(first, steps.answer(first_case), trial, first_case):
@@ -93,8 +95,8 @@ def _in_series(factory: Callable[[], Solver], problem: Problem, trial: Trial) ->
     return ""
 
 
-def _together(factory: Callable[[], Solver], problem: Problem, trial: Trial) -> str:
-    """What is wrong with the cases solved by `together` that are right when each is set up; "" if nothing."""
+def _batched(factory: Callable[[], Solver], problem: Problem, trial: Trial) -> str:
+    """What is wrong with the cases solved by `batched` that are right when each is set up; "" if nothing."""
     answers = _Steps(factory(), problem).answers(trial.cases)
     if answers is None:
         return ""
@@ -119,35 +121,32 @@ class _Steps:
     """A solver taken through its steps as a measurement does; what it raises becomes a finding."""
 
     def __init__(self, solver: Solver, problem: Problem) -> None:
-        self.solver, self.form, self.problem = solver, problem.form, problem
-        self.state = self._call("prepare", self._call("convert", problem))
+        self.problem = problem
+        self.session = SolverSession(solver, problem, TOLERANCE, self._lap)
+        self.session.open(batched=True)
+
+    @contextmanager
+    def _lap(self, name: str) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            raise _Raised(_raised(self.problem.form, name.removesuffix("_s"), error)) from error
 
     def answer(self, case: Case, tolerance: float = TOLERANCE) -> Answer:
-        self.ready = self._call("setup", self.state, case.load, tolerance)
-        return self._call("solve", self.ready, case.load, tolerance)
+        return self.session.cold(case.load, tolerance)
 
     def next_answer(self, case: Case, before: Case) -> Answer:
         """As a series does, from the answer of the case before."""
+        x = before.x if "x" in self.problem.needs else None
         gap = before.load.g - self.problem.assembly.A.T @ before.x
-        near = Near(before.load, before.lam, gap, before.x if self.form == "primal" else None)
-        self.ready = self._call("update", self.state, self.ready, case.load, TOLERANCE, near)
-        return self._call("solve", self.ready, case.load, TOLERANCE)
+        return self.session.warm(case.load, WarmStart(before.load, before.lam, gap, x))
 
     def answers(self, cases: Sequence[Case]) -> list[Answer] | None:
         """Those of all cases at once; None where the solver has no such way."""
-        solve_all = self._call("together", self.state)
-        if solve_all is None:
+        if self.session.batch is None:
             return None
-        try:
-            return list(solve_all([case.load for case in cases], TOLERANCE))
-        except Exception as error:
-            raise _Raised(_raised(self.form, "together", error)) from error
-
-    def _call(self, step: str, *arguments: Any) -> Any:
-        try:
-            return getattr(self.solver, step)(*arguments)
-        except Exception as error:
-            raise _Raised(_raised(self.form, step, error)) from error
+        with self._lap("batched"):
+            return list(self.session.batch([case.load for case in cases], TOLERANCE))
 
 
 def _raised(form: str, step: str, error: Exception) -> Finding:
@@ -176,8 +175,8 @@ def _differ(one: Answer, two: Answer, trial: Trial, case: Case) -> bool:
     a, b = _lam(one, trial), _lam(two, trial)
     if a is None or b is None:
         return False
-    load = LoadCase(case.load.f, case.load.g)
-    return distance(trial.prepared.recover(a, load), trial.prepared.recover(b, load)) > LIMIT_MM / 100
+    recover = trial.prepared.recover
+    return distance(recover(a, case.load), recover(b, case.load)) > LIMIT_MM / 100
 
 
 def _fingerprint(trial: Trial) -> list[bytes]:

@@ -11,7 +11,8 @@ from typing import get_args
 import numpy as np
 
 from harness.verification.judge import LIMIT_MM
-from problems.forms.assembly import LoadCase, Vector
+from problems.forms.assembly import Vector
+from problems.forms.problem import in_form
 from solvers.base import Answer, Form, Status
 
 from .trials import Case, Trial
@@ -80,7 +81,7 @@ def _wrong_arrays(answer: Answer, trial: Trial, form: Form, finding: Report) -> 
             yield finding(f'no answer, status "{answer.status}"', "The problem is small and easy: solve it")
         return
     arrays = [("lam", answer.lam, m)]
-    if form == "primal" and answer.x is None:
+    if "x" in in_form(trial.prepared, form).needs and answer.x is None:
         yield finding("x is None", "Return the displacements; only the dual form may leave them out")
     elif answer.x is not None:
         arrays.append(("x", answer.x, n))
@@ -102,7 +103,7 @@ def _wrong_values(
     answer: Answer, lam: Vector, trial: Trial, case: Case, finding: Report
 ) -> Iterator[Finding]:
     """x against the known displacements, and λ by the displacements K⁻¹(f − Aλ) that follow from it."""
-    load, prepared = LoadCase(case.load.f, case.load.g), trial.prepared
+    load, prepared = case.load, trial.prepared
     x_error = 0.0 if answer.x is None else distance(answer.x, case.x)
     lam_error = distance(prepared.recover(lam, load), case.x)
     if x_error > LIMIT_MM:

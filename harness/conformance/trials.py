@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as sla
 import scipy.sparse as sp
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix, Prepared, Vector
-from solvers.base import Load
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.prepared import Prepared
 
 Random = np.random.Generator
 
@@ -26,7 +25,7 @@ class Case:
     """A load case with its answer: x (n,) in mm, lam (m,) in N."""
 
     name: str
-    load: Load
+    load: LoadCase
     x: Vector
     lam: Vector
 
@@ -36,14 +35,6 @@ class Trial:
     name: str
     prepared: Prepared
     cases: tuple[Case, ...]
-
-
-def prepared_from(blocks: tuple[Matrix, ...], A: sp.csc_array) -> Prepared:
-    """Factors and Q = AᵀK⁻¹A of small blocks."""
-    factors = tuple(sla.cholesky(K) for K in blocks)
-    bare = Prepared(Assembly(blocks, A), factors, np.zeros((0, 0)))
-    Q = A.T @ bare.solve_K(A.toarray())
-    return Prepared(bare.assembly, factors, (Q + Q.T) / 2)
 
 
 def contact_rows(pairs: int, tools: int) -> sp.csc_array:
@@ -73,7 +64,7 @@ def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> 
     p = prepared.dual_load(LoadCase(f, g))
     for array in (f, g, p):
         array.flags.writeable = False
-    return Case(name, Load(f, g, p), x, lam)
+    return Case(name, LoadCase(f, g, p), x, lam)
 
 
 def trials(seed: int = 0) -> list[Trial]:
@@ -82,7 +73,7 @@ def trials(seed: int = 0) -> list[Trial]:
     made = []
     for name, pairs, tools in (("one contact", 1, 0), ("two parts", 12, 0), ("two parts and a tool", 30, 10)):
         blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
-        prepared = prepared_from(blocks, contact_rows(pairs, tools))
+        prepared = Prepared(Assembly(blocks, contact_rows(pairs, tools)))
         for array in (*blocks, *prepared.factors, prepared.Q, prepared.assembly.A.data):
             array.flags.writeable = False
         cases = tuple(known_case(random, prepared, closed, title) for title, closed in CLOSED.items())

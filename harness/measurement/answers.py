@@ -9,7 +9,8 @@ from typing import get_args
 import numpy as np
 
 from harness.results.records import Row
-from problems.forms.assembly import Prepared, Vector
+from problems.forms.assembly import Vector
+from problems.forms.problem import Problem
 from solvers.base import Answer, Status
 
 
@@ -17,15 +18,17 @@ class Refused(Exception):
     """The answer cannot be taken; the text says why."""
 
 
-def checked(answer: Answer, data: Prepared, form: str) -> Answer:
+def checked(answer: Answer, problem: Problem) -> Answer:
     """The answer; Refused where what the solver returned is none."""
     if not isinstance(answer, Answer):
         raise Refused(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
     if answer.status not in get_args(Status):
         raise Refused(f"status {answer.status!r}; allowed: {', '.join(get_args(Status))}")
-    if answer.status == "solved" and (answer.lam if form == "dual" else answer.x) is None:
-        raise Refused(f"says solved, and gives no {'lam' if form == 'dual' else 'x'}")
-    for name, value, size in (("lam", answer.lam, data.assembly.m), ("x", answer.x, data.assembly.n)):
+    needed = problem.needs[-1]  # x in a form that gives it: forces may be missing there
+    if answer.status == "solved" and getattr(answer, needed) is None:
+        raise Refused(f"says solved, and gives no {needed}")
+    assembly = problem.assembly
+    for name, value, size in (("lam", answer.lam, assembly.m), ("x", answer.x, assembly.n)):
         if value is None:
             continue
         if np.shape(value) != (size,):

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from harness.planning.suite import Suite
 from problems.errors import Fault, InputError
+from problems.forms.names import usual
 from solvers.base import Form
 
 from .solver_code import code_of
@@ -28,8 +29,7 @@ class Description:
 
     @property
     def usual_form(self) -> Form:
-        """The dual where the solver takes it."""
-        return "dual" if "dual" in self.forms else self.forms[0]
+        return usual(self.forms)
 
 
 #: By name and variant.

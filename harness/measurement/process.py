@@ -35,7 +35,7 @@ CHUNK = 2**16  # bytes
 LAST_WORDS = 64  # chunks read of what a dead worker wrote
 FAMILY_S = 0.5  # between two looks for processes that the worker forked
 
-JOB = ("source", "solver", "options", "plugin", "form", "tolerance", "yardstick", "together")
+JOB = ("source", "solver", "options", "plugin", "form", "tolerance", "yardstick", "batched")
 #: What a worker says once, for all the load cases of a series.
 SHARED = ("load_s", "convert_s", "prepare_s", "data_mib")
 THREAD_VARIABLES = (
@@ -179,7 +179,7 @@ class Worker:
             self.verdict = {"status": "memory_limit", "message": f"{used:.0f} MiB, more than {limit} MiB"}
 
     def _look_at_the_clock(self, seconds: float) -> None:
-        limit = PHASES[self.phase] or self.limits.time_limit_s * (self.limits.together or 1)
+        limit = PHASES[self.phase] or self.limits.time_limit_s * (self.limits.batched or 1)
         if seconds > limit:
             status = "time_limit" if self.phase == "solve" else "failed"
             self.verdict = {"status": status, "message": f"{self.phase} took more than {limit:g} s"}

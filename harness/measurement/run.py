@@ -14,6 +14,7 @@ from typing import Any
 
 from rich.console import Console
 
+from harness.planning.estimate import refuse_limits_too_low
 from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, to_toml
 from harness.planning.timeouts import out_of_time_before
@@ -22,11 +23,10 @@ from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
 from harness.terminal.progress import Display
 from harness.verification.ground_truth import Ground, ground, record, record_refusal
-from problems.errors import Fault, InputError
 from problems.scene import read_scene
 
 from .describe import Description, Solvers, describe
-from .machine import machine, physical_memory_mib
+from .machine import machine
 from .resume import resumed
 from .row import Measured, Order, measured, measured_on_worker, rows_of
 from .scheduler import done_as_completed, workers
@@ -43,7 +43,7 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.variant): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite)
-    refuse_what_cannot_fit(plan)
+    refuse_limits_too_low(plan)
     with records.held(directory):
         rows = resumed(directory, plan, solvers, console)
         records.replace_text(directory / "suite.toml", to_toml(suite))
@@ -149,25 +149,6 @@ def batches(left: list[Measurement]) -> list[list[Measurement]]:
     for m in left:
         found.setdefault(m.key if m.case is None else m.process, []).append(m)
     return list(found.values())
-
-
-def refuse_what_cannot_fit(plan: list[Measurement]) -> None:
-    """Raise InputError where the memory limit is no limit here, or the matrices alone are above it.
-
-    K and its factors take at least 8n² bytes (two parts of n/2 each), Q takes 8m².
-    """
-    faults, physical = [], physical_memory_mib()
-    limits = {(m.source, m.memory_limit_mib) for m in plan}
-    for limit in sorted({limit for _, limit in limits if limit > physical}):
-        faults.append(Fault("--memory-limit", "memory_limit_mib", limit, f"this machine has {physical} MiB"))
-    for source, limit in sorted(limits):
-        size = read_scene(source).expected_size
-        need = (8 * size[0] ** 2 + 8 * size[1] ** 2) / 2**20 if size else 0
-        if need > limit:
-            allowed = f"the matrices of scene {source} alone take {need:.0f} MiB"
-            faults.append(Fault("--memory-limit", "memory_limit_mib", limit, allowed))
-    if faults:
-        raise InputError(faults)
 
 
 def remember_machine(directory: Path, here: dict[str, Any]) -> str:

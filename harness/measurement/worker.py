@@ -16,32 +16,29 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import numpy as np
 import threadpoolctl
 
 from harness.results.records import Row, to_line
-from problems.forms.assembly import LoadCase, Prepared, Vector
-from problems.prepare import load_case, prepared
-from problems.scene import Scene, read_scene
-from solvers.base import Answer, Problem, Solver, Together
+from problems.build import load_case, prepared
+from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.problem import Problem, in_form
+from problems.model.scene import Scene
+from problems.scene import read_scene
+from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .answers import Refused, checked, figures, save
-from .loads import loads_of, recovered
+from .answers import Refused, figures, save
 from .machine import resident_mib
-from .warm_starts import WarmStarts
+from .solver_session import SolverSession
 from .yardstick import yardstick
 
 LARGEST_EVENT = 2**16  # bytes; a solver's details beyond it are dropped
 PAGE = 4096
-
-T = TypeVar("T")
 
 
 class Unsupported(Exception):
@@ -101,10 +98,6 @@ class Run:
         yield
         self.tell(**{name: before + time.perf_counter() - start})
 
-    def timed(self, name: str, call: Callable[[], T]) -> T:
-        with self.lap(name):
-            return call()
-
     def ends(self) -> Iterator[Row]:
         """Solve the job's load cases; how each ended."""
         job = self.job
@@ -113,127 +106,95 @@ class Run:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.lap("load_s"):
             scene = read_scene(job["source"])
-            data = prepared(scene)
-            cases = list(load_cases(scene, data, job))
-            touch(data, job["form"])
-        series = Series(solver, Problem(data, job["form"]), job["tolerance"])
-        files, at_once = list(map(Path, job["answers"])), job["together"]
-        if at_once is None:
+            problem = in_form(prepared(scene), job["form"])
+            cases = list(load_cases(scene, job))
+            touch(problem.arrays)
+        session = SolverSession(solver, problem, job["tolerance"], self.lap)
+        files, size = list(map(Path, job["answers"])), job["batched"]
+        if size is None:
             for case, file in zip(cases, files, strict=True):
-                yield self.solved(series, case, file)
+                yield self.solved(session, case, file)
             return
-        for start in range(0, len(cases), at_once):
-            some = slice(start, start + at_once)
-            yield from self.solved_together(series, cases[some], files[some])
+        for start in range(0, len(cases), size):
+            some = slice(start, start + size)
+            yield from self.solved_batch(session, cases[some], files[some])
 
-    def solved(self, series: Series, case: LoadCase, answer_file: Path) -> Row:
+    def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Row:
         """Solve one load case and save its answer; how that ended."""
-        data, form, tolerance = series.problem.prepared, series.problem.form, series.tolerance
+        problem = session.problem
         start = time.perf_counter()
-        (load,) = loads_of([case], data)
+        (load,) = problem.loads([case])
         form_s = time.perf_counter() - start
-        near = series.starts.nearest(load)
-
-        self.begin(series)
-        solver = series.solver
-        set_up = partial(solver.setup, series.state, load, tolerance)
-        if near is not None:
-            set_up = partial(solver.update, series.state, series.ready, load, tolerance, near[1])
-        series.ready = self.timed("setup_s", set_up)
-        answer = self.timed("solve_s", lambda: solver.solve(series.ready, load, tolerance))
-        said = figures(checked(answer, data, form))
+        near = session.nearest(load)
+        self.begin(session)
+        answer = session.next(load, near)
         x = answer.x
-        if form == "dual" and answer.lam is not None:
+        if "x" not in problem.needs and answer.lam is not None:
             with self.lap("form_s", form_s):
-                x = data.recover(np.asarray(answer.lam, dtype=float), case)
-        end = self.saved(answer, x, answer_file, data, said | {"warm": near is not None})
-        series.starts.keep(load, answer)
-        return end
+                (x,) = problem.recover([answer.lam], [None], [case])
+        return self.saved(answer, x, answer_file, problem, figures(answer) | {"warm": near is not None})
 
-    def solved_together(
-        self, series: Series, cases: Sequence[LoadCase], answer_files: Sequence[Path]
+    def solved_batch(
+        self, session: SolverSession, cases: Sequence[LoadCase], answer_files: Sequence[Path]
     ) -> Iterator[Row]:
         """The same for load cases solved at once; each has an equal share of the seconds."""
-        data, form, tolerance = series.problem.prepared, series.problem.form, series.tolerance
+        problem = session.problem
         start = time.perf_counter()
-        loads = loads_of(cases, data)
+        loads = problem.loads(cases)
         form_s = time.perf_counter() - start
 
-        warm = series.begun
-        self.begin(series)
-        if series.together is None:
+        warm = session.opened
+        self.begin(session)
+        if session.batch is None:
             raise Unsupported("takes one load case at a time")
         start = time.perf_counter()
-        answers = series.together(loads, tolerance)
+        answers = session.solve_batch(loads)
         solve_s = time.perf_counter() - start
-        if len(answers) != len(loads):
-            raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
-        said = [figures(checked(answer, data, form)) for answer in answers]
-        found = [answer.x for answer in answers]
-        if form == "dual":
-            start = time.perf_counter()
-            found = recovered([answer.lam for answer in answers], cases, data)
-            form_s += time.perf_counter() - start
+        start = time.perf_counter()
+        lams, own = [answer.lam for answer in answers], [answer.x for answer in answers]
+        found = problem.recover(lams, own, cases)
+        form_s += time.perf_counter() - start
         k = len(cases)
-        shares: Row = {"together": k, "warm": warm, "solve_s": solve_s / k, "form_s": form_s / k}
-        for answer, x, file, facts in zip(answers, found, answer_files, said, strict=True):
-            yield self.saved(answer, x, file, data, facts | shares)
+        shares: Row = {"batched": k, "warm": warm, "solve_s": solve_s / k, "form_s": form_s / k}
+        for answer, x, file in zip(answers, found, answer_files, strict=True):
+            yield self.saved(answer, x, file, problem, figures(answer) | shares)
 
-    def begin(self, series: Series) -> None:
+    def begin(self, session: SolverSession) -> None:
         """The clock of the solver starts; before the first load case it converts and prepares."""
-        if series.begun:
+        if session.opened:
             self.tell(phase="solve")
             return
         self.tell(phase="solve", data_mib=resident_mib("VmRSS"))
-        solver = series.solver
-        converted = self.timed("convert_s", lambda: solver.convert(series.problem))
-        with self.lap("prepare_s"):
-            series.state = solver.prepare(converted)
-            if self.job["together"] is not None:
-                series.together = solver.together(series.state)
-        series.begun = True
+        session.open(batched=self.job["batched"] is not None)
 
-    def saved(self, answer: Answer, x: Vector | None, file: Path, data: Prepared, said: Row) -> Row:
+    def saved(self, answer: Answer, x: Vector | None, file: Path, problem: Problem, said: Row) -> Row:
         """Tell what the solver said, and save its answer; how the case ended."""
         self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
-        if self.job["yardstick"]:
-            self.tell(**yardstick(data.Q))
+        if self.job["yardstick"] and problem.yardstick is not None:
+            self.tell(**yardstick(problem.yardstick))
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
-            save(file, x, answer.lam, data.assembly.m)
+            save(file, x, answer.lam, problem.assembly.m)
         except OSError as error:
             return {"status": "failed", "answer": None, "cannot_save": f"{file}: {error}"}
         return {"status": answer.status, "answer": f"answers/{file.name}"}
 
 
-class Series:
-    """A solver on load case after load case: what it keeps between them, and the answers to start from."""
-
-    def __init__(self, solver: Solver, problem: Problem, tolerance: float) -> None:
-        self.solver, self.problem, self.tolerance = solver, problem, tolerance
-        self.state: Any = None
-        self.ready: Any = None
-        self.together: Together | None = None
-        self.starts = WarmStarts(problem)
-        self.begun = False
-
-
-def load_cases(scene: Scene, data: Prepared, job: Row) -> Iterator[LoadCase]:
+def load_cases(scene: Scene, job: Row) -> Iterator[LoadCase]:
     """The scene's own load case, or those of a series."""
     if job["series"] is None:
-        yield load_case(scene, data)
+        yield load_case(scene)
         return
     from problems.load_cases.random_gaps import random_gaps
 
-    cases = random_gaps(scene, data, **job["series"])
+    cases = random_gaps(scene, **job["series"])
     for case in job["cases"]:
-        yield cases.load(case, data)
+        yield cases.load(case)
 
 
-def touch(data: Prepared, form: str) -> None:
-    """Read a byte of every page that this form needs, so that no solver pays for a cold file cache."""
-    arrays = [*data.assembly.blocks, *data.factors, *([data.Q] if form == "dual" else [])]
+def touch(arrays: Sequence[Matrix]) -> None:
+    """Read a byte of every page of the matrices, so that no solver pays for a cold file cache."""
     for array in arrays:
         array.ravel(order="K")[:: PAGE // array.itemsize].sum()
 

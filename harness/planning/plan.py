@@ -44,7 +44,7 @@ class Measurement:
     yardstick: bool = False
     series: RandomCases | None = None
     case: int | None = None
-    together: int | None = None
+    batched: int | None = None
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -56,7 +56,7 @@ class Measurement:
         """Identity of the measurement, the same in every run: '4386/0107 ipm dual tol=1e-09 …'."""
         words = [self.scene, self.solver, self.form, *([self.variant] if self.variant else [])]
         words += [f"tol={self.tolerance:g}", f"threads={self.threads}", f"repeat={self.repeat}"]
-        words += [] if self.together is None else [f"together={self.together}"]
+        words += [] if self.batched is None else [f"batched={self.batched}"]
         words += [] if self.case is None else [f"case={self.case}"]
         return " ".join(words + ([json.dumps(self.options, sort_keys=True)] if self.options else []))
 
@@ -150,7 +150,7 @@ def _of_entry(
             yardstick=suite.yardstick,
             series=series,
             case=case,
-            together=entry.together,
+            batched=entry.batched,
         )
 
 

@@ -23,7 +23,7 @@ from problems.input.validation import unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, rung_names
 from problems.scene import read_toml, scene_names
 from solvers.base import Form
-from solvers.registry import SOLVERS, solver_names
+from solvers.registry import modules, solver_names
 
 SUITES = Path(__file__).parent.parent / "suites"
 Some = Field(min_length=1)
@@ -33,7 +33,7 @@ class SolverEntry(BaseModel):
     """One [[solver]]: how it is called, and what it is measured on.
 
     Without `forms` it is the dual, or the primal of a solver that takes that only. `threads` and `cases` go
-    before the suite's. together : of a series so many load cases at once, by the solver's `together`.
+    before the suite's. batched : of a series so many load cases at once, by the solver's `batched`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -47,7 +47,7 @@ class SolverEntry(BaseModel):
     repeats: PositiveInt | None = None
     threads: Annotated[list[PositiveInt], Some] | None = None
     cases: PositiveInt | None = None
-    together: PositiveInt | None = None
+    batched: PositiveInt | None = None
     gated: bool = True
     time_limit_s: PositiveFloat | None = None
 
@@ -165,7 +165,7 @@ def found_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: 
 def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
     entries = data["solver"] if isinstance(data.get("solver"), list) else []
     names = {k: str(e["name"]) for k, e in enumerate(entries) if isinstance(e, dict) and "name" in e}
-    known = [*SOLVERS, *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
+    known = [*modules(), *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
     if not set(names.values()) <= set(known):
         known += [name for name in solver_names() if name not in known]  # slow, it imports every library
     return [
@@ -179,16 +179,16 @@ def _twice(suite: Suite, path: Path) -> Iterator[Fault]:
     """Entries that a table could not tell apart."""
     above: dict[tuple[str, str], tuple[object, bool]] = {}
     for k, entry in enumerate(suite.solver):
-        way = entry.options, entry.together is not None
+        way = entry.options, entry.batched is not None
         if above.setdefault((entry.name, entry.variant), way) != way:
-            what = "options" if above[entry.name, entry.variant][0] != entry.options else "`together`"
+            what = "options" if above[entry.name, entry.variant][0] != entry.options else "`batched`"
             allowed = f"{entry.name} stands above with other {what} under this variant; name another"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
 
 
 def _of_no_series(suite: Suite, path: Path) -> Iterator[Fault]:
     for k, entry in enumerate(suite.solver):
-        for key in ("cases", "together"):
+        for key in ("cases", "batched"):
             if suite.series is None and (value := getattr(entry, key)) is not None:
                 yield Fault(str(path), f"solver.{k}.{key}", value, "is for a suite with [series]")
 

@@ -24,7 +24,7 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
     for row in looser:
         if row["status"] == "time_limit" and m.time_limit_s <= row["time_limit_s"]:
             return f"{m.scene} at {row['tolerance']:g}"
-    if read_scene(m.source).rung:
+    if read_scene(m.source).on_ladder:
         return ""
     smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
     largest = max((row["n"] for row in smaller), default=0)

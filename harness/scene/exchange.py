@@ -8,12 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
 
-from harness.verification.principal_pivoting import contact_set
+from harness.verification.reference import reference
 from problems import formats
+from problems.build import load_case, prepared
 from problems.errors import Fault, InputError
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
 from problems.input.user_matrices import read_matrices
-from problems.prepare import load_case, prepared
 from problems.scene import read_scene
 
 from .few_digits import said_of_digits
@@ -25,7 +26,7 @@ def export(source: str, form: str, out: Path, console: Console) -> None:
         raise InputError.one("--format", "format", form, f"one of {', '.join(formats.WRITERS)}")
     scene = read_scene(source)
     data = prepared(scene)
-    load = load_case(scene, data)
+    load = load_case(scene)
     out.parent.mkdir(parents=True, exist_ok=True)
     formats.write(form, out, matrices(data, load))
     console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.WRITERS[form]}.")
@@ -80,17 +81,14 @@ def _checked(out: Path, console: Console) -> None:
     scene = read_scene(str(out))
     try:
         data = prepared(scene)
+        _ = data.Q
     except InputError:
         out.unlink()
         raise
-    load = load_case(scene, data)
+    load = load_case(scene)
     blocks = " + ".join(str(len(K)) for K in data.assembly.blocks)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
     console.print(f"K is symmetric and positive definite, cond(K) = {data.facts['cond_K']:.2e}.")
-    p = data.dual_load(load)
-    closed = contact_set(data.Q, p)
-    lam = np.zeros(data.assembly.m)
-    rows = np.flatnonzero(closed)
-    lam[rows] = np.linalg.solve(data.Q[np.ix_(rows, rows)], p[rows])
-    said, few = said_of_digits(data, data.recover(lam, load), lam)
+    known = reference(data, load)
+    said, few = said_of_digits(data, known.x, known.lam)
     console.print(f"{said}.", style="yellow" if few else None)

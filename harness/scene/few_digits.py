@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from harness.verification.judge import LIMIT_MM
-from problems.forms.assembly import Assembly, Prepared, Vector
+from problems.forms.assembly import Assembly, Vector
+from problems.forms.prepared import Prepared
 from problems.input.digits import DOUBLE, apparent_digits, expected_error
 
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from problems.forms.assembly import Prepared, Vector
+from problems.build import load_case
+from problems.forms.assembly import Vector
 from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect, effect_kinds
 from problems.model.joint import Joint
-from problems.prepare import load_case
-from problems.scene import Scene
+from problems.model.scene import JointScene, Scene
 
 BALANCE = 1e-9  # a sum so small beside its terms is rounding
 
@@ -50,22 +50,21 @@ def measured() -> Iterator[Cost]:
         tracemalloc.stop()
 
 
-def ledger(scene: Scene, prepared: Prepared, built: bool) -> list[Entry]:
+def ledger(scene: Scene, built: bool) -> list[Entry]:
     """An entry for each thing that an effect adds. built : the stiffness was computed now, not loaded."""
-    if scene.joint is None:
+    if not isinstance(scene, JointScene):
         return []
-    return [
-        entry for effect in scene.effects for entry in _entries(effect, scene, scene.joint, prepared, built)
-    ]
+    return [entry for effect in scene.effects for entry in _entries(effect, scene, built)]
 
 
-def not_called_for(scene: Scene) -> list[str]:
+def not_called_for(scene: JointScene) -> list[str]:
     """The kinds of effects that the scene does not name: their modules are not imported."""
     named = {effect.kind for effect in scene.effects}
     return [kind for kind in effect_kinds() if kind not in named]
 
 
-def _entries(effect: Effect, scene: Scene, joint: Joint, prepared: Prepared, built: bool) -> Iterator[Entry]:
+def _entries(effect: Effect, scene: JointScene, built: bool) -> Iterator[Entry]:
+    joint = scene.joint
     name = " ".join(filter(None, [effect.kind, getattr(effect, "part", None)]))
     for first, second in effect.contacts:
         yield Entry(name, "constraints", f"{joint.node_count} contacts of {first} and {second}", None, None)
@@ -84,7 +83,7 @@ def _entries(effect: Effect, scene: Scene, joint: Joint, prepared: Prepared, bui
         yield Entry(name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", cost.seconds, cost.mib)
     alone = replace(scene, effects=(*scene.stiffness_effects, effect))
     with measured() as cost:
-        load = load_case(alone, prepared)
+        load = load_case(alone)
     if isinstance(effect, GapEffect):
         yield Entry(name, "gap", _gap(load.g), cost.seconds, cost.mib)
     else:

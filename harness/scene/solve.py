@@ -16,22 +16,28 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from harness.measurement.answers import Refused, checked
+from harness.measurement.answers import Refused
 from harness.measurement.machine import resident_mib
+from harness.measurement.solver_session import SolverSession
+from harness.planning.estimate import refuse_what_cannot_fit
 from harness.results.records import replace_text, to_line
 from harness.terminal.exit_codes import DONE, FELL_SHORT
 from harness.verification.judge import LIMIT_MM, judge
-from harness.verification.reference import Reference, reference
+from harness.verification.reference import Reference, reference_of
+from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Prepared, Vector
-from problems.model.effect import ForceEffect, PartLoadEffect, TieEffect
-from problems.prepare import load_case, prepared
-from problems.scene import Scene, read_scene
-from solvers.base import Form, Load, Problem, Solver
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.names import usual
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from problems.model.effect import PartLoadEffect, TieEffect
+from problems.model.scene import JointScene, MatricesScene, Scene
+from problems.scene import read_scene
+from solvers.base import Solver
 
 from .few_digits import said_of_digits
+from .layout import layout
 from .ledger import Entry, ledger, not_called_for
-from .validate import refuse_what_cannot_fit
 
 ACTIVE_SET = "active set (block principal pivoting), refined"
 LINEAR = "linear solve with the Cholesky factors of K"
@@ -75,17 +81,18 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     chosen = _solver(solver) if solver else None
     with steps.step("matrices"):
         data = prepared(scene, steps.building)
+        _ = data.factors
     with steps.step("the effects, each alone"):
-        entries = ledger(scene, data, steps.condensed)
+        entries = ledger(scene, steps.condensed)
     with steps.step("loads and gaps"):
-        load = load_case(scene, data)
+        load = load_case(scene)
         p = data.dual_load(load)
     meets = bool((p > 0).any())
     with steps.step("answer with a proven bound"):
-        known = reference(scene.key, data, load)
+        known = reference_of(scene, data, load)
     if solver and chosen and meets:
         with steps.step(f"solving with {solver}"):
-            x, lam, said = _answer(solver, chosen, data, Load(load.f, load.g, p), tolerance)
+            x, lam, said = _answer(solver, chosen, data, load, tolerance)
         verdict = judge(data, load, known, x, lam, LIMIT_MM)
         said |= {"verdict": verdict.verdict, "judged_error_mm": verdict.displacement_error_mm}
     else:
@@ -109,9 +116,9 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
         "closest_mm": float(-p.max()) if p.size else None,
         "error_bound_mm": known.bound_mm,
         "route": known.route,
-        **_layout(scene, data),
+        **layout(scene, data.assembly),
         "ledger": [vars(entry) for entry in entries],
-        "digits": said_of_digits(data, known.x, known.lam)[0] if scene.matrices else None,
+        "digits": said_of_digits(data, known.x, known.lam)[0] if isinstance(scene, MatricesScene) else None,
         "skipped": list(_skipped(scene, steps, meets, solver, p)),
         "steps": steps.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
@@ -133,68 +140,23 @@ def _solver(name: str) -> Solver:
 
 
 def _answer(
-    name: str, solver: Solver, data: Prepared, load: Load, tolerance: float
+    name: str, solver: Solver, data: Prepared, case: LoadCase, tolerance: float
 ) -> tuple[Vector, Vector, dict[str, Any]]:
     """x (n,), λ (m,) or NaN where there is none, and what the solver says. Raises InputError without an x."""
-    form: Form = "dual" if "dual" in solver.forms else "primal"
-    state = solver.prepare(solver.convert(Problem(data, form)))
+    session = SolverSession(solver, in_form(data, usual(solver.forms)), tolerance)
+    problem = session.problem
+    session.open()
+    (load,) = problem.loads([case])
     try:
-        answer = checked(solver.solve(solver.setup(state, load, tolerance), load, tolerance), data, form)
+        answer = session.next(load, None)
     except Refused as error:
         raise InputError.one("--solver", name, str(error), "gave no answer; try another solver") from error
-    lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
-    x = answer.x
-    if form == "dual" and answer.lam is not None:
-        x = data.recover(lam, LoadCase(load.f, load.g))
+    (x,) = problem.recover([answer.lam], [answer.x], [load])
     if x is None:
         raise InputError.one("--solver", name, answer.status, "gave no answer; try another solver")
-    said = {"method": f"{name}, {form} form, tolerance {tolerance:g}", "status": answer.status}
+    lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
+    said = {"method": f"{name}, {problem.form} form, tolerance {tolerance:g}", "status": answer.status}
     return np.asarray(x, dtype=float), lam, said | {"iterations": answer.iterations}
-
-
-def _layout(scene: Scene, data: Prepared) -> dict[str, Any]:
-    """Where parts and pairs stand in x and λ, and what a picture marks."""
-    assembly = data.assembly
-    if scene.joint is None:
-        spans = zip(assembly.parts, assembly.slices, strict=True)
-        nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
-        bare: dict[str, Any] = {"clamped": [], "supports": []}
-        parts = [
-            {"name": name, "start": s.start, "stop": s.stop, "outline": _extent(nodes[s]), **bare}
-            for name, s in spans
-        ]
-        return {
-            "parts": parts,
-            "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else [],
-            "marks": {},
-        }
-    joint = scene.joint
-    size = joint.node_count
-    parts = []
-    for k, part in enumerate(joint.part):
-        plate = joint.plate(part)
-        held = [e.held_points for e in scene.stiffness_effects if e.part == part.name]
-        parts.append(
-            {
-                "name": part.name,
-                "start": k * size,
-                "stop": (k + 1) * size,
-                "outline": [0.0, joint.junction.length, plate.y[0], plate.y[-1]],
-                "clamped": part.clamped,
-                "supports": [point for points in held for point in points],
-            }
-        )
-    pairs = [{"pair": pair, "start": k * size, "stop": (k + 1) * size} for k, pair in enumerate(joint.pairs)]
-    marks: dict[str, list[list[float]]] = {}
-    for effect in scene.effects:
-        if isinstance(effect, ForceEffect) and len(points := effect.marks(joint)):
-            marks.setdefault(effect.kind, []).extend(points.tolist())
-    return {"parts": parts, "pairs": pairs, "marks": marks}
-
-
-def _extent(nodes: Vector) -> list[float]:
-    """The smallest and largest x, then y, of some nodes."""
-    return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist()
 
 
 def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vector) -> Iterator[str]:
@@ -207,12 +169,12 @@ def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vec
         yield f"the quadratic program: it was not called for. {why}{instead}"
     if not steps.built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
-    elif scene.joint is not None and not steps.condensed:
+    elif isinstance(scene, JointScene) and not steps.condensed:
         yield "condensation: the parts came from the cache"
-    if scene.joint is not None:
-        if not any(isinstance(effect, TieEffect) for effect in scene.effects):
+    if isinstance(scene, JointScene):
+        if not any(scene.effects_of(TieEffect)):
             yield "springs between parts: K stays block diagonal"
-        if not any(isinstance(effect, PartLoadEffect) for effect in scene.effects):
+        if not any(scene.effects_of(PartLoadEffect)):
             yield "condensing loads: none stands beyond the junction"
         if others := not_called_for(scene):
             yield f"effects that the scene does not name, not imported: {', '.join(others)}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import time
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sla
@@ -12,44 +11,28 @@ from rich.console import Console
 from rich.table import Table
 
 from harness.measurement.machine import physical_memory_mib
-from problems.build import cache_key, factor
-from problems.errors import InputError
-from problems.input.user_matrices import read_matrices
+from harness.planning.estimate import estimated, refuse_what_cannot_fit
+from problems.build import built, prepared
 from problems.model.effect import PartLoadEffect, TieEffect
-from problems.model.joint import Joint, Part
-from problems.scene import Scene, read_scene
-from problems.storage import cache
+from problems.model.scene import JointScene, Scene
+from problems.scene import read_scene
 
 from .few_digits import digits_of
 
 TRIAL = 700  # unknowns of the Cholesky factorisation that the machine's speed is taken from
-MIB = 2**20
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """n unknowns, m contacts; MiB of the stored matrices and at the peak; seconds to build and to answer."""
-
-    n: int
-    m: int
-    stored_mib: float
-    peak_mib: float
-    build_s: float
-    answer_s: float
 
 
 def validate(source: str, console: Console) -> None:
     """Read and check a scene, print what it is made of and an estimate. Raises InputError."""
     scene = read_scene(source)
-    if scene.joint is None:
+    if not isinstance(scene, JointScene):
         _matrices(scene, console)
         return
-    joint = scene.joint
     refuse_what_cannot_fit(scene, source)
     console.print(f"{scene.name}: {scene.title}. Fine.")
-    console.print(_contents(scene, joint))
-    estimate = estimated(scene, joint, speed())
-    cached = cache.load(cache_key(scene)) is not None
+    console.print(_contents(scene))
+    estimate = estimated(scene, speed())
+    cached = built(scene)
     console.print(
         f"n = {estimate.n} unknowns, m = {estimate.m} contacts; K, its factors and Q take "
         f"{estimate.stored_mib:.0f} MiB in the cache, the process up to {estimate.peak_mib:.0f} MiB of "
@@ -61,63 +44,22 @@ def validate(source: str, console: Console) -> None:
     )
     if estimate.m == 0:
         console.print("No contact: a linear solve, without a quadratic program.")
-    ties = [effect for effect in scene.effects if isinstance(effect, TieEffect)]
-    if ties:
-        console.print("Springs join parts into larger blocks: their factors and Q are computed anew.")
-    beyond = [effect.kind for effect in scene.effects if isinstance(effect, PartLoadEffect)]
+    if any(scene.effects_of(TieEffect)):
+        console.print("Springs join parts into larger blocks of K.")
+    beyond = [effect.kind for effect in scene.effects_of(PartLoadEffect)]
     if beyond:
         console.print(f"Loads beyond the junction are condensed once: {', '.join(beyond)}.")
 
 
 def _matrices(scene: Scene, console: Console) -> None:
     """Say what given matrices are. Raises InputError where K is not positive definite."""
-    assembly = scene.made.assembly if scene.made else read_matrices(dict(scene.matrices))[0]
-    for K, name in zip(assembly.blocks, assembly.parts, strict=True):
-        factor(K, name, scene)
+    data = prepared(scene)
+    _ = data.Q
+    assembly = data.assembly
     blocks = ", ".join(str(len(K)) for K in assembly.blocks)
     console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
-
-
-def refuse_what_cannot_fit(scene: Scene, source: str) -> None:
-    """Raise InputError where a scene's matrices need more memory than this machine has."""
-    if scene.joint is None:
-        return
-    need, physical = estimated(scene, scene.joint, 1.0).peak_mib, physical_memory_mib()
-    if need > physical:
-        nodes = list(scene.joint.junction.nodes)
-        allowed = f"fewer nodes: {need:.0f} MiB are needed, this machine has {physical}"
-        raise InputError.one(source, "junction.nodes", nodes, allowed)
-
-
-def estimated(scene: Scene, joint: Joint, flops_per_s: float) -> Estimate:
-    """From counts of operations; the numbers of the largest terms, so good to a factor of two or three."""
-    n, m = joint.size
-    size = joint.node_count
-    tied = any(isinstance(effect, TieEffect) for effect in scene.effects)
-    blocks = [n] if tied else [size] * len(joint.part)
-    entries = 2 * sum(block**2 for block in blocks) + m**2
-    condensing = sum(_condensing(joint, part) for part in joint.part)
-    # Cholesky b³/3 and inverse 2b³/3 of each block, Lanczos and its products some hundred b².
-    preparing = sum(block**3 + 200 * block**2 for block in blocks)
-    # Some dozen factorisations of half of Q, residuals in slices of K, and the proof of λmin.
-    answering = 12 * (m / 2) ** 3 / 3 + sum(12 * 6 * block**2 + 2 * block**3 / 3 for block in blocks)
-    peak = 8 * (entries + max(block**2 for block in blocks) + m**2) / MIB + 150
-    return Estimate(
-        n, m, 8 * entries / MIB, peak, (condensing + preparing) / flops_per_s, answering / flops_per_s
-    )
-
-
-def _condensing(joint: Joint, part: Part) -> float:
-    """Operations of the elimination line by line: a line of 4 nx unknowns against the nodes behind it."""
-    nx, ny = joint.junction.nodes
-    beyond = sum(side.elements for side in (part.south, part.north) if side)
-    line, total = 4 * nx, 0.0
-    for row in range(beyond + ny):
-        kept = nx * max(0, min(row - beyond + 1, ny))
-        total += line**3 / 3 + line**2 * (kept + line) + line * (kept + line) ** 2
-    return total
 
 
 def speed() -> float:
@@ -131,7 +73,8 @@ def speed() -> float:
     return TRIAL**3 / 3 / best
 
 
-def _contents(scene: Scene, joint: Joint) -> Table:
+def _contents(scene: JointScene) -> Table:
+    joint = scene.joint
     nx, ny = joint.junction.nodes
     table = Table("what", "how many", title="What will be built")
     for part in joint.part:

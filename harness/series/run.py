@@ -18,12 +18,12 @@ from harness.measurement.machine import installed_version, machine
 from harness.measurement.scheduler import done_as_completed, workers
 from harness.results import records
 from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
-from problems.model.effect import ForceEffect
-from problems.prepare import prepared
+from problems.build import prepared
+from problems.model.scene import JointScene
 
 from . import store
 from .on_worker import solve_on_worker
-from .session import BLOCK, Desk, Job, Result
+from .session import BLOCK, Job, Result, SeriesSession
 
 VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
 
@@ -76,7 +76,7 @@ def at_work(
     """The results as they come, of this process or of the workers of a scheduler."""
     if scheduler is None:
         with console.status("opening the assembly, preparing the solver"):
-            desk = Desk(job)
+            desk = SeriesSession(job)
         yield desk.solve(left)
         return
     with workers(scheduler) as (executor, count):
@@ -172,10 +172,8 @@ def remember_contacts(job: Job, directory: Path) -> int:
     arrays = {"m": np.array(assembly.m)}
     if assembly.contact_nodes is not None:
         arrays["contact_nodes"] = assembly.contact_nodes
-    if job.scene.joint:
-        effects = [effect for effect in job.scene.effects if isinstance(effect, ForceEffect)]
-        marks = [effect.marks(job.scene.joint) for effect in effects]
-        arrays["fasteners"] = np.concatenate([np.zeros((0, 2)), *marks])
+    if isinstance(job.scene, JointScene):
+        arrays["fasteners"] = job.scene.marks()
     np.savez(directory / "contacts.npz", **arrays)  # type: ignore[arg-type]
     return assembly.m
 

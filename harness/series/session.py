@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,26 +14,26 @@ import numpy as np
 import threadpoolctl
 from numpy.typing import NDArray
 
-from harness.measurement.answers import checked
-from harness.measurement.loads import loads_of
-from harness.measurement.warm_starts import WarmStarts
+from harness.measurement.solver_session import SolverSession
 from harness.results.records import Row
 from harness.verification.batched.bound import Bound
 from harness.verification.batched.vouch import Vouched, vouch
 from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
-from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.build import prepared
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from problems.load_cases.base import LoadCases
-from problems.prepare import prepared
-from problems.scene import Scene
-from solvers.base import Answer, Form, Load, Problem, failed
+from problems.model.scene import Scene
+from solvers.base import Answer, Form, failed
 from solvers.registry import make_solver
 
 Gaps = NDArray[np.float32]
 
 BLOCK = 64  # cases that share a pass over K and Q
 AT_ONCE_S = 5.0  # a block is closed after so long, so that slow cases are not lost with it
-NEARS = 32  # answers kept for warm starts: memory does not grow with the number of cases
+STARTS = 32  # answers kept for warm starts: memory does not grow with the number of cases
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,12 @@ class Result:
 @dataclass(frozen=True)
 class _Tried:
     case: int
-    load: Load
+    load: LoadCase
     row: Row
     answer: Answer
 
 
-class Desk:
+class SeriesSession:
     """A job being done in this process."""
 
     def __init__(self, job: Job) -> None:
@@ -76,19 +77,25 @@ class Desk:
         self.job = job
         self.data: Prepared = prepared(job.scene)
         self.bound = Bound.of(self.data)
-        self.solver = make_solver(job.solver, job.options, job.plugin)
-        problem = Problem(self.data, job.form)
-        self.state = self.solver.prepare(self.solver.convert(problem))
-        self.together = self.solver.together(self.state)
-        self.ready: Any = None
-        self.starts = WarmStarts(problem, NEARS)
+        self.problem = in_form(self.data, job.form)
+        solver = make_solver(job.solver, job.options, job.plugin)
+        self.row: Row = {}  # of the case being solved
+        self.session = SolverSession(solver, self.problem, job.tolerance, self._lap, STARTS)
+        self.session.open(batched=True)
+
+    @contextmanager
+    def _lap(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.row[name] = time.perf_counter() - start
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
         """The cases, some at a time, each list as soon as it is done."""
         for start in range(0, len(numbers), BLOCK):
-            loads = self._loads(numbers[start : start + BLOCK])
-            if self.together is not None:
-                yield self._finished(self._try_together(loads))
+            some = numbers[start : start + BLOCK]
+            loads = list(zip(some, self.problem.loads([self.job.cases.load(k) for k in some]), strict=True))
+            if self.session.batch is not None:
+                yield self._finished(self._try_batch(loads))
                 continue
             begun, tried = time.monotonic(), []
             for case, load in loads:
@@ -99,56 +106,40 @@ class Desk:
             if tried:
                 yield self._finished(tried)
 
-    def _loads(self, numbers: Sequence[int]) -> list[tuple[int, Load]]:
-        cases = [self.job.cases.load(k, self.data) for k in numbers]
-        return list(zip(numbers, loads_of(cases, self.data), strict=True))
-
-    def _try_together(self, loads: list[tuple[int, Load]]) -> list[_Tried]:
+    def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[_Tried]:
         """Solve them all at once; where that raises, one after another, so that it is known which does."""
-        assert self.together is not None
         start = time.perf_counter()
         try:
-            answers = self.together([load for _, load in loads], self.job.tolerance)
-            tried = [
-                _Tried(case, load, self._begun(case), checked(answer, self.data, self.job.form))
-                for (case, load), answer in zip(loads, answers, strict=True)
-            ]
+            answers = self.session.solve_batch([load for _, load in loads])
         except Exception:
             return [self._try(case, load) for case, load in loads]
-        for each in tried:
-            each.row["solve_s"] = (time.perf_counter() - start) / len(tried)
-        return tried
+        share = (time.perf_counter() - start) / len(loads)
+        return [
+            _Tried(case, load, self._begun(case) | {"solve_s": share}, answer)
+            for (case, load), answer in zip(loads, answers, strict=True)
+        ]
 
     def _begun(self, case: int) -> Row:
         return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
 
-    def _try(self, case: int, load: Load) -> _Tried:
+    def _try(self, case: int, load: LoadCase) -> _Tried:
         """Solve one; what the solver raises becomes its status."""
-        row = self._begun(case)
-        found = None if self.ready is None else self.starts.nearest(load)
-        start = time.perf_counter()
+        self.row = self._begun(case)
+        near = self.session.nearest(load)
+        if near is not None:
+            self.row["warm_from"] = near.case
         try:
-            if found is None:
-                self.ready = self.solver.setup(self.state, load, self.job.tolerance)
-            else:
-                row["warm_from"], near = found
-                self.ready = self.solver.update(self.state, self.ready, load, self.job.tolerance, near)
-            row["setup_s"] = time.perf_counter() - start
-            start = time.perf_counter()
-            answer = self.solver.solve(self.ready, load, self.job.tolerance)
-            row["solve_s"] = time.perf_counter() - start
-            answer = checked(answer, self.data, self.job.form)
+            answer = self.session.next(load, near, case)
         except Exception as error:
-            self.ready = None
+            self.session.forget()
             answer = failed(f"{type(error).__name__}: {error}"[:500])
-        self.starts.keep(load, answer, case)
-        return _Tried(case, load, row, answer)
+        return _Tried(case, load, self.row, answer)
 
     def _finished(self, tried: list[_Tried]) -> list[Result]:
         """Rows, with what is known of the answers."""
         start = time.perf_counter()
         known = self._vouched(tried)
-        if self.together is not None:
+        if self.session.batch is not None:
             self._try_again(tried, known)
         share = (time.perf_counter() - start) / len(tried)
         return [self._result(each, known.get(each.case), share) for each in tried]
@@ -165,7 +156,7 @@ class Desk:
         lams = np.column_stack([each.answer.lam for each in far if each.answer.lam is not None])
         p = self.data.Q @ lams - np.column_stack([known[each.case].gap for each in far])
         loads = [(each.case, replace(each.load, p=column)) for each, column in zip(far, p.T, strict=True)]
-        new = self._try_together(loads)
+        new = self._try_batch(loads)
         for case, about in self._vouched(new).items():
             if about.bound_mm < known[case].bound_mm:
                 known[case] = about
@@ -174,12 +165,12 @@ class Desk:
                 tried[places[case]] = replace(old, answer=replace(better.answer, iterations=count))
 
     def _vouched(self, tried: list[_Tried]) -> dict[int, Vouched]:
-        needed = ("lam", "x") if self.job.form == "primal" else ("lam",)
-        answered = [each for each in tried if all(getattr(each.answer, v) is not None for v in needed)]
+        needs = self.problem.needs
+        answered = [each for each in tried if all(getattr(each.answer, v) is not None for v in needs)]
         if not answered:
             return {}
         lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
-        own = [each.answer.x if self.job.form == "primal" else None for each in answered]
+        own = [each.answer.x if "x" in needs else None for each in answered]
         found = vouch(self.bound, [each.load for each in answered], lams, own)
         return {each.case: about for each, about in zip(answered, found, strict=True)}
 
@@ -211,10 +202,9 @@ class Desk:
 
     def _compared(self, tried: _Tried, x: Vector) -> Row:
         """The distance to the certified reference, which outweighs the bound."""
-        case = LoadCase(tried.load.f, tried.load.g)
-        known = refined_active_set(self.data, case)
+        known = refined_active_set(self.data, tried.load)
         lam = np.asarray(tried.answer.lam, dtype=float)
-        judged = judge(self.data, case, known, x, lam, self.job.limit_mm)
+        judged = judge(self.data, tried.load, known, x, lam, self.job.limit_mm)
         names = ("displacement_error_mm", "reference_bound_mm", "contact_mismatch")
         found: Row = {name: getattr(judged, name) for name in names}
         return found if judged.verdict == "cannot_be_judged" else found | {"verdict": judged.verdict}

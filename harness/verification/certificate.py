@@ -87,8 +87,8 @@ def _proven(
     A = sp.csc_array(assembly.A)
     norms = np.sqrt(np.asarray((A * A).sum(axis=0)).ravel())
     is_open = s.value - s.error > 1.01 * norms * error
-    diagonal = np.concatenate([np.diag(K) for K in assembly.blocks])
-    trace = np.concatenate([np.full(len(K), np.trace(K)) for K in assembly.blocks])
+    diagonal = assembly.diagonal_K()
+    trace = np.concatenate([np.full(K.shape[0], K.diagonal().sum()) for K in assembly.blocks])
     rows = sp.csr_array(A)
     alone = np.flatnonzero(np.diff(rows.indptr) == 1)
     entry = rows.indptr[alone]

@@ -92,9 +92,13 @@ def forces(assembly: Assembly, f: Vector, x: Double, lam: Double) -> Enclosed:
     """r = f − Kx − Aλ with its error bound, N."""
     total = Sum(assembly.n)
     total.add(f)
-    _add_sparse(total, sp.csr_array(assembly.A), lam)
+    _subtract_sparse(total, slice(None), sp.csr_array(assembly.A), lam)
     for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
-        _subtract_dense(total, rows, K, Double(x.hi[rows], x.lo[rows]))
+        part = Double(x.hi[rows], x.lo[rows])
+        if sp.issparse(K):
+            _subtract_sparse(total, rows, sp.csr_array(K), part)
+        else:
+            _subtract_dense(total, rows, K, part)
     return total.enclosed()
 
 
@@ -102,19 +106,21 @@ def gaps(assembly: Assembly, g: Vector, x: Double) -> Enclosed:
     """s = g − Aᵀx with its error bound, mm."""
     total = Sum(assembly.m)
     total.add(g)
-    _add_sparse(total, sp.csr_array(assembly.A.T), x)
+    _subtract_sparse(total, slice(None), sp.csr_array(assembly.A.T), x)
     return total.enclosed()
 
 
-def _add_sparse(total: Sum, A: sp.csr_array, v: Double) -> None:
-    """total −= Av, one entry of every row at a time."""
-    counts = np.diff(A.indptr)
+def _subtract_sparse(total: Sum, rows: slice, A: sp.csr_array, v: Double) -> None:
+    """total[rows] −= Av, one entry of every row at a time."""
+    counts, size = np.diff(A.indptr), len(total.hi)
+    first = rows.start or 0
     for k in range(int(counts.max(initial=0))):
-        rows = np.flatnonzero(counts > k)
-        entry = A.indptr[rows] + k
+        those = np.flatnonzero(counts > k)
+        entry = A.indptr[those] + k
         for part in (v.hi, v.lo):
-            term, rounding = np.zeros((2, len(counts)))
-            term[rows], rounding[rows] = two_product(-A.data[entry], part[A.indices[entry]])
+            term, rounding = np.zeros((2, size))
+            pair = two_product(-A.data[entry], part[A.indices[entry]])
+            term[first + those], rounding[first + those] = pair
             total.add(term)
             total.add(rounding)
 

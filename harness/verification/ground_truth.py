@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 
 from harness.results import records
-from problems.build import Progress
+from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.stages import Progress
 from problems.load_cases.random_gaps import random_gaps
-from problems.model.effect import ForceEffect
-from problems.prepare import load_case, prepared
-from problems.scene import Scene, read_scene
+from problems.model.scene import JointScene, Scene
+from problems.scene import read_scene
 
 from .judge import Judgement, conditioned_limit, judge
-from .reference import Reference, made_reference, reference
+from .reference import Reference, reference, reference_of
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Ground:
 
     def limit_mm(self, asked: float) -> float:
         """The limit on an answer: as asked for; on a rung of a ladder, no less than conditioning allows."""
-        if not self.scene.rung:
+        if not self.scene.on_ladder:
             return asked
         cond_K: Any = self.prepared.facts["cond_K"]
         largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
@@ -44,8 +45,8 @@ class Ground:
         """That of a load case of a series on the scene, with a reference of its own."""
         if series is None or case is None:
             return self
-        load = random_gaps(self.scene, self.prepared, **series).load(case, self.prepared)
-        return replace(self, load=load, reference=reference(self.scene.key, self.prepared, load))
+        load = random_gaps(self.scene, **series).load(case)
+        return replace(self, load=load, reference=reference(self.prepared, load))
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""
@@ -64,10 +65,10 @@ def ground(source: str, progress: Progress = lambda text, fraction: None) -> Gro
     if data.assembly.m == 0:
         allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
         raise InputError.one(source, "contacts", 0, allowed)
-    load = load_case(scene, data)
+    load = load_case(scene)
     progress("reference", 0.0)
     start = time.perf_counter()
-    known = made_reference(scene.made, data) if scene.made else reference(scene.key, data, load)
+    known = reference_of(scene, data, load)
     return Ground(scene, data, load, known, time.perf_counter() - start)
 
 
@@ -96,16 +97,15 @@ def record(ground: Ground, directory: Path) -> None:
     nodes = ground.prepared.assembly.contact_nodes
     if nodes is not None:
         arrays["contact_nodes"] = nodes
-    if scene.joint:
-        marks = [effect.marks(scene.joint) for effect in scene.effects if isinstance(effect, ForceEffect)]
-        arrays["fasteners"] = np.concatenate([np.zeros((0, 2)), *marks])
+    if isinstance(scene, JointScene):
+        arrays["fasteners"] = scene.marks()
     np.savez(directory / "scenes" / (scene.name.replace("/", "_") + ".npz"), **arrays)
 
 
 def record_refusal(scene: Scene, directory: Path) -> None:
     """Put into DIRECTORY/problems.jsonl by which words the model refuses a rung, "" where it does not."""
     try:
-        prepared(scene)
+        _ = prepared(scene).Q
         words = ""
     except InputError as error:
         words = str(error)

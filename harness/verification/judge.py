@@ -24,7 +24,8 @@ from typing import Literal
 
 import numpy as np
 
-from problems.forms.assembly import LoadCase, Prepared, Vector
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.prepared import Prepared
 
 from .reference import Reference
 
@@ -101,7 +102,7 @@ def _backward_error(
     prepared: Prepared, load: LoadCase, x: Vector, lam: Vector, force: Vector, y: Vector
 ) -> float:
     A = prepared.assembly.A
-    K_norm = max(float(np.abs(K).sum(axis=1).max()) for K in prepared.assembly.blocks)
+    K_norm = prepared.assembly.norm_K()
     A_norm, At_norm = (float(abs(A).sum(axis=axis).max()) for axis in (1, 0))
     x_size = float(np.abs(x).max())
     F = K_norm * x_size + float(np.abs(load.f).max()) + A_norm * float(np.abs(lam).max())

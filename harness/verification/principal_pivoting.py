@@ -11,14 +11,15 @@ import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Vector
+from problems.forms.compliance import AnyQ, dense_submatrix, submatrix
 
 ROUNDING = 10  # times the rounding that is seen
 FEW = 100  # contacts
 FULL_EXCHANGES = 3  # without a new smallest count of infeasibilities, before single pivots begin
 
 
-def contact_set(Q: Matrix, p: Vector, start: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+def contact_set(Q: AnyQ, p: Vector, start: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
     """The closed contacts: (m,) bool, with λ > 0 and y = 0 where True.
 
     Each pass solves Q_SS λ_S = p_S and exchanges every i in S with λ_i < 0 and outside it with
@@ -32,20 +33,20 @@ def contact_set(Q: Matrix, p: Vector, start: NDArray[np.bool_] | None = None) ->
     return _pivoted(Q, p, _first_set(Q, p) if start is None else start)[0]
 
 
-def _first_set(Q: Matrix, p: Vector) -> NDArray[np.bool_]:
+def _first_set(Q: AnyQ, p: Vector) -> NDArray[np.bool_]:
     """What is closed where only every other contact is kept, and what then overlaps; of few contacts p > 0.
 
     The forces of the half come from its own half: small factors replace most of those of many rows.
     """
     if len(p) <= FEW or not (p > 0).any():
         return p > 0
-    half = np.ascontiguousarray(Q[::2, ::2]), p[::2]
+    half = submatrix(Q, np.arange(0, len(p), 2)), p[::2]
     lam = np.zeros(len(p))
     lam[::2] = _pivoted(*half, _first_set(*half))[1]
     return (lam > 0) | (Q @ lam < p)
 
 
-def _pivoted(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Vector]:
+def _pivoted(Q: AnyQ, p: Vector, S: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Vector]:
     """The closed contacts and λ, from a first set S."""
     m = len(p)
     fewest, chances = m + 1, FULL_EXCHANGES
@@ -71,13 +72,13 @@ def _pivoted(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[NDArray[np.boo
         S = S ^ wrong
 
 
-def _solve_on(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vector, float, float]:
+def _solve_on(Q: AnyQ, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vector, float, float]:
     """λ with Q_SS λ_S = p_S and λ = 0 outside S, y = Qλ − p outside S, and the rounding of either."""
     lam = np.zeros(len(p))
     rows = np.flatnonzero(S)
     if not rows.size:
         return lam, -p, 0.0, 0.0
-    block = Q[np.ix_(rows, rows)].T  # symmetric, and so it is stored as LAPACK takes it, without a copy
+    block = dense_submatrix(Q, rows)
     factor = sla.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
     lam[rows] = sla.cho_solve(factor, p[rows], check_finite=False)
     y = Q @ lam - p

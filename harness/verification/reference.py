@@ -14,15 +14,20 @@ refinement repeated until λ_C ≥ 0 and g − Aᵀx ≥ 0 hold for the refined 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from problems.forms.assembly import LoadCase, Prepared, Vector
-from problems.manufactured.ladder import Made
+from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.compliance import dense_submatrix
+from problems.forms.prepared import Prepared
+from problems.model.scene import MadeScene, Scene
 from problems.storage import cache
+from problems.storage.fingerprint import fingerprint
 
 from .certificate import certify
 from .definite import smallest_eigenvalue
@@ -50,49 +55,63 @@ class Reference:
     gap_unit_mm: Vector | float = 1.0
 
 
-def made_reference(made: Made, prepared: Prepared) -> Reference:
-    """The reference of a rung: the answer that it was made from, else the refined one."""
-    if made.x is None or made.lam is None:
-        return refined_active_set(prepared, made.load)
-    route = "chosen, exact"
-    return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
+def reference_of(scene: Scene, prepared: Prepared, load: LoadCase) -> Reference:
+    """The reference of a scene: the answer that it was made from, else the refined one."""
+    if isinstance(scene, MadeScene):
+        made = scene.made
+        if made.x is None or made.lam is None:
+            return refined_active_set(prepared, load)
+        route = "chosen, exact"
+        return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
+    return reference(prepared, load)
 
 
-def reference(scene_key: str, prepared: Prepared, load: LoadCase) -> Reference:
-    """The reference of a scene, from the cache if it was computed before."""
-    built = prepared.facts.get("seconds")
-    key = cache.digest("reference", 4, scene_key, built, load.f.tobytes(), load.g.tobytes())
-    found = cache.load(key)
-    if found is None:
-        made = refined_active_set(prepared, load)
-        arrays: dict[str, NDArray[Any]] = {"x": made.x, "lam": made.lam, "active": made.active}
-        cache.store(key, arrays, {"bound_mm": made.bound_mm, "route": made.route})
-        return made
-    arrays, facts = found
+def reference(prepared: Prepared, load: LoadCase) -> Reference:
+    """The reference of a load case, from the cache if it was computed before for these matrices."""
+    if prepared.key is None:
+        return refined_active_set(prepared, load)
+    key = cache.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
+
+    def made() -> cache.Entry:
+        found = refined_active_set(prepared, load)
+        arrays: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam, "active": found.active}
+        return arrays, {"bound_mm": found.bound_mm, "route": found.route}
+
+    arrays, facts = cache.load_or_make(key, made)
     x, lam, active = (np.array(arrays[name]) for name in ("x", "lam", "active"))
     return Reference(x, lam, active, facts["bound_mm"], facts["route"])
 
 
 def proven_lambda_min(prepared: Prepared) -> float:
     """κ ≤ λmin(K), from the cache if it was proven before for this assembly."""
-    facts, blocks = prepared.facts, prepared.assembly.blocks
-    measured = facts.get("lambda_min"), facts.get("seconds")
-    key = cache.digest("lambda_min", 2, *measured, [float(np.trace(K)) for K in blocks])
-    found = cache.load(key) if None not in measured else None
-    if found is not None:
-        return float(found[1]["kappa"])
-    estimate = facts.get("lambda_min")
+    if prepared.key is None:
+        return _proven_lambda_min(prepared)
+    key = cache.digest("lambda_min", prepared.key, _code())
+    _, facts = cache.load_or_make(key, lambda: ({}, {"kappa": _proven_lambda_min(prepared)}))
+    return float(facts["kappa"])
+
+
+def _proven_lambda_min(prepared: Prepared) -> float:
+    blocks, estimate = prepared.assembly.blocks, prepared.facts.get("lambda_min")
     if not isinstance(estimate, float):
-        estimate = min(float(np.linalg.eigvalsh(K)[0]) for K in blocks)
-    kappa = min(smallest_eigenvalue(K, estimate) for K in blocks)
-    if None not in measured:
-        cache.store(key, {}, {"kappa": kappa})
-    return kappa
+        estimate = min(float(np.linalg.eigvalsh(_dense(K))[0]) for K in blocks)
+    return min(smallest_eigenvalue(_dense(K), estimate) for K in blocks)
+
+
+def _dense(K: Any) -> Matrix:
+    return K.toarray() if sp.issparse(K) else K
+
+
+def _code() -> str:
+    """The referee's own code: references of other code are computed anew."""
+    return fingerprint([Path(__file__)], within=["harness/verification"])
 
 
 def refined_active_set(prepared: Prepared, load: LoadCase) -> Reference:
     """Active set, refinement, certificate."""
-    active = contact_set(prepared.Q, prepared.dual_load(load))
+    p = prepared.dual_load(load)
+    meets = bool((p > 0).any())  # else Q is not needed
+    active = contact_set(prepared.compliance, p) if meets else np.zeros(len(p), dtype=bool)
     for _ in range(MAX_SET_CORRECTIONS):
         x, lam = _refine(prepared, load, active)
         s = gaps(prepared.assembly, load.g, x)
@@ -111,8 +130,10 @@ def _refine(prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]) -> tu
     assembly = prepared.assembly
     rows = np.flatnonzero(active)
     A_C = assembly.A[:, rows]
-    block = prepared.Q[np.ix_(rows, rows)].T  # symmetric, stored as LAPACK takes it
-    factor = sla.cho_factor(block, lower=True, overwrite_a=True) if rows.size else None
+    factor = None
+    if rows.size:
+        block = dense_submatrix(prepared.compliance, rows)
+        factor = sla.cho_factor(block, lower=True, overwrite_a=True)
     x = Double(np.zeros(assembly.n), np.zeros(assembly.n))
     lam = Double(np.zeros(assembly.m), np.zeros(assembly.m))
     force, gap = load.f, load.g  # the residuals at zero

@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from problems.forms.assembly import Vector
-from problems.model.effect import Effect, PartLoadEffect, PartModel
+from problems.model.effect import Effect, PartLoadEffect
 from problems.model.joint import Finite, Joint
+from problems.model.part import PartModel
 
 from .supports import Supports
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from problems.fem.line_loads import line_loads
 from problems.forms.assembly import Vector
-from problems.model.effect import PartLoadEffect, PartModel
+from problems.model.effect import PartLoadEffect
 from problems.model.joint import Finite, Positive
+from problems.model.part import PartModel
 
 
 class ThermalBending(PartLoadEffect):

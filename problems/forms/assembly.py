@@ -1,10 +1,4 @@
-"""The data of a riveting QP: what load cases share, and what one of them adds.
-
-    min ½ xᵀK x − fᵀx   subject to   Aᵀx ≤ g                         (primal)
-    min ½ λᵀQ λ − pᵀλ   subject to   λ ≥ 0                           (dual)
-
-with Q = AᵀK⁻¹A, p = AᵀK⁻¹f − g and x = K⁻¹(f − Aλ). Units: mm and N.
-"""
+"""The data of a riveting problem: what load cases share, and what one of them adds. Units: mm and N."""
 
 from __future__ import annotations
 
@@ -12,7 +6,6 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
@@ -26,11 +19,11 @@ class Assembly:
 
     Parameters
     ----------
-    blocks : K_1 … K_p, each (n_i, n_i), N/mm, symmetric positive definite, dense.
+    blocks : K_1 … K_p, each (n_i, n_i), N/mm, symmetric positive definite, dense or sparse.
         K = blockdiag(K_1, …, K_p), n = Σ n_i.
     A : (n, m) sparse. Column j is the normal of contact j: +1 and −1 for two parts,
         a single 1 for a part against a rigid tool.
-    nodes : (n, 2) coordinates of the unknowns in mm, or None where they are unknown.
+    nodes : (n, 2) coordinates of the unknowns in mm, or None if they are unknown.
     parts : a name for each block.
     """
 
@@ -64,47 +57,23 @@ class Assembly:
         """K x, block by block."""
         return np.concatenate([K @ x[s] for K, s in zip(self.blocks, self.slices, strict=True)])
 
+    def diagonal_K(self) -> Vector:
+        """The diagonal of K, (n,) N/mm."""
+        return np.concatenate([K.diagonal() for K in self.blocks])
+
+    def norm_K(self) -> float:
+        """‖K‖_∞ = max_i Σ_j |K_ij|, N/mm, but for rounding."""
+        return max(float(abs(K).sum(axis=1).max()) for K in self.blocks)
+
 
 @dataclass(frozen=True)
 class LoadCase:
-    """f : (n,) nodal forces, N. g : (m,) initial gaps, mm."""
+    """One load case.
+
+    f : (n,) nodal forces, N. g : (m,) initial gaps, mm.
+    p : (m,) AᵀK⁻¹f − g, mm, the overlap of the parts if contact is ignored; formed by the dual form only.
+    """
 
     f: Vector
     g: Vector
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """The data preparation of the paper: done once for an assembly, used by every load case.
-
-    Parameters
-    ----------
-    assembly : K and A.
-    factors : U_i upper triangular with K_i = U_iᵀU_i, each (n_i, n_i).
-    Q : (m, m), mm/N, Q = AᵀK⁻¹A.
-    facts : measured while it was built (cond_K, seconds of each step, …).
-    """
-
-    assembly: Assembly
-    factors: tuple[Matrix, ...]
-    Q: Matrix
-    facts: dict[str, object] = field(default_factory=dict)
-
-    def solve_K(self, b: Matrix) -> Matrix:
-        """K⁻¹ b through the Cholesky factors."""
-        return np.concatenate(
-            [
-                sla.cho_solve((U, False), b[s], check_finite=False)
-                for U, s in zip(self.factors, self.assembly.slices, strict=True)
-            ]
-        )
-
-    def dual_load(self, load: LoadCase) -> Vector:
-        """p = AᵀK⁻¹f − g, (m,), mm: the overlap of the parts when contact is ignored."""
-        return self.assembly.A.T @ self.solve_K(load.f) - load.g
-
-    def recover(self, lam: Vector, load: LoadCase) -> Vector:
-        """x = K⁻¹(f − Aλ), with one step of iterative refinement."""
-        b = load.f - self.assembly.A @ lam
-        x = self.solve_K(b)
-        return x + self.solve_K(b - self.assembly.multiply_K(x))
+    p: Vector = field(default_factory=lambda: np.zeros(0))

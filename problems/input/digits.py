@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.forms.assembly import Prepared, Vector
+from problems.forms.assembly import Vector
+from problems.forms.compliance import dense_submatrix
+from problems.forms.prepared import Prepared
 
 SAMPLE = 20_000
 DOUBLE, SINGLE = 16, 7  # digits of the two formats of floating-point numbers
@@ -45,7 +47,7 @@ def expected_error(prepared: Prepared, x: Vector, lam: Vector, digits: int) -> f
     assembly = prepared.assembly
     random = np.random.default_rng(0)
     closed = np.flatnonzero(lam > 0)
-    A_C, Q_CC = assembly.A[:, closed], prepared.Q[np.ix_(closed, closed)]
+    A_C, Q_CC = assembly.A[:, closed], dense_submatrix(prepared.compliance, closed)
     worst = 0.0
     for _ in range(DRAWS):
         force = np.zeros(assembly.n)

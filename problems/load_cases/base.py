@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase
 
 
 class LoadCases(ABC):
@@ -19,7 +19,7 @@ class LoadCases(ABC):
         """Hash of everything that determines case k, whatever the count."""
 
     @abstractmethod
-    def load(self, k: int, prepared: Prepared) -> LoadCase:
+    def load(self, k: int) -> LoadCase:
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
 
     def only(self, numbers: Sequence[int]) -> LoadCases:

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from problems.build import load_case
 from problems.errors import Fault, InputError
-from problems.forms.assembly import LoadCase, Matrix, Prepared, Vector
+from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.model.effect import GapEffect
-from problems.prepare import load_case
-from problems.scene import Scene
+from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
 from .base import LoadCases
@@ -44,7 +44,7 @@ class MeasuredGaps(LoadCases):
         """The hash of its gaps, by which a row that has changed since is found."""
         return {"gaps": digest(np.ascontiguousarray(self._row(k)).tobytes())}
 
-    def load(self, k: int, prepared: Prepared) -> LoadCase:
+    def load(self, k: int) -> LoadCase:
         return LoadCase(self.forces.f, np.array(self._row(k)))
 
     def only(self, numbers: Sequence[int]) -> MeasuredGaps:
@@ -55,14 +55,18 @@ class MeasuredGaps(LoadCases):
         return self.gaps[self.numbers.index(k) if self.numbers else k]
 
 
-def measured_gaps(scene: Scene, prepared: Prepared, path: Path, count: int | None = None) -> MeasuredGaps:
+def measured_gaps(scene: Scene, path: Path, count: int | None = None) -> MeasuredGaps:
     """The first `count` rows, or all, of a .csv (numbers; # begins a comment), .npz or .npy.
 
     Of an .npz the array `gaps` is taken, or the only one; an .npy is memory-mapped, the others are read
     whole. Raises InputError that names the cases that cannot be used.
     """
     gaps = _read(path)
-    m = prepared.assembly.m
+    if isinstance(scene, JointScene):
+        forces_only = tuple(e for e in scene.effects if not isinstance(e, GapEffect))
+        scene = replace(scene, effects=forces_only)
+    forces = load_case(scene)
+    m = len(forces.g)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
         raise InputError.one(path, "shape", gaps.shape, f"a row a case and a column for each of {m} contacts")
     if count is not None and count > len(gaps):
@@ -72,11 +76,6 @@ def measured_gaps(scene: Scene, prepared: Prepared, path: Path, count: int | Non
         more = len(faults) - FAULTS
         rest = [Fault(str(path), "cases", f"{more} more", ALLOWED)] if more > 0 else []
         raise InputError(faults[:FAULTS] + rest)
-    if scene.joint is None:
-        forces = load_case(scene, prepared)
-    else:
-        forces_only = tuple(e for e in scene.effects if not isinstance(e, GapEffect))
-        forces = load_case(replace(scene, effects=forces_only), prepared)
     return MeasuredGaps(forces, gaps, len(gaps) if count is None else count)
 
 

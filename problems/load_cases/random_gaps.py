@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase
 from problems.input.validation import validation_faults
 from problems.model.joint import Joint
-from problems.prepare import load_case
-from problems.scene import Scene
+from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
 from .base import LoadCases
@@ -45,7 +45,7 @@ class RandomGaps(LoadCases):
         state = np.random.SeedSequence((self.seed, k)).generate_state(1, np.uint64)[0]
         return {"gap_seed": int(state) >> (64 - SEED_BITS)}
 
-    def load(self, k: int, prepared: Prepared) -> LoadCase:
+    def load(self, k: int) -> LoadCase:
         assert self.field.random is not None
         drawn = self.field.random.model_copy(update={"seed": self.parameters(k)["gap_seed"]})
         gap = self.field.model_copy(update={"random": drawn}).gap(self.joint)
@@ -54,7 +54,6 @@ class RandomGaps(LoadCases):
 
 def random_gaps(
     scene: Scene,
-    prepared: Prepared,
     cases: int,
     seed: int,
     mean: float | None = None,
@@ -66,10 +65,10 @@ def random_gaps(
     Raises InputError where neither says them, or the scene has no joint or more than one `initial_gap`.
     """
     where = f"scene {scene.name}"
-    if scene.joint is None:
+    if not isinstance(scene, JointScene):
         allowed = "a random field needs a joint; own matrices take a table of gaps (--gaps)"
         raise InputError.one(where, "assembly", "own matrices", allowed)
-    found = [effect for effect in scene.effects if isinstance(effect, InitialGap)]
+    found = list(scene.effects_of(InitialGap))
     if len(found) > 1:
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     own = found[0].random if found else None
@@ -94,4 +93,4 @@ def random_gaps(
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = replace(scene, effects=tuple(effect for effect in scene.effects if effect not in found))
-    return RandomGaps(scene.joint, load_case(others, prepared), field, seed, cases)
+    return RandomGaps(scene.joint, load_case(others), field, seed, cases)

@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from problems.build import load_case
 from problems.errors import Fault, InputError
-from problems.forms.assembly import LoadCase, Prepared
+from problems.forms.assembly import LoadCase
 from problems.input.validation import validation_faults
 from problems.model.effect import TieEffect
-from problems.prepare import load_case
-from problems.scene import Scene
+from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
 from .base import LoadCases
 
 FORM = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
+
+
+NOTHING, OTHER = "the scene has no force or gap to sweep", "what changes K would be another assembly"
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Step:
 class Sweep(LoadCases):
     """All combinations of the steps' values, the last one running fastest."""
 
-    scene: Scene
+    scene: JointScene
     steps: tuple[Step, ...]
     count: int
 
@@ -49,15 +52,17 @@ class Sweep(LoadCases):
         places = np.unravel_index(k, [len(step.values) for step in self.steps])
         return {step.name: step.values[i] for step, i in zip(self.steps, places, strict=True)}
 
-    def load(self, k: int, prepared: Prepared) -> LoadCase:
+    def load(self, k: int) -> LoadCase:
         effects = list(self.scene.effects)
         for step, value in zip(self.steps, self.parameters(k).values(), strict=True):
             effects[step.effect] = _changed(effects[step.effect], step, value)
-        return load_case(replace(self.scene, effects=tuple(effects)), prepared)
+        return load_case(replace(self.scene, effects=tuple(effects)))
 
 
 def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
     """The cases of some --sweep options. Raises InputError with everything that is wrong."""
+    if not isinstance(scene, JointScene):
+        raise InputError.one("--sweep", "key", ", ".join(texts), f"{NOTHING}; {OTHER}")
     faults: list[Fault] = []
     steps = tuple(step for text in texts if (step := _step(scene, text, faults)))
     for step in steps:
@@ -68,7 +73,6 @@ def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
                 effect, name = scene.effects[step.effect], effect_name(scene, step.effect)
                 faults += validation_faults(f"--sweep {step.name}", type(effect), error, name, effect.units)
                 continue
-            assert scene.joint is not None
             faults += [Fault(f"--sweep {step.name}", *fault) for fault in effect.faults(scene.joint)]
     names = [step.name for step in steps]
     faults += [
@@ -79,14 +83,14 @@ def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
     return Sweep(scene, steps, int(np.prod([len(step.values) for step in steps])))
 
 
-def effect_name(scene: Scene, index: int) -> str:
+def effect_name(scene: JointScene, index: int) -> str:
     """initial_gap, or pressure.0 and pressure.1 where there are several."""
     kind = scene.effects[index].kind
     alike = [i for i, effect in enumerate(scene.effects) if effect.kind == kind]
     return kind if len(alike) == 1 else f"{kind}.{alike.index(index)}"
 
 
-def _makes_K(scene: Scene, index: int) -> bool:
+def _makes_K(scene: JointScene, index: int) -> bool:
     """Whether K or A depends on an effect."""
     if isinstance(scene.effects[index], TieEffect):
         return True
@@ -94,7 +98,7 @@ def _makes_K(scene: Scene, index: int) -> bool:
     return replace(scene, effects=others).assembly_key != scene.assembly_key
 
 
-def _step(scene: Scene, text: str, faults: list[Fault]) -> Step | None:
+def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
     name, equals, values = text.partition("=")
     numbers = _values(values)
     if not equals or not numbers:
@@ -107,8 +111,8 @@ def _step(scene: Scene, text: str, faults: list[Fault]) -> Step | None:
         for path in _numbers(scene.effects[i].model_dump())
     }
     if name not in keys:
-        allowed = f"one of {', '.join(keys)}" if keys else "the scene has no force or gap to sweep"
-        faults.append(Fault("--sweep", "key", name, f"{allowed}; what changes K would be another assembly"))
+        allowed = f"one of {', '.join(keys)}" if keys else NOTHING
+        faults.append(Fault("--sweep", "key", name, f"{allowed}; {OTHER}"))
     return keys.get(name)
 
 

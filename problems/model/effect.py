@@ -16,8 +16,7 @@ import importlib
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,6 +26,9 @@ from problems.fem.plate import Plate
 from problems.forms.assembly import Matrix, Vector
 
 from .joint import TOOL, Joint, Table
+
+if TYPE_CHECKING:
+    from .part import PartModel
 
 Pair = tuple[str, str]
 Range = tuple[float, float]
@@ -119,24 +121,6 @@ class TieEffect(ForceEffect):
     @abstractmethod
     def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
         """T (n, r) with a spring's direction in each column, and k (r,) in N/mm."""
-
-
-@dataclass(frozen=True)
-class PartModel:
-    """A part's plate and what stiffens and holds it."""
-
-    plate: Plate
-    effects: tuple[StiffnessEffect, ...]
-
-    def areas(self) -> Iterator[tuple[float, float, Range, Range]]:
-        """(sign, thickness, range of x, range of y) whose sum is the part with its pads."""
-        x, y = ((float(grid[0]), float(grid[-1])) for grid in (self.plate.x, self.plate.y))
-        yield 1.0, self.plate.thickness, x, y
-        for effect in self.effects:
-            if effect.pad:
-                thickness, x, y = effect.pad
-                yield 1.0, thickness, x, y
-                yield -1.0, self.plate.thickness, x, y
 
 
 class PartLoadEffect(Effect):

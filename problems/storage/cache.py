@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,9 @@ from numpy.typing import NDArray
 from problems.errors import InputError
 
 MANIFEST = "manifest.json"
+
+#: Arrays by name, and facts that JSON can hold.
+Entry = tuple[Mapping[str, NDArray[Any]], dict[str, Any]]
 
 
 def root() -> Path:
@@ -65,7 +68,7 @@ def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -
         shutil.rmtree(work, ignore_errors=True)
 
 
-def load(key: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
+def load(key: str) -> Entry | None:
     """The entry's arrays, memory-mapped and read-only, and its facts; None if there is none.
 
     Raises InputError if a file is missing or does not have the size it was written with.
@@ -83,6 +86,19 @@ def load(key: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
         if found != size:
             raise InputError.one(folder / name, "bytes", found, f"must be {size}; {_mend(folder)}")
     return {Path(name).stem: np.load(folder / name, mmap_mode="r") for name in sizes}, facts
+
+
+def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:
+    """The entry, made by one process while the others wait if there is none yet; memory-mapped either way."""
+    found = load(key)
+    if found is None:
+        with lock(key):
+            found = load(key)
+            if found is None:
+                store(key, *make())
+                found = load(key)
+    assert found is not None
+    return found
 
 
 def _mend(folder: Path) -> str:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import blas
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.base import Answer, Load
+from solvers.base import Answer, LoadCase
 from solvers.kkt import EPS, checked
 from solvers.linear_algebra.banded_inverse import BandedInverse, BandFactor
 from solvers.linear_algebra.product import product
@@ -59,7 +59,7 @@ class Case:
 
 
 @dataclass
-class Together:
+class BatchedSweeps:
     """Q (m, m), M ≈ Q⁻¹. last : the cases solved before, from which the next ones begin.
 
     alone : for cases that are not settled; for all of them, once that were most of a call's, or few contacts
@@ -72,7 +72,7 @@ class Together:
     last: list[Case] = field(default_factory=list)
     of_use: bool = True
 
-    def __call__(self, loads: Sequence[Load], tolerance: float) -> list[Answer]:
+    def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """An answer to each load. Iterations are products with Q, inner iterations sets tried with M."""
         p = [load.p[self.M.order] for load in loads]
         if not self.last:
@@ -101,7 +101,7 @@ class Together:
                 break
         return cases
 
-    def _answer(self, case: Case, load: Load, tolerance: float) -> Answer:
+    def _answer(self, case: Case, load: LoadCase, tolerance: float) -> Answer:
         order = self.M.order
         if not case.settled:
             C = np.zeros(len(order), dtype=bool)

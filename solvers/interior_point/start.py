@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.forms.assembly import LoadCase, Matrix, Prepared, Vector
+from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.prepared import Prepared
 
 MULT = 2.0  # the multiplier of λ, > 1
 MAX_STEPS = 200  # multiplications, and sweeps of corrections

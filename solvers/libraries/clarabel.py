@@ -7,7 +7,7 @@ The dual form's Q has eigenvalues down to 1e-5 mm/N and costs of 1e8 N·mm, whos
 equilibration and its regularisation of 1e-8 then cost digits (at n = 4386 it gives up, or ends as
 `AlmostSolved` some 1e-5 mm off): without the first, and with 1e-12 for the second, it ends as `Solved`
 within 1e-10 mm there on three plates; on smaller ones the worst of seven was 8e-8 mm. These two
-settings were chosen on such plates. The primal form keeps the defaults.
+settings were chosen on such plates. Rows instead of bounds, the primal form, keep the defaults.
 """
 
 from __future__ import annotations
@@ -16,11 +16,9 @@ from typing import Any
 
 import clarabel
 import numpy as np
-import scipy.sparse as sp
 
-from solvers.base import Answer, Load, Near, Problem, Solver, Status
-
-from .adapter import Converted, answer, blocks_of, choice, upper_triangle
+from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
+from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",
@@ -39,10 +37,9 @@ class Clarabel(Solver):
         self.direct_solve_method = direct_solve_method
 
     def convert(self, problem: Problem) -> Converted:
-        rows = problem.assembly.A.T if problem.form == "primal" else -sp.eye(problem.assembly.m)
-        return Converted(problem.form, upper_triangle(blocks_of(problem)), sp.csc_matrix(rows))
+        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0))
 
-    def setup(self, state: Converted, load: Load, tolerance: float) -> Any:
+    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = 500
@@ -50,32 +47,28 @@ class Clarabel(Solver):
         settings.tol_feas = tolerance
         settings.tol_gap_abs = tolerance
         settings.tol_gap_rel = 0.0
-        if state.form == "dual":
+        if state.bounded:
             settings.equilibrate_enable = False
             settings.static_regularization_constant = 1e-12
-        bounds = load.g if state.form == "primal" else np.zeros_like(load.p)
-        cones = [clarabel.NonnegativeConeT(len(bounds))]
-        library = clarabel.DefaultSolver(state.P, state.q(load), state.rows, bounds, cones, settings)
-        return state.form, library
+        h = state.h(load)
+        h = np.zeros(state.G.shape[0]) if h is None else h
+        cones = [clarabel.NonnegativeConeT(len(h))]
+        return state, clarabel.DefaultSolver(state.P, state.q(load), state.G, h, cones, settings)
 
-    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+    def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """Clarabel's update of the vectors, with the equilibration kept; it has no warm start."""
-        form, library = ready
-        if form == "primal":
-            library.update(q=state.q(load), b=load.g)
-        else:
-            library.update(q=state.q(load))
+        h = state.h(load)
+        ready[1].update(q=state.q(load), **({} if h is None else {"b": h}))
         return ready
 
-    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
-        form, library = ready
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        state, library = ready
         result = library.solve()
-        lam, x = (result.z, np.array(result.x)) if form == "primal" else (result.x, None)
-        return answer(
+        return state.answer(
             STATUS.get(str(result.status), "failed"),
             tolerance,
-            np.array(lam),
-            x,
+            np.array(result.x),
+            np.array(result.z),
             iterations=result.iterations,
             reported_s=result.solve_time,  # includes its set-up
             details={"status": str(result.status)},

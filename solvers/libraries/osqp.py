@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 import osqp
-import scipy.sparse as sp
 
-from solvers.base import Answer, Load, Near, Problem, Solver, Status
-
-from .adapter import Converted, answer, blocks_of, choice, upper_triangle
+from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
+from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 STATUS: dict[int, Status] = {
     int(osqp.SolverStatus.OSQP_SOLVED): "solved",
@@ -36,18 +34,17 @@ class Osqp(Solver):
         self.polishing = polishing
 
     def convert(self, problem: Problem) -> Converted:
-        rows = problem.assembly.A.T if problem.form == "primal" else sp.eye(problem.assembly.m)
-        return Converted(problem.form, upper_triangle(blocks_of(problem)), sp.csc_matrix(rows))
+        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, 1.0))
 
-    def setup(self, state: Converted, load: Load, tolerance: float) -> Any:
-        m = len(load.g)
-        free = np.full(m, np.inf)
-        bounds = (-free, load.g) if state.form == "primal" else (np.zeros(m), free)
+    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
+        h = state.h(load)
+        free = np.full(state.G.shape[0], np.inf)
+        bounds = (np.zeros_like(free), free) if h is None else (-free, h)
         library = osqp.OSQP()
         library.setup(
             state.P,
             state.q(load),
-            state.rows,
+            state.G,
             *bounds,
             eps_abs=tolerance,
             eps_rel=0.0,
@@ -58,33 +55,30 @@ class Osqp(Solver):
             polishing=self.polishing,
             verbose=False,
         )
-        return state.form, library
+        return state, library
 
-    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+    def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """OSQP.update and warm_start; the factors and the last ρ are kept."""
-        form, library = ready
-        if form == "primal":
-            library.update(q=state.q(load), u=load.g)
-            library.warm_start(x=near.x, y=near.lam)
-        else:
-            library.update(q=state.q(load))
-            library.warm_start(x=near.lam, y=-np.maximum(near.gap, 0.0))
+        _, library = ready
+        h, (z, multipliers) = state.h(load), state.start(start)
+        library.update(q=state.q(load), **({} if h is None else {"u": h}))
+        # OSQP's multipliers of lower bounds are negative.
+        library.warm_start(x=z, y=-np.maximum(multipliers, 0.0) if state.bounded else multipliers)
         return ready
 
-    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
-        form, library = ready
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        state, library = ready
         result = library.solve(raise_error=False)
         info = result.info
         status = STATUS.get(info.status_val, "failed")
         worst = max(info.prim_res, info.dual_res, abs(info.duality_gap))
         if status == "solved" and worst > tolerance:
             status = "inaccurate"
-        lam, x = (result.y, result.x) if form == "primal" else (result.x, None)
-        return answer(
+        return state.answer(
             status,
             tolerance,
-            lam,
-            x,
+            result.x,
+            result.y,
             iterations=info.iter,
             reported_s=info.run_time,
             details={"status": info.status, "polish": POLISH[info.status_polish]},

@@ -12,9 +12,8 @@ import numpy as np
 import piqp
 import scipy.sparse as sp
 
-from solvers.base import Answer, Load, Near, Problem, Solver, Status
-
-from .adapter import Converted, answer, blocks_of, choice, dense, upper_triangle
+from solvers.adapter import Converted, choice, dense, upper_triangle
+from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 STATUS: dict[Any, Status] = {
     piqp.PIQP_SOLVED: "solved",
@@ -32,14 +31,12 @@ class Piqp(Solver):
         self.backend = backend
 
     def convert(self, problem: Problem) -> Converted:
-        blocks = blocks_of(problem)
-        rows = problem.assembly.A.T if problem.form == "primal" else None
+        G = problem.G
         if self.backend == "sparse":
-            G = None if rows is None else sp.csc_matrix(rows)
-            return Converted(problem.form, upper_triangle(blocks), G)
-        return Converted(problem.form, dense(blocks), None if rows is None else rows.toarray(order="F"))
+            return Converted(problem, upper_triangle(problem.blocks), None if G is None else sp.csc_matrix(G))
+        return Converted(problem, dense(problem.blocks), None if G is None else G.toarray(order="F"))
 
-    def setup(self, state: Converted, load: Load, tolerance: float) -> Any:
+    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         library = piqp.DenseSolver() if self.backend == "dense" else piqp.SparseSolver()
         settings = library.settings
         settings.eps_abs = settings.eps_duality_gap_abs = tolerance
@@ -47,31 +44,26 @@ class Piqp(Solver):
         settings.check_duality_gap = True
         settings.max_iter = 500
         settings.compute_timings = True
-        if state.form == "primal":
-            library.setup(state.P, state.q(load), G=state.rows, h_u=load.g)
-        else:
-            library.setup(state.P, state.q(load), x_l=np.zeros(len(load.p)))
-        return state.form, library
+        q, h = state.q(load), state.h(load)
+        limits = {"x_l": np.zeros_like(q)} if h is None else {"G": state.G, "h_u": h}
+        library.setup(state.P, q, **limits)
+        return state, library
 
-    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+    def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """PIQP's update of the vectors, with the preconditioner kept; it has no warm start."""
-        form, library = ready
-        if form == "primal":
-            library.update(c=state.q(load), h_u=load.g)
-        else:
-            library.update(c=state.q(load))
+        h = state.h(load)
+        ready[1].update(c=state.q(load), **({} if h is None else {"h_u": h}))
         return ready
 
-    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
-        form, library = ready
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        state, library = ready
         status = library.solve()
         result, info = library.result, library.result.info
-        lam, x = (result.z_u, result.x) if form == "primal" else (result.x, None)
-        return answer(
+        return state.answer(
             STATUS.get(status, "failed"),
             tolerance,
-            lam,
-            x,
+            result.x,
+            result.z_u,
             iterations=info.iter,
             reported_s=info.run_time,
             details={"status": status.name},

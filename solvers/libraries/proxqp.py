@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from proxsuite import proxqp
 
-from solvers.base import Answer, Load, Near, Problem, Solver, Status
-
-from .adapter import Converted, answer, blocks_of, choice, dense
+from solvers.adapter import Converted, choice, dense
+from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 BACKENDS = {
     "automatic": proxqp.dense.DenseBackend.Automatic,
@@ -31,21 +30,21 @@ INFINITY = 1e20  # what ProxQP takes for no bound
 class ProxQp(Solver):
     """backend : which matrix it factors; "automatic" decides by the sizes."""
 
+    distribution = "proxsuite"
+
     def __init__(self, *, backend: str = "automatic") -> None:
         choice("proxqp", "backend", backend, tuple(BACKENDS))
         self.backend = backend
 
     def convert(self, problem: Problem) -> Converted:
-        rows = problem.assembly.A.T.toarray() if problem.form == "primal" else None
-        return Converted(problem.form, dense(blocks_of(problem)), rows)
+        G = problem.G
+        return Converted(problem, dense(problem.blocks), None if G is None else G.toarray())
 
-    def setup(self, state: Converted, load: Load, tolerance: float) -> Any:
-        m = len(load.g)
+    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
+        q, h = state.q(load), state.h(load)
+        rows = 0 if h is None else len(h)
         backend = BACKENDS[self.backend]
-        if state.form == "primal":
-            library = proxqp.dense.QP(len(load.f), 0, m, False, dense_backend=backend)
-        else:
-            library = proxqp.dense.QP(m, 0, 0, True, dense_backend=backend)
+        library = proxqp.dense.QP(len(q), 0, rows, state.bounded, dense_backend=backend)
         settings = library.settings
         settings.eps_abs = settings.eps_duality_gap_abs = tolerance
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
@@ -53,40 +52,38 @@ class ProxQp(Solver):
         settings.max_iter = 100_000
         settings.max_iter_in = 100_000
         settings.compute_timings = True
-        if state.form == "primal":
-            lower = np.full(m, -INFINITY)
-            library.init(H=state.P, g=state.q(load), C=state.rows, l=lower, u=load.g)
+        if h is None:
+            library.init(H=state.P, g=q, l_box=np.zeros_like(q), u_box=np.full_like(q, INFINITY))
         else:
-            upper = np.full(m, INFINITY)
-            library.init(H=state.P, g=state.q(load), l_box=np.zeros(m), u_box=upper)
-        return state.form, library, ()
+            library.init(H=state.P, g=q, C=state.G, l=np.full_like(h, -INFINITY), u=h)
+        return state, library, ()
 
-    def update(self, state: Converted, ready: Any, load: Load, tolerance: float, near: Near) -> Any:
+    def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """QP.update, with the preconditioner kept, and a warm start.
 
-        It cannot be given the multipliers of box constraints, so that the dual form starts from the case
-        before, whichever is near.
+        It cannot be given the multipliers of box constraints, so that a problem with bounds starts from the
+        case before, whichever is nearest.
         """
-        form, library, start = ready
-        if form == "primal":
-            library.settings.initial_guess = proxqp.InitialGuess.WARM_START
-            library.update(g=state.q(load), u=load.g)
-            start = near.x, np.zeros(0), near.lam
-        else:
+        _, library, _ = ready
+        h = state.h(load)
+        if h is None:
             library.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
             library.update(g=state.q(load))
-        return form, library, start
+            return state, library, ()
+        library.settings.initial_guess = proxqp.InitialGuess.WARM_START
+        library.update(g=state.q(load), u=h)
+        z, multipliers = state.start(start)
+        return state, library, (z, np.zeros(0), multipliers)
 
-    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
-        form, library, start = ready
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        state, library, start = ready
         library.solve(*start)
         result, info = library.results, library.results.info
-        lam, x = (result.z, result.x) if form == "primal" else (result.x, None)
-        return answer(
+        return state.answer(
             STATUS.get(info.status, "failed"),
             tolerance,
-            lam,
-            x,
+            result.x,
+            result.z,
             iterations=info.iter_ext,
             inner_iterations=info.iter,
             reported_s=info.run_time * 1e-6,  # µs

@@ -15,9 +15,8 @@ import scipy.sparse as sp
 from qpsolvers.exceptions import QPError
 
 from problems.errors import InputError
-from solvers.base import Answer, Load, Problem, Solver
-
-from .adapter import Converted, answer, blocks_of, dense
+from solvers.adapter import Converted, dense
+from solvers.base import Answer, LoadCase, Problem, Solver
 
 #: How each solver takes the absolute tolerance. Relative ones are 0 and iteration limits out of the way.
 #: DAQP's own dual tolerance of 1e-12 is not loosened. HiGHS takes no tolerance below 1e-10, and adds 1e-7
@@ -33,6 +32,10 @@ TOLERANCE: dict[str, Callable[[float], dict[str, Any]]] = {
 }
 
 
+#: Distributions that have another name than the solver.
+DISTRIBUTIONS = {"highs": "highspy"}
+
+
 class QpSolvers(Solver):
     """name : the solver's name in qpsolvers.available_solvers."""
 
@@ -43,39 +46,38 @@ class QpSolvers(Solver):
         self.name = name
 
     def convert(self, problem: Problem) -> Converted:
-        rows = problem.assembly.A.T if problem.form == "primal" else None
+        G = problem.G
         # Copies, because some of these solvers refuse read-only arrays.
         if self.name in qpsolvers.dense_solvers:
-            P = np.array(dense(blocks_of(problem)), order="C")
-            return Converted(problem.form, P, None if rows is None else rows.toarray(order="C"))
-        P = sp.block_diag([sp.csc_matrix(block) for block in blocks_of(problem)], format="csc")
-        return Converted(problem.form, sp.csc_matrix(P), None if rows is None else sp.csc_matrix(rows))
+            P = np.array(dense(problem.blocks), order="C")
+            return Converted(problem, P, None if G is None else G.toarray(order="C"))
+        P = sp.block_diag([sp.csc_matrix(block) for block in problem.blocks], format="csc")
+        return Converted(problem, sp.csc_matrix(P), None if G is None else sp.csc_matrix(G))
 
-    def setup(self, state: Converted, load: Load, tolerance: float) -> Any:
-        if state.form == "primal":
-            return qpsolvers.Problem(state.P, state.q(load), G=state.rows, h=np.array(load.g))
-        return qpsolvers.Problem(state.P, state.q(load), lb=np.zeros(len(load.p)))
+    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
+        q, h = state.q(load), state.h(load)
+        limits = {"lb": np.zeros_like(q)} if h is None else {"G": state.G, "h": np.array(h)}
+        return state, qpsolvers.Problem(state.P, q, **limits)
 
-    def solve(self, ready: Any, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        state, problem = ready
         options = TOLERANCE.get(self.name)
         details: dict[str, Any] = {} if options else {"tolerance": "not taken"}
         settings = options(tolerance) if options else {}
         try:
-            solution = qpsolvers.solve_problem(ready, self.name, **settings)
+            solution = qpsolvers.solve_problem(problem, self.name, **settings)
         except QPError as error:
             return Answer("failed", None, details={**details, "message": str(error)})
-        primal = ready.G is not None
-        lam, x = (solution.z, solution.x) if primal else (solution.x, None)
-        if lam is None or lam.size == 0:
+        if solution.x is None or (not state.bounded and (solution.z is None or not solution.z.size)):
             return Answer("failed", None, details=details)
         iterations = solution.extras.get("iterations", solution.extras.get("iter"))
         if isinstance(iterations, np.ndarray):  # quadprog: constraints added, constraints dropped
             iterations = int(iterations.sum())
-        return answer(
+        return state.answer(
             "solved" if solution.found else "failed",
             tolerance,
-            lam,
-            x,
+            solution.x,
+            solution.z,
             iterations=iterations,
             reported_s=solution.solve_time,
             details=details,

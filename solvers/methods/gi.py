@@ -20,12 +20,12 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
 from solvers.active_set.growing_factor import GrowingFactor
 from solvers.active_set.solve import solve_from
-from solvers.base import FORMS, Answer, Form, Load, Problem, Solver, failed
+from solvers.base import FORMS, Answer, Form, LoadCase, Problem, Solver, failed
 from solvers.kkt import checked
 from solvers.linear_algebra.inverse import inverse_with_factor
 
@@ -62,7 +62,7 @@ class GoldfarbIdnani(Solver):
 
     def prepare(self, data: Problem) -> _Prepared | Answer:
         """G: Q itself, or Q⁻¹ by the Cholesky factor of Q; where that cannot be, the answer that says so."""
-        if data.form == "primal":
+        if not data.bounded:
             return _Prepared(data, data.Q, None)
         try:
             inverse, U = inverse_with_factor(data.Q)
@@ -70,7 +70,7 @@ class GoldfarbIdnani(Solver):
             return failed(f"Q is not positive definite: {error}")
         return _Prepared(data, inverse, U)
 
-    def solve(self, ready: _Prepared | Answer, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: _Prepared | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
             return ready
         try:
@@ -78,7 +78,7 @@ class GoldfarbIdnani(Solver):
         except np.linalg.LinAlgError as error:
             return failed(str(error))
 
-    def _solved(self, ready: _Prepared, load: Load, tolerance: float) -> Answer:
+    def _solved(self, ready: _Prepared, load: LoadCase, tolerance: float) -> Answer:
         data = ready.problem
         slacks = _primal_slacks(ready, load) if ready.factor is None else _dual_slacks(ready, load)
         limit = int(self.max_pivots * len(ready.G)) + 10
@@ -87,7 +87,7 @@ class GoldfarbIdnani(Solver):
             return failed("rounding: the multipliers are no longer finite", result.pivots)
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is None:
-            x = data.prepared.recover(result.u, LoadCase(load.f, load.g))
+            x = data.prepared.recover(result.u, load)
             return Answer(result.status, result.u, x, result.pivots, details=details)
         if result.status == "inaccurate":
             return _finished(ready, load, result, tolerance, details)
@@ -101,7 +101,7 @@ class GoldfarbIdnani(Solver):
 
 
 def _finished(
-    ready: _Prepared, load: Load, result: GiResult, tolerance: float, details: dict[str, Any]
+    ready: _Prepared, load: LoadCase, result: GiResult, tolerance: float, details: dict[str, Any]
 ) -> Answer:
     """Where the rounding of Q⁻¹ misleads the pivots: block pivoting from the set that they have reached."""
     closed = np.ones(len(load.p), dtype=bool)
@@ -116,7 +116,7 @@ def _finished(
     return replace(answer, iterations=result.pivots, details=details)
 
 
-def _primal_slacks(ready: _Prepared, load: Load) -> Slacks:
+def _primal_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
     prepared, A = ready.problem.prepared, ready.problem.assembly.A
 
     def slacks(u: Vector) -> tuple[Vector, Vector]:
@@ -133,7 +133,7 @@ def _primal_slacks(ready: _Prepared, load: Load) -> Slacks:
     return slacks
 
 
-def _dual_slacks(ready: _Prepared, load: Load) -> Slacks:
+def _dual_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
     Q, factor = ready.problem.Q, (ready.factor, False)
 
     def slacks(u: Vector) -> tuple[Vector, Vector]:
@@ -148,7 +148,7 @@ def _dual_slacks(ready: _Prepared, load: Load) -> Slacks:
     return slacks
 
 
-def _on_support(ready: _Prepared, load: Load, lam: Vector, result: GiResult) -> Vector:
+def _on_support(ready: _Prepared, load: LoadCase, lam: Vector, result: GiResult) -> Vector:
     """λ with λ_C = 0 exactly and Q_SS λ_S = p_S refined on the rest S, so that no rounding of λ_C is left.
 
     With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). What is then negative, where a
@@ -166,7 +166,9 @@ def _on_support(ready: _Prepared, load: Load, lam: Vector, result: GiResult) -> 
             C = np.append(C, k)
 
 
-def _refined(ready: _Prepared, load: Load, lam: Vector, C: NDArray[np.intp], factor: GrowingFactor) -> Vector:
+def _refined(
+    ready: _Prepared, load: LoadCase, lam: Vector, C: NDArray[np.intp], factor: GrowingFactor
+) -> Vector:
     lam = lam.copy()
     for _ in range(2):
         lam[C] = 0.0

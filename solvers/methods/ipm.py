@@ -13,8 +13,8 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from problems.errors import Fault, InputError
-from problems.forms.assembly import LoadCase, Vector
-from solvers.base import Answer, Form, Load, Problem, Solver, Status, failed
+from problems.forms.assembly import Vector
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, failed
 from solvers.interior_point.infeasible_start import mehrotra_start, stp1, stp2
 from solvers.interior_point.newton_system import SYSTEMS, NewtonSystem, OpenLast
 from solvers.interior_point.schemes import SCHEMES, CgExhausted, Newton, Point
@@ -126,7 +126,7 @@ class Ipm(Solver):
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 
-    def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
             return ready
         Q, system = ready.problem.Q, ready.system
@@ -159,7 +159,7 @@ class Ipm(Solver):
             details=details,
         )
 
-    def _start(self, problem: Problem, load: Load, details: dict[str, Any]) -> Start:
+    def _start(self, problem: Problem, load: LoadCase, details: dict[str, Any]) -> Start:
         match self.start:
             case "stp1":
                 return stp1(problem.Q, load.p, self.rho)
@@ -169,7 +169,7 @@ class Ipm(Solver):
                 return mehrotra_start(problem.Q, load.p)
         try:
             if self.start == "algorithm_4":
-                return algorithm_4(problem.prepared, LoadCase(load.f, load.g))
+                return algorithm_4(problem.prepared, load)
             return algorithm_5(problem.Q, load.p)
         except NoStart as error:
             details["start_instead"] = f"mehrotra, because {error}"

@@ -16,7 +16,7 @@ from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix
 from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.solve import solve_from
-from solvers.base import Answer, Form, Load, Problem, Solver, failed
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, failed
 from solvers.interior_point.infeasible_start import stp2
 from solvers.interior_point.newton_system import Direct, NewtonSystem
 from solvers.interior_point.schemes import Newton, Point, mehrotra
@@ -75,7 +75,7 @@ class FastIpm(Solver):
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 
-    def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
             return ready
         try:
@@ -83,7 +83,7 @@ class FastIpm(Solver):
         except (np.linalg.LinAlgError, NoStart) as error:
             return failed(str(error))
 
-    def _solved(self, ready: _Ready, load: Load, tolerance: float) -> Answer:
+    def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
         Q, p, system = ready.problem.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()

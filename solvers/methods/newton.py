@@ -18,13 +18,13 @@ import numpy as np
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
-from solvers.active_set.batched import Together
+from solvers.active_set.batched import BatchedSweeps
 from solvers.active_set.block_pivoting import block_pivoting
 from solvers.active_set.bordered_factor import Set
 from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.nested import Cells, cells_of, representatives
 from solvers.active_set.solve import solve_from
-from solvers.base import Answer, Form, Load, Near, Problem, Solver, failed
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
 from solvers.linear_algebra.banded_inverse import banded_inverse
 from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
@@ -39,7 +39,7 @@ class _Ready:
     problem: Problem
     inverse: Matrix
     cells: tuple[Cells, ...]
-    near: Near | None = None
+    start: WarmStart | None = None
 
 
 class ActiveSetNewton(Solver):
@@ -76,12 +76,17 @@ class ActiveSetNewton(Solver):
             return failed(f"Q is not positive definite: {error}")
 
     def update(
-        self, state: _Ready | Answer, ready: _Ready | Answer, load: Load, tolerance: float, near: Near
+        self,
+        state: _Ready | Answer,
+        ready: _Ready | Answer,
+        load: LoadCase,
+        tolerance: float,
+        start: WarmStart,
     ) -> _Ready | Answer:
         """The first guess comes from the near answer."""
-        return state if isinstance(state, Answer) else replace(state, near=near)
+        return state if isinstance(state, Answer) else replace(state, start=start)
 
-    def together(self, state: _Ready | Answer) -> Together | None:
+    def batched(self, state: _Ready | Answer) -> BatchedSweeps | None:
         """Sweeps with a banded M ≈ Q⁻¹; contact sets as in `solve` for what they do not settle."""
         if isinstance(state, Answer):
             return None
@@ -92,9 +97,9 @@ class ActiveSetNewton(Solver):
                 C, _ = _first_guess(state, p, tolerance)
             return solve_from(C, ContactSets(Q, p, inverse), tolerance, self.max_sets)
 
-        return Together(Q, banded_inverse(Q, nodes), alone)
+        return BatchedSweeps(Q, banded_inverse(Q, nodes), alone)
 
-    def solve(self, ready: _Ready | Answer, load: Load, tolerance: float) -> Answer:
+    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
             return ready
         try:
@@ -109,8 +114,8 @@ class ActiveSetNewton(Solver):
 def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
     """The set that the near answer suggests, else the forces of the finest subset; the sets tried there."""
     Q, tried = ready.problem.Q, 0
-    if ready.near is not None:
-        lam, y = ready.near.lam, ready.near.gap + ready.near.load.p - p  # Qλ − p
+    if ready.start is not None:
+        lam, y = ready.start.lam, ready.start.gap + ready.start.load.p - p  # Qλ − p
         C = np.diag(Q) * lam > y
         if (C ^ (lam > 0)).sum() <= NEAR * len(p):
             return C, tried

@@ -27,7 +27,8 @@ from scipy.sparse.csgraph import connected_components
 from harness.verification.definite import smallest_eigenvalue
 from harness.verification.exact_residual import gamma
 from harness.verification.reference import proven_lambda_min
-from problems.forms.assembly import Assembly, Matrix, Prepared, Vector
+from problems.forms.assembly import Assembly, Matrix, Vector
+from problems.forms.prepared import Prepared
 
 from .compliance import largest_compliance
 from .residual import SAFE, Split

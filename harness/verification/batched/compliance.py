@@ -16,7 +16,8 @@ import numpy as np
 from scipy.linalg import lapack
 
 from harness.verification.exact_residual import gamma
-from problems.forms.assembly import Matrix, Prepared
+from problems.forms.assembly import Matrix
+from problems.forms.prepared import Prepared
 
 from .residual import SAFE
 

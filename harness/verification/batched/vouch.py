@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.forms.assembly import Vector
-from solvers.base import Load
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.problem import side_by_side
 
 from .bound import Bound, gaps
 from .residual import refined, residual, split
@@ -37,7 +37,7 @@ class Vouched:
 
 def vouch(
     bound: Bound,
-    loads: Sequence[Load],
+    loads: Sequence[LoadCase],
     lams: Sequence[Vector],
     own: Sequence[Vector | None],
 ) -> list[Vouched]:
@@ -48,7 +48,9 @@ def vouch(
     """
     prepared, assembly = bound.prepared, bound.prepared.assembly
     A = assembly.A
-    f, g, p = (np.column_stack([getattr(load, name) for load in loads]) for name in "fgp")
+    f, g = (np.column_stack([getattr(load, name) for load in loads]) for name in "fg")
+    formed = all(load.p.size for load in loads)  # by the dual form
+    p = np.column_stack([load.p for load in loads]) if formed else prepared.dual_load(side_by_side(loads))
     lam = np.column_stack(lams)
     compliance = np.diag(prepared.Q)[:, None]
     clean = np.where(compliance * lam > prepared.Q @ lam - p, np.maximum(lam, 0.0), 0.0)

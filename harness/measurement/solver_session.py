@@ -1,0 +1,116 @@
+"""A solver on one problem, taken through the steps of solvers.base: the only code that does so."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.problem import Problem
+from solvers.base import Answer, Batch, Solver, WarmStart
+
+from .answers import Refused, checked
+
+#: Wraps a step of the solver, by the name of its seconds: to time it, or to say which one failed.
+Lap = Callable[[str], AbstractContextManager[None]]
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A load case whose answer the next one may begin from. case : its number in a series."""
+
+    case: int | None
+    load: LoadCase
+    lam: Vector
+    x: Vector | None
+
+
+class SolverSession:
+    """Convert and prepare once, then load case after load case; what may be a warm start is kept.
+
+    Parameters
+    ----------
+    lap : entered around each step, with convert_s, prepare_s, setup_s or solve_s.
+    most : answers kept for warm starts; all by default.
+
+    Raises what the solver raises, and Refused where what it returns is no answer.
+    """
+
+    def __init__(
+        self,
+        solver: Solver,
+        problem: Problem,
+        tolerance: float,
+        lap: Lap = lambda name: nullcontext(),
+        most: int | None = None,
+    ) -> None:
+        self.solver, self.problem, self.tolerance, self.lap = solver, problem, tolerance, lap
+        self.solved: deque[Solved] = deque(maxlen=most)
+        self.opened = False
+        self.state: Any = None
+        self.ready: Any = None
+        self.batch: Batch | None = None
+
+    def open(self, batched: bool = False) -> None:
+        """Convert and prepare. batched : ask for what takes several load cases at once, if there is one."""
+        with self.lap("convert_s"):
+            converted = self.solver.convert(self.problem)
+        with self.lap("prepare_s"):
+            self.state = self.solver.prepare(converted)
+            if batched:
+                self.batch = self.solver.batched(self.state)
+        self.opened = True
+
+    def nearest(self, load: LoadCase) -> Solved | None:
+        """The solved case to start from; None before the first, and after a failure."""
+        if self.ready is None:
+            return None
+        return min(self.solved, key=lambda other: self.problem.distance(other.load, load), default=None)
+
+    def cold(self, load: LoadCase, tolerance: float | None = None) -> Answer:
+        """Set up and solve."""
+        tolerance = self.tolerance if tolerance is None else tolerance
+        with self.lap("setup_s"):
+            self.ready = self.solver.setup(self.state, load, tolerance)
+        return self._solve(load, tolerance)
+
+    def warm(self, load: LoadCase, start: WarmStart) -> Answer:
+        """The library's own way to the next load case."""
+        with self.lap("setup_s"):
+            self.ready = self.solver.update(self.state, self.ready, load, self.tolerance, start)
+        return self._solve(load, self.tolerance)
+
+    def next(self, load: LoadCase, near: Solved | None, case: int | None = None) -> Answer:
+        """Solve from the nearest answer if there is one; the answer is checked and kept for the next case."""
+        if near is None:
+            found = self.cold(load)
+        else:
+            gap = self.problem.gap(near.load, near.lam, near.x)
+            found = self.warm(load, WarmStart(near.load, near.lam, gap, near.x))
+        answer = checked(found, self.problem)
+        if answer.lam is not None:
+            x = answer.x if "x" in self.problem.needs else None
+            self.solved.append(Solved(case, load, np.asarray(answer.lam, dtype=float), x))
+        return answer
+
+    def solve_batch(self, loads: Sequence[LoadCase]) -> list[Answer]:
+        """An answer to each load case, checked."""
+        if self.batch is None:
+            raise Refused("takes one load case at a time")
+        answers = list(self.batch(loads, self.tolerance))
+        if len(answers) != len(loads):
+            raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
+        return [checked(answer, self.problem) for answer in answers]
+
+    def forget(self) -> None:
+        """Set the next case up anew, after a failure."""
+        self.ready = None
+
+    def _solve(self, load: LoadCase, tolerance: float) -> Answer:
+        with self.lap("solve_s"):
+            return self.solver.solve(self.ready, load, tolerance)

@@ -1,0 +1,107 @@
+"""What a scene will need, before anything is built: memory, and time by counts of operations.
+
+The dense forms keep K and its factors, Σ 2 b² entries for blocks of b unknowns, and Q, m² entries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from harness.measurement.machine import physical_memory_mib
+from problems.errors import Fault, InputError
+from problems.model.effect import TieEffect
+from problems.model.joint import Joint, Part
+from problems.model.scene import JointScene, MadeScene, Scene
+from problems.scene import read_scene
+
+if TYPE_CHECKING:
+    from .plan import Measurement  # which imports the solvers
+
+MIB = 2**20
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """n unknowns, m contacts; MiB of the stored matrices and at the peak; seconds to build and to answer."""
+
+    n: int
+    m: int
+    stored_mib: float
+    peak_mib: float
+    build_s: float
+    answer_s: float
+
+
+def stored_mib(scene: Scene) -> float:
+    """MiB of K, its factors and Q; 0 if that takes reading the matrices."""
+    match scene:
+        case JointScene():
+            return 8 * _entries(_blocks(scene), scene.joint.size[1]) / MIB
+        case MadeScene():
+            assembly = scene.made.assembly
+            return 8 * _entries([len(K) for K in assembly.blocks], assembly.m) / MIB
+    return 0.0
+
+
+def refuse_limits_too_low(plan: Iterable[Measurement]) -> None:
+    """Raise InputError where a memory limit is above what this machine has, or below the matrices alone."""
+    faults, physical = [], physical_memory_mib()
+    limits = {(m.source, m.memory_limit_mib) for m in plan}
+    for limit in sorted({limit for _, limit in limits if limit > physical}):
+        faults.append(Fault("--memory-limit", "memory_limit_mib", limit, f"this machine has {physical} MiB"))
+    for source, limit in sorted(limits):
+        if (need := stored_mib(read_scene(source))) > limit:
+            allowed = f"the matrices of scene {source} alone take {need:.0f} MiB"
+            faults.append(Fault("--memory-limit", "memory_limit_mib", limit, allowed))
+    if faults:
+        raise InputError(faults)
+
+
+def refuse_what_cannot_fit(scene: Scene, source: str) -> None:
+    """Raise InputError where a scene's matrices need more memory than this machine has."""
+    if not isinstance(scene, JointScene):
+        return
+    need, physical = estimated(scene, 1.0).peak_mib, physical_memory_mib()
+    if need > physical:
+        nodes = list(scene.joint.junction.nodes)
+        allowed = f"fewer nodes: {need:.0f} MiB are needed, this machine has {physical}"
+        raise InputError.one(source, "junction.nodes", nodes, allowed)
+
+
+def estimated(scene: JointScene, flops_per_s: float) -> Estimate:
+    """From counts of operations; the numbers of the largest terms, so good to a factor of two or three."""
+    joint, blocks = scene.joint, _blocks(scene)
+    n, m = joint.size
+    entries = _entries(blocks, m)
+    condensing = sum(_condensing(joint, part) for part in joint.part)
+    # Cholesky b³/3 and inverse 2b³/3 of each block, Lanczos and its products some hundred b².
+    preparing = sum(block**3 + 200 * block**2 for block in blocks)
+    # Some dozen factorisations of half of Q, residuals in slices of K, and the proof of λmin.
+    answering = 12 * (m / 2) ** 3 / 3 + sum(12 * 6 * block**2 + 2 * block**3 / 3 for block in blocks)
+    peak = 8 * (entries + max(block**2 for block in blocks) + m**2) / MIB + 150
+    return Estimate(
+        n, m, 8 * entries / MIB, peak, (condensing + preparing) / flops_per_s, answering / flops_per_s
+    )
+
+
+def _condensing(joint: Joint, part: Part) -> float:
+    """Operations of the elimination line by line: a line of 4 nx unknowns against the nodes behind it."""
+    nx, ny = joint.junction.nodes
+    beyond = sum(side.elements for side in (part.south, part.north) if side)
+    line, total = 4 * nx, 0.0
+    for row in range(beyond + ny):
+        kept = nx * max(0, min(row - beyond + 1, ny))
+        total += line**3 / 3 + line**2 * (kept + line) + line * (kept + line) ** 2
+    return total
+
+
+def _blocks(scene: JointScene) -> list[int]:
+    """The sizes of K's blocks; springs between parts are taken to make one of all."""
+    joint = scene.joint
+    return [joint.size[0]] if any(scene.effects_of(TieEffect)) else [joint.node_count] * len(joint.part)
+
+
+def _entries(blocks: list[int], m: int) -> int:
+    return 2 * sum(block**2 for block in blocks) + m**2

@@ -1,0 +1,17 @@
+"""The forms of the quadratic program, by name. (Imports nothing: the command line lists them.)
+
+A new form is one file beside this one and its name here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+Form = Literal["primal", "dual"]
+FORMS: tuple[Form, ...] = get_args(Form)
+
+
+def usual(forms: Sequence[Form]) -> Form:
+    """Of the forms that a solver takes, the one it is run in unless another is asked for: the dual."""
+    return "dual" if "dual" in forms else forms[0]

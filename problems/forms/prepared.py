@@ -1,0 +1,74 @@
+"""The data preparation of the paper: done once per assembly, used by every load case."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as sla
+
+from .assembly import Assembly, LoadCase, Matrix, Vector
+from .compliance import AnyQ
+from .factorisation import factor, schur
+
+
+class Prepared:
+    """An assembly with what is derived from it: each stage is made when it is first asked for.
+
+    Parameters
+    ----------
+    assembly : K and A.
+    factors : U_i upper triangular with K_i = U_iᵀU_i, each (n_i, n_i); computed unless given.
+    Q : (m, m), mm/N, Q = AᵀK⁻¹A; computed unless given.
+
+    Another way to K⁻¹ (a sparse factor, a band) overrides `solve_K`, and `compliance` by products with it:
+    what judges an answer needs no more than these and products with K and A.
+    """
+
+    def __init__(
+        self, assembly: Assembly, factors: tuple[Matrix, ...] | None = None, Q: Matrix | None = None
+    ) -> None:
+        self.assembly = assembly
+        #: What the matrices are known by on disk; None if they are in memory only.
+        self.key: str | None = None
+        if factors is not None:
+            self.__dict__["factors"] = factors  # in the place of the cached properties
+        if Q is not None:
+            self.__dict__["Q"] = Q
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What was measured while the stages were made: cond_K, λmin, λmax, seconds of each step, …"""
+        return {}
+
+    @cached_property
+    def factors(self) -> tuple[Matrix, ...]:
+        return tuple(factor(K) for K in self.assembly.blocks)
+
+    @cached_property
+    def Q(self) -> Matrix:
+        return schur(self.assembly, self.factors)
+
+    def solve_K(self, b: Matrix) -> Matrix:
+        """K⁻¹ b through the Cholesky factors."""
+        return np.concatenate(
+            [
+                sla.cho_solve((U, False), b[s], check_finite=False)
+                for U, s in zip(self.factors, self.assembly.slices, strict=True)
+            ]
+        )
+
+    @property
+    def compliance(self) -> AnyQ:
+        """Q, as a matrix or by its products."""
+        return self.Q
+
+    def dual_load(self, load: LoadCase) -> Vector:
+        """p = AᵀK⁻¹f − g, (m,), mm: the overlap of the parts if contact is ignored."""
+        return self.assembly.A.T @ self.solve_K(load.f) - load.g
+
+    def recover(self, lam: Vector, load: LoadCase) -> Vector:
+        """x = K⁻¹(f − Aλ), (n,) mm, with one step of iterative refinement."""
+        b = load.f - self.assembly.A @ lam
+        x = self.solve_K(b)
+        return x + self.solve_K(b - self.assembly.multiply_K(x))

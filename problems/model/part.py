@@ -1,0 +1,86 @@
+"""One part as finite elements: its plate, what stiffens and holds it, and where it meets the others.
+
+All that is made of a part (its condensed stiffness, condensed loads, the model without condensation) reads
+its unknowns here: the deflections at the junction nodes, those at built-in edges, and the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from problems.fem.plate import Plate
+
+from .joint import Joint, Part
+
+if TYPE_CHECKING:
+    from .effect import Range, StiffnessEffect
+
+Unknowns = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class PartModel:
+    """A part's plate and what stiffens and holds it.
+
+    junction : the grid lines y = const of the junction. clamped : those that are built in.
+    """
+
+    plate: Plate
+    effects: tuple[StiffnessEffect, ...]
+    junction: range
+    clamped: frozenset[int] = frozenset()
+
+    @classmethod
+    def of(cls, joint: Joint, part: Part, effects: tuple[StiffnessEffect, ...]) -> PartModel:
+        """The model of a part; of `effects`, those that act on it count."""
+        plate = joint.plate(part)
+        first = part.south.elements if part.south else 0
+        edges = {"south": 0, "north": len(plate.y) - 1}
+        return cls(
+            plate,
+            tuple(effect for effect in effects if effect.part == part.name),
+            range(first, first + len(joint.y)),
+            frozenset(edges[edge] for edge in part.clamped),
+        )
+
+    def stiffness(self) -> sp.csr_array:
+        """(plate.size, plate.size), N/mm and N: the plate and the terms of its effects, nothing clamped."""
+        K = self.plate.stiffness()
+        for effect in self.effects:
+            K = K + effect.stiffness(self.plate)
+        return sp.csr_array(K)
+
+    @property
+    def free_lines(self) -> list[int]:
+        """The grid lines that are not built in, by ascending y."""
+        return [line for line in range(len(self.plate.y)) if line not in self.clamped]
+
+    @property
+    def deflections(self) -> Unknowns:
+        """The deflections at the junction nodes, x running fastest: what condensation keeps."""
+        return np.concatenate([self.plate.deflection_dofs(line) for line in self.junction])
+
+    @property
+    def others(self) -> Unknowns:
+        """The free unknowns that condensation eliminates."""
+        held = np.zeros(self.plate.size, dtype=bool)
+        held[self.deflections] = True
+        for line in self.clamped:
+            held[self.plate.line_dofs(line)] = True
+        return np.flatnonzero(~held)
+
+    def areas(self) -> Iterator[tuple[float, float, Range, Range]]:
+        """(sign, thickness, range of x, range of y) whose sum is the part with its pads."""
+        x, y = ((float(grid[0]), float(grid[-1])) for grid in (self.plate.x, self.plate.y))
+        yield 1.0, self.plate.thickness, x, y
+        for effect in self.effects:
+            if effect.pad:
+                thickness, x, y = effect.pad
+                yield 1.0, thickness, x, y
+                yield -1.0, self.plate.thickness, x, y

@@ -1,0 +1,141 @@
+"""A scene: a joint with its effects, a user's own matrices, or matrices made for a ladder's rung."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from problems.forms.assembly import Matrix
+from problems.forms.made import Made
+from problems.storage.cache import digest
+
+from .effect import Effect, ForceEffect, StiffnessEffect
+from .joint import Joint, Table
+
+E = TypeVar("E", bound=Effect)
+
+
+@dataclass(frozen=True)
+class Scene(ABC):
+    """A checked scene.
+
+    on_ladder : whether it is a rung, whose limit follows its conditioning.
+    refused : words of the InputError that building a rung is to end with; "" where it is not.
+    """
+
+    name: str
+    title: str
+    _: KW_ONLY
+    on_ladder: bool = False
+    refused: str = ""
+
+    @property
+    @abstractmethod
+    def assembly_key(self) -> str:
+        """Hash of everything that determines K and A."""
+
+    @property
+    @abstractmethod
+    def key(self) -> str:
+        """Hash of everything that determines K, A, f and g."""
+
+    @property
+    @abstractmethod
+    def expected_size(self) -> tuple[int, int] | None:
+        """(n, m) without building anything; None if that takes reading the matrices."""
+
+    def source_of(self, matrix: str) -> object:
+        """What an error message names as the place that a matrix comes from."""
+        return f"scene {self.name}"
+
+    def marks(self) -> Matrix:
+        """(k, 2) points in mm that a picture of the junction should mark."""
+        return np.zeros((0, 2))
+
+
+@dataclass(frozen=True)
+class JointScene(Scene):
+    """A joint, and the effects that the scene calls for."""
+
+    joint: Joint
+    effects: tuple[Effect, ...] = ()
+
+    def effects_of(self, kind: type[E]) -> Iterator[E]:
+        """The effects of one class, in the scene's order."""
+        return (effect for effect in self.effects if isinstance(effect, kind))
+
+    @property
+    def stiffness_effects(self) -> tuple[StiffnessEffect, ...]:
+        return tuple(self.effects_of(StiffnessEffect))
+
+    @property
+    def assembly_key(self) -> str:
+        return digest(plain(self.joint), [plain(effect) for effect in self.stiffness_effects])
+
+    @property
+    def key(self) -> str:
+        loads = [plain(effect) for effect in self.effects if not isinstance(effect, StiffnessEffect)]
+        return digest(self.assembly_key, loads)
+
+    @property
+    def expected_size(self) -> tuple[int, int]:
+        return self.joint.size
+
+    def marks(self) -> Matrix:
+        own = [effect.marks(self.joint) for effect in self.effects_of(ForceEffect)]
+        return np.concatenate([super().marks(), *own])
+
+
+@dataclass(frozen=True)
+class MatricesScene(Scene):
+    """The files of a user's own matrices: ("problem", x.npz), or one for each of K, A, f and g."""
+
+    files: tuple[tuple[str, Path], ...]
+
+    @property
+    def assembly_key(self) -> str:
+        return digest([key for key, _ in self.files], *(path.read_bytes() for _, path in self.files))
+
+    @property
+    def key(self) -> str:
+        return digest(self.assembly_key, [])
+
+    @property
+    def expected_size(self) -> None:
+        return None
+
+    def source_of(self, matrix: str) -> object:
+        own = dict(self.files)
+        return own.get("problem") or own.get(matrix)
+
+
+@dataclass(frozen=True)
+class MadeScene(Scene):
+    """Matrices that were made in memory: a ladder's rung without plates."""
+
+    made: Made
+
+    @property
+    def assembly_key(self) -> str:
+        assembly = self.made.assembly
+        A = assembly.A
+        arrays = (*assembly.blocks, A.data, A.indices, A.indptr)
+        return digest([assembly.n, assembly.m], *(array.tobytes() for array in arrays))
+
+    @property
+    def key(self) -> str:
+        return digest(self.assembly_key, self.made.load.f.tobytes(), self.made.load.g.tobytes())
+
+    @property
+    def expected_size(self) -> tuple[int, int]:
+        return self.made.assembly.n, self.made.assembly.m
+
+
+def plain(table: Table) -> dict[str, Any]:
+    """What a key is made of."""
+    return table.model_dump(mode="json")

@@ -1,0 +1,109 @@
+"""What the adapters of the libraries share: a quadratic program in a library's format, options, the answer.
+
+Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms); an adapter never
+asks which form it is. Relative tolerances are 0 where a library has them apart, and the absolute ones are the
+tolerance asked for, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the
+duality gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+
+from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Matrix, Vector
+
+from .base import Answer, Problem, Status, WarmStart
+
+
+@dataclass(frozen=True)
+class Converted:
+    """P and G in a library's format; G is None where z ≥ 0 are bounds of the library's own kind."""
+
+    problem: Problem
+    P: Any
+    G: Any = None
+
+    @property
+    def bounded(self) -> bool:
+        """Whether z ≥ 0 replaces the rows Gz ≤ h."""
+        return self.problem.bounded
+
+    def q(self, load: LoadCase) -> Vector:
+        """The linear term: −f in N (primal) or −p in mm (dual)."""
+        return self.problem.q(load)
+
+    def h(self, load: LoadCase) -> Vector | None:
+        """The right-hand side of the rows, g in mm; None where there are bounds."""
+        return self.problem.h(load)
+
+    def start(self, start: WarmStart) -> tuple[Vector | None, Vector]:
+        """(z, multipliers) of a warm start."""
+        return self.problem.start(start.lam, start.gap, start.x)
+
+    def answer(
+        self, status: Status, tolerance: float, z: Vector, multipliers: Vector | None, **facts: Any
+    ) -> Answer:
+        """The answer of a solution z and the multipliers of its rows, if there are rows."""
+        lam, x = self.problem.answer(z, multipliers)
+        return Answer("failed", None, **facts) if lam is None else answer(status, tolerance, lam, x, **facts)
+
+
+def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = None, **facts: Any) -> Answer:
+    """An Answer with λ in [−tolerance, 0) set to 0, which the library's own test allows.
+
+    A larger negative stays for the judge to see. With values that are not finite there is no answer.
+    """
+    lam = np.array(lam, dtype=float)
+    if not np.isfinite(lam).all() or (x is not None and not np.isfinite(x).all()):
+        return Answer("failed", None, **facts)
+    lam[(lam < 0) & (lam >= -tolerance)] = 0.0
+    return Answer(status, lam, None if x is None else np.array(x, dtype=float), **facts)
+
+
+def unknowns(problem: Problem) -> int:
+    """The length of z."""
+    return sum(len(block) for block in problem.blocks)
+
+
+def rows_for_bounds(problem: Problem, sign: float) -> sp.csc_matrix:
+    """G, or ±I where a library takes the bounds z ≥ 0 as rows, CSC."""
+    return sp.csc_matrix(sign * sp.eye(unknowns(problem)) if problem.G is None else problem.G)
+
+
+def upper_triangle(blocks: Sequence[Matrix]) -> sp.csc_matrix:
+    """Upper triangle of blockdiag(blocks), CSC with 32-bit indices, sorted.
+
+    The blocks are symmetric, so the columns of the upper triangle are the rows of the lower one,
+    which lie contiguous in memory.
+    """
+    data, indices, counts, offset = [], [], [], 0
+    for block in blocks:
+        size = len(block)
+        lower = np.tri(size, dtype=bool)
+        data.append(block[lower])
+        columns = np.arange(offset, offset + size, dtype=np.int32)
+        indices.append(np.broadcast_to(columns, (size, size))[lower])
+        counts.append(np.arange(1, size + 1))
+        offset += size
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
+    return sp.csc_matrix((np.concatenate(data), np.concatenate(indices), indptr), shape=(offset, offset))
+
+
+def dense(blocks: Sequence[Matrix]) -> Matrix:
+    """blockdiag(blocks) as a dense array in Fortran order. No copy of a single C-ordered block."""
+    whole = blocks[0] if len(blocks) == 1 else sla.block_diag(*blocks)
+    return whole.T  # symmetric
+
+
+def choice(solver: str, key: str, value: object, allowed: Collection[Any]) -> None:
+    """Raise InputError unless `value` is one of `allowed`, of the same type (1 is not True)."""
+    if not any(type(value) is type(good) and value == good for good in allowed):
+        listed = ", ".join(map(repr, allowed))
+        raise InputError.one(f"solver {solver}", f"options.{key}", value, f"must be one of {listed}")
