@@ -12,6 +12,7 @@ from typing import Any
 
 from harness.planning.plan import Measurement
 from harness.results.records import Row
+from harness.results.schema import MEASURED, STEPS
 from harness.verification.ground_truth import Ground
 from harness.verification.judge import Judgement
 from problems.prepare import prepared
@@ -22,15 +23,8 @@ from .describe import Description
 from .machine import installed_version, machine
 from .process import measure
 
-#: A row's fields that the worker tells of; null where it does not.
-TOLD = (
-    *("status", "message", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
-    *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details"),
-    *("cholesky_s", "product_s", "stderr", "answer"),
-)
-#: The same of a case of a series: how many were solved at once, and whether others were before.
+#: Of a case of a series: how many were solved at once, and whether others were before.
 TOLD_OF_SERIES = ("together", "warm")
-CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
 
 
 @dataclass(frozen=True)
@@ -62,7 +56,7 @@ def measured(order: Order, answers: Path) -> Measured:
     """Carry out the order; the answers' files go into that directory."""
     start, batch = time.monotonic(), order.batch
     if order.hopeless:
-        not_run: Row = {"status": "time_limit", "message": f"not run: too slow already on {order.hopeless}"}
+        not_run: Row = {"status": "not_run", "message": f"too slow already on {order.hopeless}"}
         told = [not_run] * len(batch)
     elif batch[0].form in order.forms:
         told = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
@@ -109,8 +103,8 @@ def one_row(
     of_series: Row = {"case": m.case, "series": series, **{name: told.get(name) for name in TOLD_OF_SERIES}}
     if m.case is None:
         of_series = {}
-    told = {name: told.get(name) for name in TOLD}
-    known = [told[name] for name in CLOCKS if told[name] is not None]
+    told = {name: told.get(name) for name in MEASURED}
+    known = [told[name] for name in ("load_s", *STEPS) if told[name] is not None]
     return {
         "key": m.key,
         **{name: getattr(m, name) for name in ("suite", "scene", "source", "solver", "form", "variant")},
