@@ -14,8 +14,8 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import everything, no_answer, row, write_rows
 
+from report.analysis.drawn import drawn, left_out, middle_scenes
 from report.analysis.precision import pareto
-from report.analysis.shown import drawn, left_out, middle_scenes
 from report.analysis.standings import compare, standings
 from report.document.numbers import power, significant
 from report.figures import style

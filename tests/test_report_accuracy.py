@@ -13,8 +13,8 @@ from synthetic_results import no_answer, row, write_rows
 
 from report.analysis.advice import advice
 from report.analysis.checks import planned_measurements
+from report.analysis.drawn import best
 from report.analysis.precision import pareto, settings, swept, with_errors
-from report.analysis.shown import best
 from report.document.blocks import Figure, Section, Table, Text
 from report.figures import style
 from report.results.reader import Results, read

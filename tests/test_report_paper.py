@@ -30,11 +30,11 @@ from scipy.stats import linregress
 from synthetic_results import no_answer
 
 from report.analysis.fit import exponent
+from report.analysis.paper.crossings import BETTER, below, compared, worst
+from report.analysis.paper.selection import cells_of_paper, method
 from report.figures import style
-from report.sections import printed
+from report.results import printed
 from report.sections.paper import figures5_7, table1, table2, table3, table4
-from report.sections.paper.crossings import BETTER, below, compared, worst
-from report.sections.paper.selection import cells_of_paper, method
 from report.writers.markdown import write
 
 

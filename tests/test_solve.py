@@ -85,7 +85,7 @@ value = 1e-3
 def _without_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes most of the time: only where a test looks at pictures."""
     if "pictures" not in request.fixturenames:
-        monkeypatch.setattr("report.writers.solution._figures", lambda *_: {})
+        monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
 
 
 @pytest.fixture

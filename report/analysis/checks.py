@@ -9,11 +9,14 @@ from typing import Any
 from report.document.numbers import counted, listed
 from report.results.reader import Results
 
+from .code import code_warnings
+
 
 def warnings(results: Results) -> list[str]:
     """One sentence a fault, the gravest first."""
     checks = (_machines, _unfinished, _versions, _threads)
-    return [*(sentence for check in checks for sentence in check(results)), *results.warnings]
+    found = [sentence for check in checks for sentence in check(results)]
+    return [*code_warnings(results.rows), *found, *results.warnings]
 
 
 def _machines(results: Results) -> list[str]:

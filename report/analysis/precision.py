@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from report.figures import style
 from report.results.reader import Results
 
-from .shown import drawn, styles_of
+from .drawn import drawn
 
 #: mm: the accuracies that prices and advice are given for.
 ACCURACIES = (1e-3, 1e-5, 1e-7, 1e-9)
@@ -41,13 +39,6 @@ def curves(cells: pd.DataFrame) -> set[str]:
     """The series with ENOUGH tolerances on a scene."""
     tolerances = cells.groupby(["series", "scene"])["tolerance"].nunique()
     return set(tolerances.index.get_level_values("series")[tolerances >= ENOUGH])
-
-
-def looks(results: Results, cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """The looks of the series in some of the cells drawn: those without a curve there are marks alone."""
-    joined = curves(cells)
-    styles = styles_of(results, cells)
-    return {s: look if s in joined else style.marker_only(look) for s, look in styles.items()}
 
 
 def swept(results: Results) -> pd.DataFrame:

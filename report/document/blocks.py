@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
@@ -37,6 +37,11 @@ def word(heading: str, name: str) -> Column:
     return Column(heading, lambda row: str(row[name] or MISSING).replace("|", r"\|"), "left")
 
 
+def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The lines of a frame as dictionaries."""
+    return frame.to_dict("records")  # type: ignore[return-value]
+
+
 @dataclass(frozen=True)
 class Table:
     """A table: `columns` of it in the report, all of `data` with all its digits in NAME.csv beside it."""
@@ -49,9 +54,9 @@ class Table:
 
     @property
     def markdown(self) -> str:
-        records: list[dict[str, Any]] = self.data.to_dict("records")  # type: ignore[assignment]
+        lines = records(self.data)
         shown = pd.DataFrame(
-            {c.heading: [c.show(record) for record in records] for c in self.columns}, dtype=object
+            {c.heading: [c.show(line) for line in lines] for c in self.columns}, dtype=object
         )
         align = [c.align for c in self.columns]
         text = shown.to_markdown(index=False, disable_numparse=True, colalign=align)
@@ -75,3 +80,13 @@ Block = Text | Table | Figure
 class Section:
     title: str
     blocks: list[Block]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a section stands in the report: by growing `number`. `about`: the results that it is given,
+    those on the rungs of ladders, those on all other scenes, or all.
+    """
+
+    number: int
+    about: Literal["scenes", "ladders", "all"] = "scenes"

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from report.analysis.precision import ENOUGH, WRONG, in_view, looks, pareto, with_errors
-from report.analysis.shown import drawn, left_out, scenes, sizes
-from report.document.blocks import Figure, Section, Text
-from report.figures import marks, style
-from report.results.reader import ANSWERED, Results
+from harness.results.schema import ANSWERED
+from report.analysis.drawn import drawn, left_out, scenes, sizes
+from report.analysis.precision import ENOUGH, WRONG, in_view, pareto, with_errors
+from report.document.blocks import Figure, Place, Section, Text
+from report.figures import style, unfinished
+from report.figures.lines import looks
+from report.figures.pareto_front import staircase
+from report.results.reader import Results
 
-STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, "solid_joinstyle": "miter"}
+PLACE = Place(330)
 
 
 def section(results: Results) -> Section | None:
@@ -44,7 +46,7 @@ def _figure(results: Results, cells: pd.DataFrame, n: int) -> Figure | None:
         return None
     cells = cells[cells["scene"].isin(ends)]
     styles = looks(results, cells)
-    handles = [*style.legend_entries(styles), *marks.entries(cells)]
+    handles = [*style.legend_entries(styles), *unfinished.entries(cells)]
     drawing = style.figure_above(3.4, handles)
     panels = drawing.subplots(1, len(ends), sharex=True, sharey=True, squeeze=False)[0]
     limit = cells["limit_mm"].max()
@@ -81,14 +83,4 @@ def _unfinished(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any
     missed = cells[~cells["verdict"].isin(ANSWERED)].drop_duplicates(["series", "status"])
     reached = missed["series"].map(cells.groupby("series")["error"].min())
     at = reached.fillna(axes.get_xlim()[1] / 2)
-    marks.unfinished(axes, missed.assign(at=at), "at", styles, inside=True)
-
-
-def staircase(axes: Axes, front: pd.DataFrame, time: str) -> None:
-    """A Pareto front as a staircase from the upper to the right edge of axes that are otherwise done."""
-    if front.empty:
-        return
-    errors, seconds = front["error"].tolist(), front[time].tolist()
-    (_, right), (_, top) = axes.get_xlim(), axes.get_ylim()
-    across, up = np.array([errors[0], *errors, right]), np.array([top, *seconds, seconds[-1]])
-    axes.plot(across, up, drawstyle="steps-post", scalex=False, scaley=False, **STAIRCASE)
+    unfinished.unfinished(axes, missed.assign(at=at), "at", styles, inside=True)

@@ -9,14 +9,16 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.precision import ACCURACIES, in_view, judged, looks, pareto, settings, swept
-from report.analysis.shown import middle_scenes
-from report.document.blocks import Column, Figure, Section, Table, number
+from report.analysis.drawn import middle_scenes
+from report.analysis.precision import ACCURACIES, in_view, judged, pareto, settings, swept
+from report.document.blocks import Column, Figure, Place, Section, Table, number
 from report.document.numbers import MISSING, counted, significant, tidy_power, whole
 from report.figures import style
+from report.figures.lines import looks
+from report.figures.pareto_front import staircase
 from report.results.reader import Results
 
-from .accuracy import staircase
+PLACE = Place(380)
 
 LOAD_CASES = (1, 10, 100, 1000)
 PANEL = 2.6  # inches

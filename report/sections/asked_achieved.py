@@ -7,12 +7,15 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.precision import in_view, looks, swept
-from report.document.blocks import Figure, Section, Table, number, word
+from report.analysis.precision import in_view, swept
+from report.document.blocks import Figure, Place, Section, Table, number, word
 from report.document.numbers import whole
 from report.figures import style
+from report.figures.lines import looks
 from report.results.labels import in_order, named
 from report.results.reader import Results
+
+PLACE = Place(350)
 
 
 def section(results: Results) -> Section | None:

@@ -9,11 +9,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from report.analysis.shown import best, left_out, middle_scenes, of_tolerances
-from report.document.blocks import Figure, Section
+from report.analysis.drawn import best, left_out, middle_scenes, of_tolerances
+from report.document.blocks import Figure, Place, Section
 from report.document.numbers import significant, whole
 from report.figures import style
-from report.results.reader import TIMES, Results
+from report.results.reader import Results
+
+PLACE = Place(400)
 
 ROW = 0.2  # inches
 STEPS = {
@@ -58,8 +60,7 @@ def _answered(cells: pd.DataFrame) -> pd.DataFrame:
 def _panel(axes: Axes, lines: pd.DataFrame) -> None:
     places = np.arange(len(lines))
     left = np.zeros(len(lines))
-    for name in TIMES:
-        _, color, hatch = STEPS[name]
+    for name, (_, color, hatch) in STEPS.items():
         share = (100 * lines[name].fillna(0) / lines["total_s"]).to_numpy(dtype=float)
         look: dict[str, Any] = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.6}
         axes.barh(places, share, left=left, height=0.72, **look)

@@ -7,9 +7,12 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Block, Column, Section, Table, Text, number, word
+from harness.results.schema import VERDICTS
+from report.document.blocks import Block, Column, Place, Section, Table, Text, number, word
 from report.document.numbers import MISSING, power, significant, whole
-from report.results.reader import VERDICTS, Results
+from report.results.reader import Results
+
+PLACE = Place(420)
 
 FIGURES = [
     *("scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeats"),

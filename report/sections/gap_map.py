@@ -7,11 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, PowerNorm
 
-from report.analysis.shown import middle_scene
-from report.document.blocks import Block, Figure, Section, Text
+from report.analysis.drawn import middle_scene
+from report.document.blocks import Block, Figure, Place, Section, Text
 from report.figures import style
 from report.figures.maps import Array, draw, grid_of, outline
 from report.results.reader import Results
+
+PLACE = Place(410)
 
 
 def section(results: Results) -> Section | None:

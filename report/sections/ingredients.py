@@ -6,10 +6,12 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Column, Section, Table, number, word
+from report.document.blocks import Column, Place, Section, Table, number, word
 from report.document.numbers import spread, whole
 from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(150)
 
 KEYS = ["solver", "form", "scene", "threads", "tolerance"]
 

@@ -8,11 +8,13 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, holds, with_outcomes
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, word
 from report.document.numbers import MISSING, counted, power, whole
 from report.figures.ladder_map import ladder_map
-from report.results.labels import IN_HOUSE, in_order
+from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(10, "ladders")
 
 CONDITION = 1e12  # of K: up to it the in-house solvers are to hold
 
@@ -53,7 +55,7 @@ def rungs_in_order(results: Results, cells: pd.DataFrame) -> dict[str, list[str]
 
 def in_house(results: Results, cells: pd.DataFrame) -> str:
     """How the in-house solvers keep what is asked of them."""
-    own = cells[cells["solver"].isin(IN_HOUSE)]
+    own = cells[cells["in_house"]]
     if own.empty or not {"scene", "cond_K"} <= set(results.problems):
         return ""
     known = results.problems.drop_duplicates("scene", keep="last").set_index("scene")["cond_K"]

@@ -6,14 +6,22 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Block, Section, Table, Text, word
+from report.analysis.code import commits_text
+from report.document.blocks import Block, Place, Section, Table, Text, word
 from report.document.numbers import listed, tidy_power
-from report.results.labels import ORDER
+from report.results.labels import in_order
 from report.results.reader import Results
 
+PLACE = Place(900, "all")
+
+FORMS = {
+    "primal": "*Primal*: min ½xᵀKx − fᵀx, Aᵀx ≤ g, in the displacements x of the junction.",
+    "dual": "*Dual*: min ½λᵀQλ − pᵀλ, λ ≥ 0, in the contact forces λ, with Q = AᵀK⁻¹A, p = AᵀK⁻¹f − g, "
+    "x = K⁻¹(f − Aλ).",
+    "sparse": "*Sparse*: min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ g, in all unknowns û of the finite-element model, "
+    "without condensation.",
+}
 MEANING = """\
-- **solver (form)**: what was run. *Primal*: min ½xᵀKx − fᵀx, Aᵀx ≤ g, in the displacements x. *Dual*:
-  min ½λᵀQλ − pᵀλ, λ ≥ 0, in the contact forces λ, with Q = AᵀK⁻¹A, p = AᵀK⁻¹f − g, x = K⁻¹(f − Aλ).
 - **error**: max |x − x*| in mm against the reference answer x*, worked out from the saved answer.
 - **verdict**: the judge's, from the error alone. *Within* or *outside* the limit; *cannot be judged* where
   the reference's own error bound is too wide; *no answer* where there is none.
@@ -36,13 +44,18 @@ def section(results: Results) -> Section | None:
         _machine(results),
         _versions(results.rows),
         Text("### Method\n\n" + _method(results)),
-        Text("### What the columns mean\n\n" + MEANING),
+        Text("### What the columns mean\n\n" + _forms(results.rows) + MEANING),
         Text(
             "### Once more\n\nFrom the directory that holds `measurements.jsonl`:\n\n"
             "```\npython -m harness run suite.toml --out again\n```"
         ),
     ]
     return Section("Machine and method", blocks)
+
+
+def _forms(rows: pd.DataFrame) -> str:
+    words = " ".join(text for form, text in FORMS.items() if (rows["form"] == form).any())
+    return f"- **solver (form)**: what was run. {words}\n"
 
 
 def _machine(results: Results) -> Table:
@@ -52,6 +65,7 @@ def _machine(results: Results) -> Table:
         "threads in effect": _values(rows["threads"]),
         "BLAS kernels in effect": _values(rows["kernels"]),
         "rivetbench": _values(rows["rivetbench_version"]),
+        "commit": commits_text(rows),
         "measured": _period(rows["recorded_at"]),
     }
     table = pd.DataFrame([{"what": k, "value": v} for k, v in facts.items() if v])
@@ -84,11 +98,11 @@ def _period(times: pd.Series[Any]) -> str:
 
 
 def _versions(rows: pd.DataFrame) -> Table:
-    found = rows.groupby("solver")["solver_version"].agg(_values).reset_index()
-    order = {solver: i for i, solver in enumerate(ORDER)}
-    found = found.sort_values("solver", key=lambda names: names.map(lambda s: (order.get(s, len(order)), s)))
-    columns = [word("solver", "solver"), word("version", "solver_version")]
-    return Table("versions", "*The solvers.*", found, columns)
+    found = rows.groupby("solver")[["solver_version", "solver_code"]].agg(_values)
+    found = found.reindex(in_order(rows, "solver")).reset_index()
+    columns = [word("solver", "solver"), word("version", "solver_version"), word("code", "solver_code")]
+    caption = "*The solvers.* Code: a fingerprint of the project's code that implements or calls the solver."
+    return Table("versions", caption, found, columns)
 
 
 def _method(results: Results) -> str:

@@ -11,10 +11,12 @@ import numpy as np
 import pandas as pd
 
 from report.analysis.precision import ACCURACIES, ENOUGH, judged, pareto, swept
-from report.document.blocks import Column, Section, Table, number, word
+from report.document.blocks import Column, Place, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(340)
 
 REACHED, LATE, MISSED, UNJUDGED, NOT_RUN = "reached", "not in time", "missed", "cannot be judged", "not run"
 #: The state of a size is the first of these that one of its scenes is in.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.document.blocks import Block, Section, Table, number, word
+from report.document.blocks import Block, Place, Section, Table, number, word
 from report.document.numbers import MISSING, as_number, power, signed, whole
+from report.results.printed import TABLE_4
 from report.results.reader import Results
 
-from .printed import TABLE_4
+PLACE = Place(310)
 
 PRINTED = {n: cond for _, n, _, cond in TABLE_4}
 

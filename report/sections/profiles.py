@@ -6,13 +6,16 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
+from report.analysis.drawn import left_out, sidelined
 from report.analysis.precision import judged, with_errors
-from report.analysis.shown import left_out, sidelined, styles_of
-from report.document.blocks import Figure, Section, Table, number, word
+from report.document.blocks import Figure, Place, Section, Table, number, word
 from report.document.numbers import counted, listed, whole
 from report.figures import style
+from report.figures.lines import styles_of
 from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(370)
 
 FEWEST = 5  # load cases that a profile stands on
 MOST = 0.75  # of the scenes that a series was asked for, to be compared

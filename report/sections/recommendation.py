@@ -8,9 +8,11 @@ import pandas as pd
 
 from report.analysis.precision import ACCURACIES, judged, settings, swept
 from report.analysis.standings import TIE, preferred
-from report.document.blocks import Section, Table, number, word
+from report.document.blocks import Place, Section, Table, number, word
 from report.document.numbers import listed, power, significant, tidy_power, whole
 from report.results.reader import Results
+
+PLACE = Place(120)
 
 
 def section(results: Results) -> Section | None:

@@ -9,12 +9,14 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.precision import EXACT, swept
-from report.analysis.shown import styles_of
-from report.document.blocks import Block, Figure, Section, Table, Text, number, word
+from report.document.blocks import Block, Figure, Place, Section, Table, Text, number, word
 from report.document.numbers import power, tidy_power, whole
 from report.figures import style
+from report.figures.lines import styles_of
 from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(360)
 
 RESIDUALS = {"primal_residual": "mm", "dual_residual": "N", "duality_gap": "N·mm"}
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pandas as pd
 
+from harness.results.schema import LADDERS
 from report.analysis.outcomes import with_outcomes
-from report.document.blocks import Block, Section, Table, number, word
+from report.document.blocks import Block, Place, Section, Table, number, word
 from report.document.numbers import as_number, power, whole
-from report.results.reader import RUNGS, Results
+from report.results.reader import Results
+
+PLACE = Place(20, "ladders")
 
 FIGURES = (
     *("label", "scene", "status", "verdict", "outcome", "displacement_error_mm", "limit_mm"),
@@ -18,7 +21,7 @@ FIGURES = (
 def section(results: Results) -> Section | None:
     if results.cells.empty or "scene" not in results.problems:
         return None
-    known = results.problems[results.problems["scene"].str.startswith(RUNGS)]
+    known = results.problems[results.problems["scene"].str.startswith(LADDERS)]
     known = known.drop_duplicates("scene", keep="last")
     blocks: list[Block] = [_taken(results, known)]
     broken = with_outcomes(results.cells).query("verdict != 'within'")

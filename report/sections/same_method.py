@@ -6,10 +6,12 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.timed import records, seconds_text, timed
-from report.document.blocks import Column, Section, Table, number, word
+from report.analysis.seconds import seconds_text, timed
+from report.document.blocks import Column, Place, Section, Table, number, records, word
 from report.document.numbers import significant, whole
 from report.results.reader import Results
+
+PLACE = Place(140)
 
 #: Ours, the form, and the other code of a dual active-set method.
 PAIRS = (("gi", "dual", "daqp"), ("gi", "primal", "quadprog"))

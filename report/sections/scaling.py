@@ -8,13 +8,15 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from report.analysis.fit import exponent
-from report.analysis.shown import styles_of
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Column, Figure, Section, Table, number, word
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Column, Figure, Place, Section, Table, number, records, word
 from report.document.numbers import MISSING, whole
 from report.figures import style
+from report.figures.lines import styles_of
 from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(160)
 
 FEWEST = 3  # sizes
 #: What grows, and its unit.

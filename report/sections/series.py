@@ -6,10 +6,14 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Column, Section, Table, Text, number, word
+from harness.results.schema import ANSWERED
+from report.document.blocks import Column, Place, Section, Table, Text, number, word
 from report.document.numbers import power, spread, whole
-from report.results.labels import IN_HOUSE, named
-from report.results.reader import ANSWERED, CELL, Results
+from report.results.labels import named
+from report.results.reader import Results
+from report.results.rows import CELL
+
+PLACE = Place(170)
 
 CASE = ["setup_s", "solve_s", "form_s"]
 ROUND = ["scene", "threads"]
@@ -62,7 +66,7 @@ def compared(rows: pd.DataFrame) -> pd.DataFrame:
     """
     rows = rows.assign(case_s=rows[CASE].sum(axis=1))
     rows["later_s"] = rows["case_s"].where((rows["verdict"] == "within") & (rows["warm"] == 1))
-    libraries = rows[~rows["solver"].isin(IN_HOUSE)].groupby(CELL, dropna=False)["later_s"].median()
+    libraries = rows[~rows["in_house"]].groupby(CELL, dropna=False)["later_s"].median()
     fastest = libraries.groupby(ROUND).min().rename("library_s")
     rows = rows.join(fastest, on=ROUND)
     return rows.assign(to_library=rows["later_s"] / rows["library_s"])
@@ -80,7 +84,7 @@ def _line(group: pd.DataFrame) -> dict[str, Any]:
         "once_s": float(group[["convert_s", "prepare_s"]].max().sum()),
         "first_iterations": answered.loc[first, "iterations"].median(),
         "later_iterations": answered.loc[later, "iterations"].median(),
-        "together": group["together"].max(),
+        "batched": group["batched"].max(),
         "error_mm": answered["displacement_error_mm"].max(),
     }
     line |= {"to_library": group["to_library"].median(), "to_library_least": group["to_library"].min()}
@@ -92,9 +96,9 @@ def _ways(rows: pd.DataFrame) -> str:
     seen = [way for solver, way in REPEATED.items() if (rows["solver"] == solver).any()]
     words = "Each solver takes one load case after another, by its own way from one to the next"
     words += f": {'; '.join(seen)}." if seen else "."
-    if rows["together"].notna().any():
+    if rows["batched"].notna().any():
         words += (
-            " *Together* is given many load cases at once, and their seconds are shared equally among them; "
-            "the others have each one before the next is given."
+            " *Batched*: given many load cases at once, whose time is divided equally among them; all others "
+            "are given one load case at a time."
         )
     return words

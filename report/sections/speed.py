@@ -7,12 +7,15 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.shown import drawn, left_out, styles_of
-from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.analysis.drawn import drawn, left_out
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, number, word
 from report.document.numbers import significant, span, spread, whole
 from report.figures import style
-from report.results.labels import IN_HOUSE, in_order
+from report.figures.lines import styles_of
+from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(130)
 
 PANEL = 3.0  # inches
 ROUND = ["scene", "threads", "repeat"]
@@ -43,7 +46,7 @@ def load_cases(results: Results) -> pd.DataFrame:
     cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
     cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
     cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
-    library = cases[~cases["solver"].isin(IN_HOUSE)].groupby(ROUND)[["load_case_s", "total_s"]].min()
+    library = cases[~cases["in_house"]].groupby(ROUND)[["load_case_s", "total_s"]].min()
     cases = cases.join(library.add_prefix("library_"), on=ROUND)
     cases["to_library"] = cases["load_case_s"] / cases["library_load_case_s"]
     cases["total_to_library"] = cases["total_s"] / cases["library_total_s"]
@@ -62,7 +65,7 @@ def _ratios(cases: pd.DataFrame) -> Table:
                 line |= {name: by_scene.median(), f"{name}_least": mine[name].min()}
                 line |= {f"{name}_most": mine[name].max()}
             lines.append(line)
-    rivals = ", ".join(in_order(cases[~cases["solver"].isin(IN_HOUSE)], "series")) or "none"
+    rivals = ", ".join(in_order(cases[~cases["in_house"]], "series")) or "none"
     caption = (
         "*Seconds as ratios*: a load case (set-up + solve + the dual form's own cost) to the fastest "
         "library's on the same scene in the same round of repeats; the same with what each prepares for "

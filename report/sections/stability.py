@@ -6,10 +6,14 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Block, Section, Table, Text, number, word
+from harness.results.schema import ANSWERED
+from report.document.blocks import Block, Place, Section, Table, Text, number, word
 from report.document.numbers import counted, whole
 from report.results.labels import named
-from report.results.reader import ANSWERED, CELL, Results
+from report.results.reader import Results
+from report.results.rows import CELL
+
+PLACE = Place(390)
 
 SPREAD = 0.2  # most less least, over the median: a time that spreads by more is called unstable
 SHORT = 0.05  # seconds: below, the clock and the start of threads tell

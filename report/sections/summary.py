@@ -6,13 +6,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from report.analysis.advice import advice
+from report.analysis.drawn import left_out, sidelined
 from report.analysis.precision import ENOUGH
-from report.analysis.shown import left_out, sidelined
 from report.analysis.standings import TIE, compare, standings
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, word
 from report.document.numbers import counted, listed, power, whole
 from report.figures.scoreboard import scoreboard
 from report.results.reader import Results
+
+PLACE = Place(110)
 
 
 def section(results: Results) -> Section | None:

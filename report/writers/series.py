@@ -9,11 +9,12 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
+from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number
 from report.document.numbers import counted, listed, significant, tidy_power
 from report.figures import style
 from report.figures.maps import draw
-from report.results.series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
+from report.results.series import Series, read
 
 from .markdown import save_block, template
 

@@ -6,22 +6,25 @@ from collections import Counter
 
 import pandas as pd
 
-from report.document.blocks import Block, Column, Section, Table, Text, word
+from report.analysis.paper.claims import CLAIMS
+from report.analysis.paper.claims.verdict import (
+    CONFIRMED,
+    DEPENDS,
+    NOT_CONFIRMED,
+    NOT_DECIDED,
+    NOT_MEASURED,
+    Claim,
+    Measured,
+    Verdict,
+)
+from report.analysis.paper.growth import measured
+from report.analysis.paper.selection import cells_of_paper, is_paper, of_problems
+from report.document.blocks import Block, Column, Place, Section, Table, Text, word
 from report.document.numbers import counted
 from report.results.reader import Results
 
-from . import claims_comparison, claims_complexity, claims_contacts, claims_linear, claims_start
-from .scaling import measured
-from .selection import cells_of_paper, is_paper, of_problems
-from .verdict import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_DECIDED, NOT_MEASURED, Claim, Measured, Verdict
+PLACE = Place(210)
 
-CLAIMS: list[Claim] = [
-    *claims_linear.CLAIMS,
-    *claims_start.CLAIMS,
-    *claims_complexity.CLAIMS,
-    *claims_contacts.CLAIMS,
-    *claims_comparison.CLAIMS,
-]
 SHOWN_KEYS = 2
 WORDS = (CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_DECIDED, NOT_MEASURED)
 COUNTED_AS = {DEPENDS: "confirmed in part"}

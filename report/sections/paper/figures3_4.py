@@ -6,13 +6,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from report.document.blocks import Block, Figure, Section, Text
+from report.analysis.paper.selection import SCALING, is_paper
+from report.document.blocks import Block, Figure, Place, Section, Text
 from report.figures import style
 from report.figures.maps import Array, draw
+from report.results.printed import TABLE_4
 from report.results.reader import Results
-from report.sections.printed import TABLE_4
 
-from .selection import SCALING, is_paper
+PLACE = Place(260)
 
 PROBLEMS = (1, 3)  # those of Figure 3
 SHARE = 0.15  # of the strip's length: the fragment that is shown

@@ -7,17 +7,17 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.analysis.paper.crossings import BETTER, below, compared, sizes, worst
+from report.analysis.paper.selection import METHODS, cells_of_paper, is_paper, method, of_problems
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, number, records, word
 from report.document.numbers import whole
-from report.figures import style
+from report.figures import style, times_panel
+from report.figures.paper_methods import LOOKS
 from report.results.labels import in_order
 from report.results.reader import Results
-from report.sections import times
 
-from .crossings import BETTER, below, compared, sizes, worst
-from .looks import LOOKS
-from .selection import METHODS, cells_of_paper, is_paper, method, of_problems
+PLACE = Place(270)
 
 FIGURE = {4386: "5", 6112: "6", 11308: "7"}
 PAIRS = (
@@ -59,15 +59,15 @@ def _figure(cells: pd.DataFrame, n: int) -> Figure:
     styles = {series: looks[series] for series in _order(lines)}
     drawing = style.figure(4.2)
     axes = drawing.add_subplot()
-    times.panel(axes, lines, styles)
+    times_panel.panel(axes, lines, styles)
     axes.set(xlabel="active contacts", ylabel="working time, s")
-    handles = [*style.legend_entries(styles), *times.entries(lines)]
+    handles = [*style.legend_entries(styles), *times_panel.entries(lines)]
     drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
     caption = (
         f"*Working time against the active contacts, n = {n}*"
         + (f" (Figure {FIGURE[n]} of the paper)" if n in FIGURE else "")
         + ": seconds a load case, without data preparation; below in number, above in % of m. Thick: "
-        "the paper's methods; thin: the other solvers. " + times.MARKS.format(limit="the limit")
+        "the paper's methods; thin: the other solvers. " + times_panel.MARKS.format(limit="the limit")
     )
     return Figure(f"paper-figure-{n}", caption, drawing)
 

@@ -8,16 +8,17 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.analysis.paper.cg import SYSTEMS, Counts, counts, system_name
+from report.analysis.paper.selection import asked, cells_of_paper, first, ipm, is_paper, of_problems
+from report.analysis.paper.targets import late_target, ratio_target
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, records, word
 from report.document.numbers import MISSING, listed, significant, tidy_power, whole
 from report.figures import style
+from report.results.printed import TABLE_1
 from report.results.reader import Results
-from report.sections.printed import TABLE_1
 
-from .cg import SYSTEMS, Counts, counts, system_name
-from .selection import asked, cells_of_paper, first, ipm, is_paper, of_problems
-from .targets import late_target, ratio_target
+PLACE = Place(220)
 
 PRINTED_N = 4386
 SHOWN = ("V = I", "V = U + √D", "V = U + √D, open gaps last")

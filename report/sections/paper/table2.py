@@ -7,17 +7,15 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Column, Section, Table, Text, number, word
+from harness.results.schema import ANSWERED
+from report.analysis.paper.selection import cells_of_paper, figures_of, ipm, is_paper
+from report.analysis.paper.starts import RIVALS, STARTS, loads, no_more, scene_of
+from report.document.blocks import Column, Place, Section, Table, Text, number, records, word
 from report.document.numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
-from report.results.reader import ANSWERED, Results
-from report.sections.printed import TABLE_2
+from report.results.printed import TABLE_2
+from report.results.reader import Results
 
-from .selection import cells_of_paper, figures_of, first, ipm, is_paper
-
-STARTS = {"stp1": "STP1", "stp2": "STP2", "algorithm_5": "Algorithm 5", "mehrotra": "Mehrotra"}
-RIVALS = ("stp1", "stp2")
-N = 4386
+PLACE = Place(230)
 
 
 def section(results: Results) -> Section | None:
@@ -28,38 +26,6 @@ def section(results: Results) -> Section | None:
     if not any(line[f"{start}_key"] for line in lines for start in RIVALS):
         return None
     return Section("Table 2: starting points", [_table(lines, cells), Text(_counted(lines)), _starts(cells)])
-
-
-def scene_of(active: int) -> str:
-    return f"{N}/{active:04d}"
-
-
-def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
-    """One record a load of Table 2: iterations, seconds and key of every start, ours and as printed."""
-    lines = []
-    for active, printed in TABLE_2.items():
-        of_scene = cells[cells["scene"] == scene_of(active)]
-        reached = of_scene["active"].max()
-        line: dict[str, Any] = {"scene": scene_of(active), "active_printed": active, "active": reached}
-        for start in STARTS:
-            row = first(ipm(of_scene, start=start))
-            answered = row is not None and row["verdict"] in ANSWERED
-            line[f"{start}_iterations"] = row["iterations"] if row and answered else None
-            line[f"{start}_s"] = row["load_case_s"] if row and answered else None
-            line[f"{start}_says"] = seconds_text(row) if row else "not measured"
-            line[f"{start}_key"] = row["key"] if row else ""
-            line[f"{start}_mu"] = figures_of(row, "start").get("mu") if row else None
-            line[f"{start}_iterations_printed"], line[f"{start}_s_printed"] = printed.get(start, (None, None))
-        lines.append(line)
-    return lines
-
-
-def no_more(line: Mapping[str, Any], suffix: str = "") -> bool | None:
-    """Whether Algorithm 5 needed no more iterations than STP1 and STP2; None where a number is missing."""
-    mine, *others = [as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)]
-    if mine is None or not all(other is not None for other in others):
-        return None
-    return all(mine <= other for other in others if other is not None)
 
 
 def _table(lines: list[dict[str, Any]], cells: pd.DataFrame) -> Table:

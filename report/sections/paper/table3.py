@@ -8,15 +8,16 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.analysis.paper.growth import QUANTITIES, fitted, measured
+from report.analysis.paper.selection import METHODS, is_paper
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, number, records, word
 from report.document.numbers import MISSING, whole
 from report.figures import style
+from report.figures.paper_methods import LOOKS
 from report.results.reader import Results
 
-from .looks import LOOKS
-from .scaling import QUANTITIES, fitted, measured
-from .selection import METHODS, is_paper
+PLACE = Place(240)
 
 PANELS = (
     ("preparation_s", "data preparation, s"),

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
+from harness.results.schema import ANSWERED
 from report.document.numbers import significant
-from report.results.reader import ANSWERED
 
 from . import style
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.paper.cg import SYSTEMS, counts
+from report.analysis.paper.selection import ipm
+from report.analysis.paper.targets import LATE, ORDERINGS, RATIO, largest_late, ratios
+from report.analysis.seconds import timed
 from report.analysis.standings import TIE
-from report.analysis.timed import records, timed
+from report.document.blocks import records
 from report.document.numbers import significant
 
-from .cg import SYSTEMS, counts
-from .selection import ipm
-from .targets import LATE, ORDERINGS, RATIO, largest_late, ratios
 from .verdict import Case, Claim, Measured, by_case
 
 HUNDREDS = 100

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pandas as pd
 
 from report.document.numbers import counted, listed
-from report.figures import style
 from report.results.labels import in_order
 from report.results.reader import Results
 
@@ -33,12 +30,6 @@ def drawn(results: Results) -> pd.DataFrame:
     """The cells that figures show: those that were run and are not sidelined."""
     cells = results.cells[~results.cells["status"].isin(NOT_RUN)]
     return cells.drop(sidelined(results).index)
-
-
-def styles_of(results: Results, cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """The looks of the series in some of the cells drawn, the same in every figure of a report."""
-    styles = style.line_styles(drawn(results))
-    return {series: styles[series] for series in in_order(cells, "series")}
 
 
 def best(results: Results) -> pd.DataFrame:

@@ -8,7 +8,8 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.fit import Exponent, exponent
-from report.analysis.timed import records, timed
+from report.analysis.seconds import timed
+from report.document.blocks import records
 from report.document.numbers import as_number
 from report.results.reader import Results
 

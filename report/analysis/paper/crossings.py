@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import pandas as pd
 
-from report.analysis.timed import records, timed
+from report.analysis.seconds import timed
+from report.document.blocks import records
 from report.document.numbers import counted, significant
 
 from .selection import METHODS, method

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from report.analysis.fit import Exponent
+from report.analysis.paper.growth import fitted, keys
+from report.analysis.paper.selection import method
 from report.document.numbers import significant, whole
 
-from .scaling import fitted, keys
-from .selection import method
 from .verdict import Case, Claim, Measured, by_case
 
 CLOSE = 0.3  # exponents this near to each other are one order

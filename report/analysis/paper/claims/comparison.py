@@ -7,13 +7,14 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.paper.crossings import BETTER, below, sizes, worst
+from report.analysis.paper.selection import method
+from report.analysis.seconds import timed
 from report.analysis.standings import geometric_mean
-from report.analysis.timed import records, timed
+from report.document.blocks import records
 from report.document.numbers import counted, power, significant
 
-from .claims_linear import is_faster, pairs
-from .crossings import BETTER, below, sizes, worst
-from .selection import method
+from .linear_systems import is_faster, pairs
 from .verdict import Case, Claim, Measured, Verdict, by_case, decided
 
 RIVALS = ("GI primal", "GI dual")

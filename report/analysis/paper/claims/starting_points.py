@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from report.analysis.paper.selection import figures_of, ipm
+from report.analysis.paper.starts import RIVALS, STARTS, loads, no_more
 from report.analysis.standings import TIE
-from report.analysis.timed import records
+from report.document.blocks import records
 from report.document.numbers import as_number, power, significant, span, tidy_power, whole
 
-from .claims_linear import pairs
-from .selection import figures_of, ipm
-from .table2 import RIVALS, STARTS, loads, no_more
+from .linear_systems import pairs
 from .verdict import (
     CONFIRMED,
     DEPENDS,

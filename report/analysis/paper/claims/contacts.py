@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pandas as pd
 
-from report.analysis.timed import timed
+from report.analysis.paper.crossings import at_share, sizes
+from report.analysis.paper.selection import method
+from report.analysis.seconds import timed
 from report.document.numbers import significant
 
-from .crossings import at_share, sizes
-from .selection import method
 from .verdict import Case, Claim, Measured, by_case
 
 RIVALS = ("GI primal", "GI dual")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from report.analysis.timed import records
+from report.document.blocks import records
 
 from .cg import SYSTEMS, Counts, counts
 from .selection import first, ipm

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from report.analysis.timed import records
+from report.document.blocks import records
 from report.results.reader import Results
 
 SUITE = "paper"

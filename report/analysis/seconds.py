@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
+from harness.results.schema import ANSWERED
 from report.document.numbers import MISSING, significant
-from report.results.reader import ANSWERED
 
 
 def timed(cells: pd.DataFrame) -> pd.DataFrame:
@@ -32,8 +32,3 @@ def seconds_text(cell: Mapping[str, Any]) -> str:
     if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
         return f"> {cell['time_limit_s']:.4g}"
     return str(cell["status"]).replace("_", " ") or MISSING
-
-
-def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """The lines of a frame as dictionaries."""
-    return frame.to_dict("records")  # type: ignore[return-value]
