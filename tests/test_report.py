@@ -215,7 +215,7 @@ def variants(counts: dict[str, int]) -> list[dict[str, Any]]:
 def test_of_many_variants_those_run_on_few_scenes_are_not_drawn(tmp_path: Path) -> None:
     rows = [*variants({"": 4, "x": 3, "y": 2, "z": 1}), row("4386/0000", "b")]
     results = read(write_rows(tmp_path / "many", rows))
-    assert set(drawn(results)["series"]) == {"a (dual)", "a (dual) x", "a (dual) y", "b (dual)"}
+    assert set(drawn(results)["method"]) == {"a (dual)", "a (dual) x", "a (dual) y", "b (dual)"}
     assert "Not drawn: 1 variant of a run on fewer than half of its scenes" in left_out(results)
     text = write(tmp_path / "many").read_text("utf-8")
     assert re.search(r"\| a \(dual\) z +\| ✓ within", text)

@@ -58,7 +58,7 @@ def text(section: Section | None) -> str:
 
 
 def prices(found: Results) -> Any:
-    return table(price_list.section(found), "price-list").data.set_index("series")
+    return table(price_list.section(found), "price-list").data.set_index("method")
 
 
 def advised(found: Results) -> Any:
@@ -170,7 +170,7 @@ def test_what_was_not_reached_is_shown_as_such(tmp_path: Path) -> None:
     rows = [*sweep(), answer(LOW, "once", 9, 1.0, 1e-9)]
     rows += [row(s, "lost", tolerance=1e-6, **no_answer("crashed")) for s in (LOW, HIGH)]
     found = table(price_list.section(results(tmp_path, rows)), "price-list")
-    shown = {record["series"]: record for record in found.data.to_dict("records")}
+    shown = {record["method"]: record for record in found.data.to_dict("records")}
     words = {
         name: [column.show(line) for column in found.columns[2:6]]  # type: ignore[arg-type]
         for name, line in shown.items()
@@ -192,7 +192,7 @@ def test_a_reference_too_coarse_for_an_accuracy_does_not_judge_it(tmp_path: Path
 
 
 def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:
-    trust = asked_achieved.trust(results(tmp_path, sweep())).set_index("series")
+    trust = asked_achieved.trust(results(tmp_path, sweep())).set_index("method")
     assert trust.loc["liar (dual)", "worst_ratio"] == pytest.approx(900, rel=0.02)
     # its error is 900 times the tolerance, on two scenes: outside at 7, 8 and 9 digits, not at 10
     assert trust.loc["liar (dual)", ["solved", "above_tolerance", "tight", "tight_outside"]].tolist() == [
@@ -203,13 +203,13 @@ def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:
 
 def test_only_runs_called_solved_can_break_their_word(tmp_path: Path) -> None:
     rows = changed(sweep(), "liar", status="inaccurate")
-    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("series")
+    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("method")
     assert "liar (dual)" not in trust.index
 
 
 def test_what_the_reference_leaves_open_is_in_the_solvers_favour(tmp_path: Path) -> None:
     rows = [answer(LOW, "a", k, 1.0, 10.0**-k + 5e-11, reference_bound_mm=6e-11) for k in (6, 8, 10)]
-    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("series")
+    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("method")
     assert trust.loc["a (dual)", "above_tolerance"] == 0
 
 
@@ -220,7 +220,7 @@ def test_small_residuals_beside_a_large_error_are_named(tmp_path: Path) -> None:
     assert "A small residual is no proof. On scene" in text(section)
     assert "coarse (dual) 1e-2 has residuals (1.0e-15 mm, 1.0e-12 N, 1.0e-13 N·mm)" in text(section)
     assert "an error of 5.0e-3 mm against 5.0e-11 mm" in text(section)
-    line = table(section, "residual-error").data.set_index("series").loc["coarse (dual)"]
+    line = table(section, "residual-error").data.set_index("method").loc["coarse (dual)"]
     assert [line["small_residual"], line["outside"], line["worst_error_mm"]] == [8, 8, 5e-3]
 
 
@@ -250,7 +250,7 @@ def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
     rows += [answer("4386/100", "seldom", 7, 0.01, 1e-9), answer("4386/100", "a", 9, 5.0, 1e-10)]
     late = answer("4386/105", "b", 7, 9.0, 1e-9) | no_answer("time_limit")
     rows += [answer("4386/105", "a", 7, 9.0, 1e-9), late, answer("4386/105", "c", 7, 0.1, 1e-6)]
-    found = table(profiles.section(results(tmp_path, rows)), "profiles").data.set_index("series")
+    found = table(profiles.section(results(tmp_path, rows)), "profiles").data.set_index("method")
     counts = found[["load_cases", "answered", "within_1", "within_2", "within_10"]]
     assert counts.loc["a (dual)"].tolist() == [6, 6, 4, 4, 6]  # ratios 1, 1, 1, 3, 8 and 1
     assert counts.loc["b (dual)"].tolist() == [6, 5, 3, 4, 5]  # ratios 3, 2, 1, 1, 1 and none
@@ -338,7 +338,7 @@ def test_unstable_times_are_warned_of_with_the_reason(tmp_path: Path) -> None:
 def test_the_best_of_several_tolerances_stands_for_a_solver(tmp_path: Path) -> None:
     found = results(tmp_path, sweep())
     # honest is within 1e-7 mm from 7 digits on, and the fastest there; liar at 10 digits alone
-    lines = best(found).drop_duplicates("label").set_index("series")["tolerance"]
+    lines = best(found).drop_duplicates("label").set_index("method")["tolerance"]
     assert lines[["honest (dual)", "liar (dual)"]].tolist() == [1e-7, 1e-10]
     shown = table(summary.section(found), "summary").data["label"]
     assert {"honest (dual) 1e-7", "liar (dual) 1e-10"} < set(shown)

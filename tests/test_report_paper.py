@@ -31,7 +31,7 @@ from synthetic_results import no_answer
 
 from report.analysis.fit import exponent
 from report.analysis.paper.crossings import BETTER, below, compared, worst
-from report.analysis.paper.selection import cells_of_paper, method
+from report.analysis.paper.selection import cells_of_paper, of_method
 from report.figures import style
 from report.results import printed
 from report.sections.paper import figures5_7, table1, table2, table3, table4
@@ -256,5 +256,5 @@ def test_runs_without_an_answer_stay_in_the_figures_and_tables(tmp_path: Path) -
 def test_of_several_tolerances_the_tightest(tmp_path: Path) -> None:
     at = ("4386/0052", 4386, 52)
     rows = [ipm_row(*at, tolerance=t, solve_s=s) for t, s in ((1e-8, 1.0), (1e-14, 3.0))]
-    cells = method(cells_of_paper(results(tmp_path, rows)), "IPM")
+    cells = of_method(cells_of_paper(results(tmp_path, rows)), "IPM")
     assert cells["load_case_s"].tolist() == [3.0]

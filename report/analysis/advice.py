@@ -57,8 +57,8 @@ def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list
 
 def _beaten(cells: pd.DataFrame, best: list[str]) -> list[str]:
     """Where another line is clearly faster than the one recommended."""
-    series = cells.loc[cells["label"].isin(best), "series"]
-    rivals = cells["label"].isin(best) | ~cells["series"].isin(series)  # not the same at other tolerances
+    method = cells.loc[cells["label"].isin(best), "method"]
+    rivals = cells["label"].isin(best) | ~cells["method"].isin(method)  # not the same at other tolerances
     seconds = seconds_within(cells[rivals])
     active = cells.drop_duplicates("scene").set_index("scene")["active"]
     recommended = seconds[best].min(axis=1)

@@ -20,10 +20,10 @@ def sidelined(results: Results) -> pd.DataFrame:
     fewer than half as many scenes as the one run on most.
     """
     cells = results.cells[~results.cells["status"].isin(NOT_RUN)]
-    lines = cells.groupby(["solver", "form", "series"])["scene"].nunique().reset_index()
+    lines = cells.groupby(["solver", "form", "method"])["scene"].nunique().reset_index()
     of_solver = lines.groupby(["solver", "form"])["scene"]
     rare = (of_solver.transform("size") > VARIANTS) & (2 * lines["scene"] < of_solver.transform("max"))
-    return cells[cells["series"].isin(lines.loc[rare, "series"])]
+    return cells[cells["method"].isin(lines.loc[rare, "method"])]
 
 
 def drawn(results: Results) -> pd.DataFrame:
@@ -33,14 +33,14 @@ def drawn(results: Results) -> pd.DataFrame:
 
 
 def best(results: Results) -> pd.DataFrame:
-    """The cells drawn, of several tolerances of a series those of the one that stands best."""
+    """The cells drawn, of several tolerances of a method those of the one that stands best."""
     cells, table = drawn(results), standings(results)
-    return cells[cells["label"].isin(table["label"][~table["series"].duplicated()] if len(table) else [])]
+    return cells[cells["label"].isin(table["label"][~table["method"].duplicated()] if len(table) else [])]
 
 
 def of_tolerances(results: Results) -> str:
-    """A sentence for the captions of figures of the `best`, empty where every series has one tolerance."""
-    several = drawn(results).groupby("series")["tolerance"].nunique() > 1
+    """A sentence for the captions of figures of the `best`, empty where every method has one tolerance."""
+    several = drawn(results).groupby("method")["tolerance"].nunique() > 1
     words = " Of several tolerances, the one within the limit on most scenes, then the fastest."
     return words if several.any() else ""
 
@@ -51,7 +51,7 @@ def left_out(results: Results) -> str:
     if missing.empty:
         return ""
     solvers = listed(in_order(missing, "solver"))
-    count = counted(missing["series"].nunique(), "variant")
+    count = counted(missing["method"].nunique(), "variant")
     return f" Not drawn: {count} of {solvers} run on fewer than half of its scenes; the tables have them."
 
 

@@ -13,7 +13,7 @@ from .drawn import drawn
 
 #: mm: the accuracies that prices and advice are given for.
 ACCURACIES = (1e-3, 1e-5, 1e-7, 1e-9)
-#: So many tolerances of one series on one scene make a curve; fewer are points.
+#: So many tolerances of one method on one scene make a curve; fewer are points.
 ENOUGH = 3
 EXACT = 1e-16  # mm: what an error of zero counts as
 WRONG = 1.0  # mm: more than any gap here
@@ -36,13 +36,13 @@ def in_view(cells: pd.DataFrame) -> pd.DataFrame:
 
 
 def curves(cells: pd.DataFrame) -> set[str]:
-    """The series with ENOUGH tolerances on a scene."""
-    tolerances = cells.groupby(["series", "scene"])["tolerance"].nunique()
-    return set(tolerances.index.get_level_values("series")[tolerances >= ENOUGH])
+    """The method with ENOUGH tolerances on a scene."""
+    tolerances = cells.groupby(["method", "scene"])["tolerance"].nunique()
+    return set(tolerances.index.get_level_values("method")[tolerances >= ENOUGH])
 
 
 def swept(results: Results) -> pd.DataFrame:
-    """The cells drawn, with errors; none of them where no series has a curve."""
+    """The cells drawn, with errors; none of them where no method has a curve."""
     cells = with_errors(drawn(results))
     return cells if curves(cells) else cells.iloc[:0]
 

@@ -43,18 +43,18 @@ def seconds_within(cells: pd.DataFrame) -> pd.DataFrame:
 
 
 def preferred(seconds: pd.Series[float], cells: pd.DataFrame) -> pd.DataFrame:
-    """A line a series with the setting to use, the fastest first: `label` (the index), `series`,
+    """A line a method with the setting to use, the fastest first: `label` (the index), `method`,
     `tolerance` and `seconds`.
 
-    It is the tightest tolerance of those that are as fast as the series' fastest: what costs nothing
+    It is the tightest tolerance of those that are as fast as the method' fastest: what costs nothing
     is not given away.
 
     seconds : by label, of the settings that come into question.
     """
-    known = cells.drop_duplicates("label").set_index("label")[["series", "tolerance"]].loc[seconds.index]
+    known = cells.drop_duplicates("label").set_index("label")[["method", "tolerance"]].loc[seconds.index]
     known = known.assign(seconds=seconds)
-    as_fast = known["seconds"] <= TIE * known.groupby("series")["seconds"].transform("min")
-    tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("series")
+    as_fast = known["seconds"] <= TIE * known.groupby("method")["seconds"].transform("min")
+    tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("method")
     return tightest.sort_values("seconds")
 
 
@@ -82,7 +82,7 @@ def standings(results: Results) -> pd.DataFrame:
         outside = line[line["verdict"] == "outside"]
         record = {
             "label": label,
-            "series": line["series"].iloc[0],
+            "method": line["method"].iloc[0],
             "solver": line["solver"].iloc[0],
             "form": line["form"].iloc[0],
             "scenes": len(line),

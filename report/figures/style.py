@@ -114,17 +114,17 @@ def figure_above(height: float, handles: list[Line2D]) -> Figure:
 
 
 def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """Keyword arguments of `Axes.plot` for each series of some cells."""
+    """Keyword arguments of `Axes.plot` for each method of some cells."""
     unknown = sorted(set(cells["solver"]) - set(KNOWN))
     looks = KNOWN | {solver: SPARE[i % len(SPARE)] for i, solver in enumerate(unknown)}
     styles: dict[str, dict[str, Any]] = {}
     for (solver, form), lines in cells.groupby(["solver", "form"]):
         full, marker = looks[solver]
         known = form if form in FORMS else "sparse"
-        for i, series in enumerate(sorted(lines["series"].unique())):
+        for i, method in enumerate(sorted(lines["method"].unique())):
             size, tint, filled = VARIANTS[i % len(VARIANTS)]
             color = _tinted(full, tint)
-            styles[series] = {
+            styles[method] = {
                 "color": color,
                 "marker": marker,
                 "markersize": size,
@@ -160,7 +160,7 @@ def marker_only(style: dict[str, Any]) -> dict[str, Any]:
 
 
 def legend_entries(styles: dict[str, dict[str, Any]]) -> list[Line2D]:
-    return [Line2D([], [], label=series, **look) for series, look in styles.items()]
+    return [Line2D([], [], label=method, **look) for method, look in styles.items()]
 
 
 def percent_above(axes: Axes, whole: float) -> None:

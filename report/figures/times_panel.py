@@ -31,9 +31,9 @@ MARKS = (
 
 
 def panel(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
-    """One size: a line a series of `styles`, and the marks of what is no answer within the limit."""
-    for series, look in styles.items():
-        line = cells[cells["series"] == series].sort_values("active")  # broken where a time is missing
+    """One size: a line a method of `styles`, and the marks of what is no answer within the limit."""
+    for method, look in styles.items():
+        line = cells[cells["method"] == method].sort_values("active")  # broken where a time is missing
         axes.plot(line["active"], line["load_case_s"], **look)
         outside = line[line["verdict"] != "within"]
         axes.plot(outside["active"], outside["load_case_s"], color=look["color"], **OUTSIDE)

@@ -21,7 +21,7 @@ HOLLOW: dict[str, Any] = {"linestyle": "", "markersize": 6, "markerfacecolor": "
 def unfinished(
     axes: Axes, cells: pd.DataFrame, x: str, styles: dict[str, dict[str, Any]], *, inside: bool = False
 ) -> None:
-    """On a logarithmic axis of seconds: open triangles, in the colour of their series, at the time limit
+    """On a logarithmic axis of seconds: open triangles, in the colour of their method, at the time limit
     of runs that it stopped; crosses at the upper edge for runs without an answer for another reason.
 
     `x`: the column of their places along the axis; marks of one place stand side by side. The limit is
@@ -31,7 +31,7 @@ def unfinished(
     if missed.empty:
         return
     order = list(styles)
-    missed = missed.assign(order=missed["series"].map(order.index)).sort_values("order")
+    missed = missed.assign(order=missed["method"].map(order.index)).sort_values("order")
     late = missed[(missed["status"] == "time_limit") & missed["time_limit_s"].notna()]
     for limit in late["time_limit_s"].unique():
         axes.axhline(limit, color="#AAAAAA", linewidth=0.8, zorder=0.5)
@@ -43,17 +43,17 @@ def unfinished(
     low, high = axes.get_ylim()
     axes.set_ylim(low, high * (high / low) ** 0.08)
     for _, place in late.groupby(x):
-        _beside(axes, place[x], place["time_limit_s"], place["series"], styles, "^")
+        _beside(axes, place[x], place["time_limit_s"], place["method"], styles, "^")
     for _, place in missed.drop(late.index).groupby(x):
-        _beside(axes, place[x], 0.97, place["series"], styles, "x")
+        _beside(axes, place[x], 0.97, place["method"], styles, "x")
 
 
 def _beside(
-    axes: Axes, xs: pd.Series[float], heights: Any, series: pd.Series[str],
+    axes: Axes, xs: pd.Series[float], heights: Any, method: pd.Series[str],
     styles: dict[str, dict[str, Any]], marker: str,
 ) -> None:  # fmt: skip
     along = axes.transData if marker == "^" else axes.get_xaxis_transform()
-    table = pd.DataFrame({"x": xs, "y": heights, "series": series})
+    table = pd.DataFrame({"x": xs, "y": heights, "method": method})
     for i, (x, y, name) in enumerate(table.itertuples(index=False)):
         inches = BESIDE * (i - (len(table) - 1) / 2) / 72
         shift = ScaledTranslation(inches, 0, axes.figure.dpi_scale_trans)

@@ -24,7 +24,7 @@ def cells_of(rows: pd.DataFrame) -> pd.DataFrame:
         once_s             convert + prepare: paid once per assembly
         total_s            load_case_s + once_s
 
-    and `repeats`, their number; `label`, the name of the line; and `series`, that name without the
+    and `repeats`, their number; `label`, the name of the line; and `method`, that name without the
     tolerance.
     """
     timed = rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()

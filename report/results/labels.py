@@ -9,7 +9,7 @@ from report.document.numbers import counted, tidy_power
 
 
 def named(cells: pd.DataFrame) -> pd.DataFrame:
-    """Cells with `series`, 'solver (form)' with the variant if it has one and the number of threads
+    """Cells with `method`, 'solver (form)' with the variant if it has one and the number of threads
     if several were used, and `label`, the same with the tolerance if there are several.
     """
     variant = cells["variant"].map(lambda name: f" {name}" if name else "")
@@ -18,12 +18,12 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
     by_line = cells.groupby(["solver", "form", "variant"], dropna=False)
     threads = threads.where(by_line["threads"].transform("nunique") > 1, "")
     tolerance = tolerance.where(by_line["tolerance"].transform("nunique") > 1, "")
-    series = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
-    return cells.assign(series=series, label=series + tolerance)
+    method = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
+    return cells.assign(method=method, label=method + tolerance)
 
 
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
-    """The labels (or series, or solvers) of some cells in the one order used everywhere: in-house solvers
+    """The labels (or method, or solvers) of some cells in the one order used everywhere: in-house solvers
     first, then by name, and the forms of a solver in the order of FORMS.
     """
     lines = cells.drop_duplicates(name)

@@ -71,8 +71,8 @@ def _figure(results: Results, cells: pd.DataFrame, n: int) -> Figure | None:
 
 
 def _curves(axes: Axes, points: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
-    for series, line in points.groupby("series"):
-        look = styles[str(series)]
+    for method, line in points.groupby("method"):
+        look = styles[str(method)]
         ordered = line.sort_values("tolerance", ascending=False)
         axes.plot(ordered["error"], ordered["load_case_s"], **look)
         several = line[line["most_s"] > line["least_s"]]
@@ -80,7 +80,7 @@ def _curves(axes: Axes, points: pd.DataFrame, styles: dict[str, dict[str, Any]])
 
 
 def _unfinished(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
-    missed = cells[~cells["verdict"].isin(ANSWERED)].drop_duplicates(["series", "status"])
-    reached = missed["series"].map(cells.groupby("series")["error"].min())
+    missed = cells[~cells["verdict"].isin(ANSWERED)].drop_duplicates(["method", "status"])
+    reached = missed["method"].map(cells.groupby("method")["error"].min())
     at = reached.fillna(axes.get_xlim()[1] / 2)
     unfinished.unfinished(axes, missed.assign(at=at), "at", styles, inside=True)

@@ -50,8 +50,8 @@ def _drawing(results: Results, answered: pd.DataFrame) -> Drawing:
         points = answered[answered["scene"] == scene]
         for axes, load_cases in zip(line, ends, strict=True):
             shown = points.assign(cost=points["load_case_s"] + points["once_s"] / load_cases)
-            for series, look in styles.items():
-                curve = shown[shown["series"] == series].sort_values("tolerance", ascending=False)
+            for method, look in styles.items():
+                curve = shown[shown["method"] == method].sort_values("tolerance", ascending=False)
                 axes.plot(curve["error"], curve["cost"], **look)
             axes.set_yscale("log")
             axes.set_title(f"n = {points['n'].iloc[0]:.0f}, {counted(load_cases, 'load case')}")

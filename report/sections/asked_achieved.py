@@ -29,7 +29,7 @@ def section(results: Results) -> Section | None:
         "diagonal, at whatever distance, and where it stops to. Runs without an answer are left out."
     )
     columns = [
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         number("said solved", "solved", whole),
         number("error above the tolerance", "above_tolerance", whole),
         number("largest error / tolerance", "worst_ratio"),
@@ -50,9 +50,9 @@ def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
     drawing = style.figure_above(3.2, style.legend_entries(styles))
     panels = drawing.subplots(1, len(sizes), sharex=True, sharey=True, squeeze=False)[0]
     for axes, n in zip(panels, sizes, strict=True):
-        worst = cells[cells["n"] == n].groupby(["series", "tolerance"], as_index=False)["error"].max()
-        for series, look in styles.items():
-            line = worst[worst["series"] == series]
+        worst = cells[cells["n"] == n].groupby(["method", "tolerance"], as_index=False)["error"].max()
+        for method, look in styles.items():
+            line = worst[worst["method"] == method]
             axes.plot(line["tolerance"], line["error"], **look)
         axes.axline((1e-6, 1e-6), (1e-5, 1e-5), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
         axes.set(xscale="log", yscale="log", title=f"n = {n:.0f}", xlabel="tolerance asked for")
@@ -61,7 +61,7 @@ def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
 
 
 def trust(results: Results) -> pd.DataFrame:
-    """A line a series: of its runs called solved, how many miss the tolerance, and the limit although the
+    """A line a method: of its runs called solved, how many miss the tolerance, and the limit although the
     tolerance was no larger.
     """
     rows = named(results.rows)
@@ -71,9 +71,9 @@ def trust(results: Results) -> pd.DataFrame:
     rows = rows.assign(ratio=error / rows["tolerance"], tight=rows["tolerance"] <= rows["limit_mm"])
     rows["broken"] = rows["tight"] & (error > rows["limit_mm"])
     lines: list[dict[str, Any]] = []
-    for series in in_order(rows, "series"):
-        runs = rows[rows["series"] == series]
-        line = {"series": series, "solved": len(runs), "above_tolerance": int((runs["ratio"] > 1).sum())}
+    for method in in_order(rows, "method"):
+        runs = rows[rows["method"] == method]
+        line = {"method": method, "solved": len(runs), "above_tolerance": int((runs["ratio"] > 1).sum())}
         line |= {"tight": int(runs["tight"].sum()), "tight_outside": int(runs["broken"].sum())}
         lines.append(line | {"worst_ratio": runs["ratio"].max()})
     return pd.DataFrame(lines)

@@ -72,7 +72,7 @@ def _panel(axes: Axes, lines: pd.DataFrame) -> None:
             text += f",  {whole(line['iterations'])} × {each} ms"
         axes.annotate(text, (100, place), (6, 0), textcoords="offset points", va="center", fontsize=8.5)
     axes.set(xlim=(0, 100), ylim=(len(lines) - 0.5, -0.5))
-    axes.set_yticks(places, lines["series"])
+    axes.set_yticks(places, lines["method"])
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
     n, active = lines["n"].iloc[0], lines["active"].iloc[0]

@@ -27,9 +27,9 @@ def section(results: Results) -> Section | None:
     if both.empty:
         return None
     both["ratio"] = (both["load_case_s"] / both["load_case_s_plain"]).where(both["verdict"] == "within")
-    lines = [_line(both[both["series"] == series]) for series in in_order(both, "series")]
+    lines = [_line(both[both["method"] == method]) for method in in_order(both, "method")]
     columns = [
-        word("solver (form), variant", "series"),
+        word("solver (form), variant", "method"),
         number("scenes", "scenes", whole),
         number("within", "within", whole),
         Column("times as long", spread("ratio")),
@@ -49,7 +49,7 @@ def section(results: Results) -> Section | None:
 
 def _line(group: pd.DataFrame) -> dict[str, Any]:
     return {
-        "series": group["series"].iloc[0],
+        "method": group["method"].iloc[0],
         "scenes": group["scene"].nunique(),
         "within": int((group["verdict"] == "within").sum()),
         "ratio": group["ratio"].median(),

@@ -31,9 +31,9 @@ def section(results: Results) -> Section | None:
     lines = []
     for _, of_size in cells.groupby("n"):
         scenes = of_size["scene"].unique().tolist()
-        for series in in_order(of_size, "series"):
-            lines.append(_line(of_size[of_size["series"] == series], scenes))
-    columns = [number("n", "n", whole), word("solver (form)", "series")]
+        for method in in_order(of_size, "method"):
+            lines.append(_line(of_size[of_size["method"] == method], scenes))
+    columns = [number("n", "n", whole), word("solver (form)", "method")]
     columns += [Column(f"≤ {tidy_power(x)} mm", partial(_shown, name=tidy_power(x))) for x in ACCURACIES]
     columns.append(number("time × a digit", "factor_a_digit"))
     caption = (
@@ -53,7 +53,7 @@ def _line(runs: pd.DataFrame, scenes: list[str]) -> dict[str, Any]:
     by_scene = [runs[runs["scene"] == scene] for scene in scenes]
     line: dict[str, Any] = {
         "n": runs["n"].iloc[0],
-        "series": runs["series"].iloc[0],
+        "method": runs["method"].iloc[0],
         "best_error_mm": np.max([group["error"].min() for group in by_scene]),  # missing if one scene's is
         "factor_a_digit": _mean([factor_a_digit(group) for group in by_scene]),
     }
@@ -66,7 +66,7 @@ def _line(runs: pd.DataFrame, scenes: list[str]) -> dict[str, Any]:
 
 
 def price(runs: pd.DataFrame, accuracy: float) -> tuple[str, float]:
-    """State and seconds of one series on one scene: the fastest run with an error ≤ accuracy, or else the
+    """State and seconds of one method on one scene: the fastest run with an error ≤ accuracy, or else the
     least time limit that a run was stopped at, which is a lower bound.
     """
     if runs.empty:
@@ -81,7 +81,7 @@ def price(runs: pd.DataFrame, accuracy: float) -> tuple[str, float]:
 
 
 def factor_a_digit(runs: pd.DataFrame) -> float:
-    """10 to the slope of log10 time against −log10 error along the Pareto front of one series on one
+    """10 to the slope of log10 time against −log10 error along the Pareto front of one method on one
     scene; missing for a front of too few points or digits.
     """
     front = pareto(runs.dropna(subset=["error"]))

@@ -49,9 +49,9 @@ def recommended(cells: pd.DataFrame, accuracy: float) -> dict[str, Any]:
         return line
     best, *others = preferred(seconds, cells).to_dict("records")
     ties = [_tie(other) for other in others if other["seconds"] <= TIE * best["seconds"]]
-    line |= {"use": best["series"], "tolerance": best["tolerance"], "seconds": best["seconds"]}
+    line |= {"use": best["method"], "tolerance": best["tolerance"], "seconds": best["seconds"]}
     return line | {"ties": listed(ties) if ties else ""}
 
 
 def _tie(line: dict[Any, Any]) -> str:
-    return f"{line['series']} at {tidy_power(line['tolerance'])} ({significant(line['seconds'])} s)"
+    return f"{line['method']} at {tidy_power(line['tolerance'])} ({significant(line['seconds'])} s)"

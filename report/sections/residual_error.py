@@ -46,8 +46,8 @@ def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
     drawing = style.figure_above(3.2, style.legend_entries(styles))
     panels = drawing.subplots(1, len(RESIDUALS), sharey=True)
     for axes, (name, unit) in zip(panels, RESIDUALS.items(), strict=True):
-        for series, look in styles.items():
-            line = cells[cells["series"] == series]
+        for method, look in styles.items():
+            line = cells[cells["method"] == method]
             axes.plot(line[name], line["error"], **look)
         axes.set(xscale="log", yscale="log", xlabel=f"{name.replace('_', ' ')}, {unit}")
         axes.axhline(cells["limit_mm"].max(), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
@@ -96,14 +96,14 @@ def _residuals(line: dict[Hashable, object]) -> str:
 
 def _table(cells: pd.DataFrame, results: Results) -> Table:
     lines = []
-    for series in in_order(cells, "series"):
-        runs = cells[cells["series"] == series]
+    for method in in_order(cells, "method"):
+        runs = cells[cells["method"] == method]
         small = runs[runs["primal_residual"] <= runs["limit_mm"]]
-        line = {"series": series, "answers": len(runs), "small_residual": len(small)}
+        line = {"method": method, "answers": len(runs), "small_residual": len(small)}
         line |= {"outside": int((small["error"] > small["limit_mm"]).sum())}
         lines.append(line | {"worst_error_mm": small["error"].max()})
     columns = [
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         number("answers", "answers", whole),
         number(f"primal residual ≤ {results.limit}", "small_residual", whole),
         number("of these outside it", "outside", whole),

@@ -30,9 +30,9 @@ def section(results: Results) -> Section | None:
         word("scene", "scene"),
         number("active", "active", whole),
         number("threads", "threads", whole),
-        word("this", "series"),
+        word("this", "method"),
         word("s", "text"),
-        word("the other", "series_other"),
+        word("the other", "method_other"),
         word("s ", "text_other"),
         Column("ratio", _ratio),
     ]
@@ -50,7 +50,7 @@ def _lines(cells: pd.DataFrame, solver: str, form: str, other: str) -> list[dict
     keys = ["scene", "threads"]
     mine = cells[(cells["solver"] == solver) & (cells["form"] == form) & (cells["verdict"] == "within")]
     theirs = cells[(cells["solver"] == other) & (cells["form"] == form) & cells["at_least"].notna()]
-    both = mine.merge(theirs[[*keys, "series", "text", "at_least", "cut"]], on=keys, suffixes=("", "_other"))
+    both = mine.merge(theirs[[*keys, "method", "text", "at_least", "cut"]], on=keys, suffixes=("", "_other"))
     return records(
         both.assign(ratio=both["load_case_s"] / both["at_least_other"]).sort_values(["n", "active"])
     )

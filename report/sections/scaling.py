@@ -39,9 +39,9 @@ def section(results: Results) -> Section | None:
 def _exponents(cells: pd.DataFrame) -> Table:
     within = cells[cells["verdict"] == "within"]
     lines: list[dict[str, Any]] = []
-    for series in in_order(within, "series"):
-        mine = within[within["series"] == series].sort_values("n")
-        line: dict[str, Any] = {"series": series, "sizes": len(mine), "largest": mine["n"].max()}
+    for method in in_order(within, "method"):
+        mine = within[within["method"] == method].sort_values("n")
+        line: dict[str, Any] = {"method": method, "sizes": len(mine), "largest": mine["n"].max()}
         for name in GROWING:
             fit = exponent(mine["n"].tolist(), _fitted(mine, name).tolist())
             line |= {name: fit and fit.slope, f"{name}_shown": str(fit) if fit else MISSING}
@@ -49,10 +49,10 @@ def _exponents(cells: pd.DataFrame) -> Table:
     once = within.drop_duplicates("scene")
     for name, what in (("cholesky_s", "one Cholesky of Q"), ("product_s", "one product Qv")):
         fit = exponent(once["n"].tolist(), once[name].tolist())
-        lines.append({"series": what, "sizes": len(once), "largest": once["n"].max()})
+        lines.append({"method": what, "sizes": len(once), "largest": once["n"].max()})
         lines[-1] |= {"load_case_s": fit and fit.slope, "load_case_s_shown": str(fit) if fit else MISSING}
     columns = [
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         number("sizes", "sizes", whole),
         number("largest n", "largest", whole),
         *(Column(f"exponent of {what}", _shown(name)) for name, what in GROWING.items()),
@@ -74,15 +74,15 @@ def _shown(name: str) -> Any:
 
 
 def _figures(cells: pd.DataFrame) -> Table:
-    names = in_order(cells, "series")
-    table = cells.assign(place=cells["series"].map(names.index)).sort_values(["n", "place"])
+    names = in_order(cells, "method")
+    table = cells.assign(place=cells["method"].map(names.index)).sort_values(["n", "place"])
     table = table.assign(seconds=[seconds_text(cell) for cell in records(table)])
     table["q_mib"] = 8 * table["m"] ** 2 / 2**20
     columns = [
         number("n", "n", whole),
         number("m", "m", whole),
         number("active", "active", whole),
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         word("s a load case", "seconds"),
         number("once, s", "once_s"),
         number("Cholesky of Q, s", "cholesky_s"),
@@ -99,8 +99,8 @@ def _figure(results: Results, cells: pd.DataFrame) -> Figure:
     panels: list[Axes] = list(drawing.subplots(2, 1, sharex=True))
     styles = styles_of(results, within)
     for axes, name in zip(panels, ("load_case_s", "working_mib"), strict=True):
-        for series, look in styles.items():
-            line = within[within["series"] == series].sort_values("n")
+        for method, look in styles.items():
+            line = within[within["method"] == method].sort_values("n")
             axes.plot(line["n"], _fitted(line, name).where(lambda v: v > 0), **look)
         axes.set(xscale="log", yscale="log", ylabel=GROWING[name])
     data = within.groupby("n")[["cholesky_s", "m"]].median()

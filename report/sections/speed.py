@@ -32,7 +32,7 @@ def section(results: Results) -> Section | None:
 
 
 def load_cases(results: Results) -> pd.DataFrame:
-    """The rows within the limit, with `series`, and the seconds of a load case and of all the solver does.
+    """The rows within the limit, with `method`, and the seconds of a load case and of all the solver does.
 
     load_case_s : set-up + solve + the dual form's own cost
     total_s : the same with the solver's own preparation, paid once an assembly
@@ -41,7 +41,7 @@ def load_cases(results: Results) -> pd.DataFrame:
     """
     rows = results.rows
     keys = ["scene", "solver", "form", "variant", "tolerance", "threads"]
-    names = results.cells_by_threads()[[*keys, "series"]]
+    names = results.cells_by_threads()[[*keys, "method"]]
     cases = rows[rows["verdict"] == "within"].merge(names, on=keys)
     cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
     cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
@@ -56,16 +56,16 @@ def load_cases(results: Results) -> pd.DataFrame:
 def _ratios(cases: pd.DataFrame) -> Table:
     lines = []
     for (n, threads), group in cases.groupby(["n", "threads"]):
-        for series in in_order(group, "series"):
-            mine = group[group["series"] == series]
-            line: dict[str, Any] = {"n": n, "threads": threads, "series": series}
+        for method in in_order(group, "method"):
+            mine = group[group["method"] == method]
+            line: dict[str, Any] = {"n": n, "threads": threads, "method": method}
             line |= {"scenes": mine["scene"].nunique(), "runs": len(mine)}
             for name in ("to_library", "total_to_library", "to_cholesky"):
                 by_scene = mine.groupby("scene")[name].median()
                 line |= {name: by_scene.median(), f"{name}_least": mine[name].min()}
                 line |= {f"{name}_most": mine[name].max()}
             lines.append(line)
-    rivals = ", ".join(in_order(cases[~cases["in_house"]], "series")) or "none"
+    rivals = ", ".join(in_order(cases[~cases["in_house"]], "method")) or "none"
     caption = (
         "*Seconds as ratios*: a load case (set-up + solve + the dual form's own cost) to the fastest "
         "library's on the same scene in the same round of repeats; the same with what each prepares for "
@@ -76,7 +76,7 @@ def _ratios(cases: pd.DataFrame) -> Table:
     columns = [
         number("n", "n", whole),
         number("threads", "threads", whole),
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         number("scenes", "scenes", whole),
         number("runs", "runs", whole),
         Column("load case, to the fastest library", spread("to_library")),
@@ -126,11 +126,11 @@ def _figure(results: Results, cases: pd.DataFrame) -> Figure:
     sizes = sorted(cases["n"].unique())
     drawing = style.figure(PANEL * len(sizes) + 0.3)
     shown = drawn(results)
-    styles = styles_of(results, shown[shown["series"].isin(cases["series"])])
+    styles = styles_of(results, shown[shown["method"].isin(cases["method"])])
     for axes, n in zip(drawing.subplots(len(sizes), 1, squeeze=False)[:, 0], sizes, strict=True):
         of_size = cases[cases["n"] == n]
-        for series, look in styles.items():
-            line = of_size[of_size["series"] == series].groupby("active")["to_cholesky"].median()
+        for method, look in styles.items():
+            line = of_size[of_size["method"] == method].groupby("active")["to_cholesky"].median()
             axes.plot(line.index, line.to_numpy(), **look)
         product = (of_size["product_s"] / of_size["cholesky_s"]).median()
         for height, what in ((1.0, "one Cholesky of Q"), (product, "one product Qv")):

@@ -21,8 +21,8 @@ def section(results: Results) -> Section | None:
     table = standings(results)
     if table.empty:
         return None
-    several = table.groupby("series")["label"].transform("size") >= ENOUGH
-    table = table[~(several & table["series"].duplicated())]
+    several = table.groupby("method")["label"].transform("size") >= ENOUGH
+    table = table[~(several & table["method"].duplicated())]
     limit = results.limit
     rare = sidelined(results)["label"]
     comparisons = [compare(results, n) for n in results.sizes]

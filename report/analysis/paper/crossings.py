@@ -12,7 +12,7 @@ from report.analysis.seconds import timed
 from report.document.blocks import records
 from report.document.numbers import counted, significant
 
-from .selection import METHODS, method
+from .selection import METHODS, of_method
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,12 @@ def compared(cells: pd.DataFrame, n: int, first: str, second: str) -> Pair:
 
 
 def _scenes(cells: pd.DataFrame, n: int, name: str) -> list[str]:
-    rows = method(cells, name)
+    rows = of_method(cells, name)
     return rows.loc[rows["n"] == n, "scene"].tolist()
 
 
 def _lines(cells: pd.DataFrame, n: int, name: str) -> pd.DataFrame:
-    rows = timed(method(cells, name))
+    rows = timed(of_method(cells, name))
     rows = rows[(rows["n"] == n) & (rows["at_least"] > 0) & (rows["m"] > 0)]
     rows = rows.assign(share=rows["active"] / rows["m"]).set_index("scene")
     return rows[["share", "at_least", "cut", "key"]]
@@ -116,11 +116,11 @@ BETTER = "the better of GI dual and primal"
 def worst(cells: pd.DataFrame, n: int, name: str) -> Worst | None:
     """Of METHODS, or of BETTER: GI's better form chosen for each scene."""
     if name == BETTER:
-        both = pd.concat([method(cells, "GI dual"), method(cells, "GI primal")])
+        both = pd.concat([of_method(cells, "GI dual"), of_method(cells, "GI primal")])
         rows = timed(both[both["n"] == n]).sort_values(["at_least", "cut"], na_position="last")
         rows = rows.drop_duplicates("scene")
     else:
-        rows = timed(method(cells, name))
+        rows = timed(of_method(cells, name))
         rows = rows[rows["n"] == n]
     known = rows.dropna(subset=["at_least"])
     if known.empty:
@@ -156,6 +156,6 @@ def at_share(cells: pd.DataFrame, n: int, name: str, share: float) -> tuple[floa
 
 def sizes(cells: pd.DataFrame) -> list[int]:
     """Sizes with at least two scenes of the interior-point or the Goldfarb–Idnani method."""
-    rows = pd.concat([method(cells, name) for name in METHODS])
+    rows = pd.concat([of_method(cells, name) for name in METHODS])
     counted = rows.groupby("n")["scene"].nunique()
     return sorted(int(n) for n in counted[counted > 1].index.to_list())

@@ -13,7 +13,7 @@ from report.document.blocks import records
 from report.document.numbers import as_number
 from report.results.reader import Results
 
-from .selection import METHODS, cells_of_paper, method, of_scaling
+from .selection import METHODS, cells_of_paper, of_method, of_scaling
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def measured(results: Results) -> pd.DataFrame:
     lines = [
         _line(name, row, build.get(str(row["scene"]), {}))
         for name in METHODS
-        for row in records(method(cells, name))
+        for row in records(of_method(cells, name))
     ]
     return pd.DataFrame(lines)
 
@@ -103,11 +103,11 @@ def fitted(lines: pd.DataFrame, name: str, key: str) -> Exponent | None:
     """The exponent in n of one quantity of one method."""
     if lines.empty:
         return None
-    of_method = lines[lines["method"] == name]
-    values = [as_number(v) or 0.0 for v in of_method[key]]
+    mine = lines[lines["method"] == name]
+    values = [as_number(v) or 0.0 for v in mine[key]]
     if key in TIMES:
         values = [v if v >= SHORTEST else 0.0 for v in values]
-    return exponent(of_method["n"].tolist(), values)
+    return exponent(mine["n"].tolist(), values)
 
 
 def keys(lines: pd.DataFrame, *names: str) -> list[str]:

@@ -71,7 +71,7 @@ def ipm(cells: pd.DataFrame, **changed: Any) -> pd.DataFrame:
     return cells[np.array(chosen, dtype=bool)].drop_duplicates("scene")
 
 
-def method(cells: pd.DataFrame, name: str) -> pd.DataFrame:
+def of_method(cells: pd.DataFrame, name: str) -> pd.DataFrame:
     """The cells of one of METHODS, one a scene."""
     solver, form, options = METHODS[name]
     if solver == "ipm":

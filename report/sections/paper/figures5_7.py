@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.paper.crossings import BETTER, below, compared, sizes, worst
-from report.analysis.paper.selection import METHODS, cells_of_paper, is_paper, method, of_problems
+from report.analysis.paper.selection import METHODS, cells_of_paper, is_paper, of_method, of_problems
 from report.analysis.seconds import seconds_text
 from report.document.blocks import Block, Column, Figure, Place, Section, Table, number, records, word
 from report.document.numbers import whole
@@ -46,17 +46,17 @@ def section(results: Results) -> Section | None:
 
 
 def _lines(cells: pd.DataFrame) -> pd.DataFrame:
-    """The cells of the paper's methods, each named in `series`, and those of the other solvers."""
-    named = [method(cells, name).assign(series=name) for name in METHODS]
+    """The cells of the paper's methods, each named in `method`, and those of the other solvers."""
+    named = [of_method(cells, name).assign(method=name) for name in METHODS]
     return pd.concat([*named, cells[~cells["solver"].isin(["ipm", "gi"])]])
 
 
 def _figure(cells: pd.DataFrame, n: int) -> Figure:
     lines = _lines(cells[cells["n"] == n])
-    others = style.line_styles(lines[~lines["series"].isin(METHODS)])
+    others = style.line_styles(lines[~lines["method"].isin(METHODS)])
     looks = {name: look | THICK for name, look in LOOKS.items()}
-    looks |= {series: look | THIN for series, look in others.items()}
-    styles = {series: looks[series] for series in _order(lines)}
+    looks |= {method: look | THIN for method, look in others.items()}
+    styles = {method: looks[method] for method in _order(lines)}
     drawing = style.figure(4.2)
     axes = drawing.add_subplot()
     times_panel.panel(axes, lines, styles)
@@ -73,8 +73,8 @@ def _figure(cells: pd.DataFrame, n: int) -> Figure:
 
 
 def _order(lines: pd.DataFrame) -> list[str]:
-    """The series that occur: the paper's methods first."""
-    found = in_order(lines, "series")
+    """The method that occur: the paper's methods first."""
+    found = in_order(lines, "method")
     return [name for name in METHODS if name in found] + [name for name in found if name not in METHODS]
 
 
@@ -133,7 +133,7 @@ def _times(cells: pd.DataFrame, n: int) -> Table:
     lines: dict[str, dict[str, Any]] = {}
     for row in records(found):
         start = {"scene": row["scene"], "active": row["active"], "m": row["m"]}
-        lines.setdefault(row["scene"], start)[row["series"]] = seconds_text(row)
+        lines.setdefault(row["scene"], start)[row["method"]] = seconds_text(row)
     names = _order(found)
     table = pd.DataFrame(list(lines.values())).sort_values("active")
     table[names] = table[names].fillna("")

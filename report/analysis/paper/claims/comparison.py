@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.paper.crossings import BETTER, below, sizes, worst
-from report.analysis.paper.selection import method
+from report.analysis.paper.selection import of_method
 from report.analysis.seconds import timed
 from report.analysis.standings import geometric_mean
 from report.document.blocks import records
@@ -24,9 +24,9 @@ AGREE_MM = 1e-7
 def _agree(measured: Measured) -> Verdict:
     cases: list[Case] = []
     largest = 0.0
-    mine = method(measured.cells, "IPM").set_index("scene")
+    mine = of_method(measured.cells, "IPM").set_index("scene")
     for name in RIVALS:
-        for row in records(method(measured.cells, name)):
+        for row in records(of_method(measured.cells, name)):
             scene = row["scene"]
             case = f"{name}, scene {scene}"
             errors = [row["displacement_error_mm"]]
@@ -79,9 +79,9 @@ def _keys(found: list[dict[str, Any]]) -> list[str]:
 
 def _against(measured: Measured, n: int, name: str) -> list[dict[str, Any]]:
     of_size = measured.cells[measured.cells["n"] == n]
-    rows = pd.concat([method(of_size, of) for of in (RIVALS if name == BETTER else (name,))])
+    rows = pd.concat([of_method(of_size, of) for of in (RIVALS if name == BETTER else (name,))])
     rows = timed(rows).sort_values(["at_least", "cut"], na_position="last").drop_duplicates("scene")
-    return pairs(method(of_size, "IPM"), rows)
+    return pairs(of_method(of_size, "IPM"), rows)
 
 
 def _means(found: list[dict[str, Any]]) -> tuple[float, float, bool | None]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from report.analysis.fit import Exponent
 from report.analysis.paper.growth import fitted, keys
-from report.analysis.paper.selection import method
+from report.analysis.paper.selection import of_method
 from report.document.numbers import significant, whole
 
 from .verdict import Case, Claim, Measured, by_case
@@ -87,13 +87,13 @@ def _inversion_besides(measured: Measured) -> Iterator[Case]:
 
 @by_case("the form and the size")
 def _less_memory(measured: Measured) -> Iterator[Case]:
-    mine = method(measured.cells, "IPM").dropna(subset=["working_mib"])
+    mine = of_method(measured.cells, "IPM").dropna(subset=["working_mib"])
     for n in sorted(mine["n"].unique()):
         of_size = mine[mine["n"] == n]
         largest = of_size["working_mib"].max()
         yield Case("", None, f"n = {n:.0f}: IPM {whole(largest)} MiB", of_size["key"].tolist())
         for name in RIVALS:
-            rows = method(measured.cells, name).dropna(subset=["working_mib"])
+            rows = of_method(measured.cells, name).dropna(subset=["working_mib"])
             rows = rows[rows["n"] == n]
             if rows.empty:
                 continue

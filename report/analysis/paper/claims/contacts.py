@@ -8,7 +8,7 @@ from dataclasses import replace
 import pandas as pd
 
 from report.analysis.paper.crossings import at_share, sizes
-from report.analysis.paper.selection import method
+from report.analysis.paper.selection import of_method
 from report.analysis.seconds import timed
 from report.document.numbers import significant
 
@@ -21,7 +21,7 @@ SLIGHT = 3.0  # longest over shortest time that counts as a slight influence
 
 
 def _of_size(measured: Measured, name: str, n: int) -> pd.DataFrame:
-    rows = timed(method(measured.cells, name))
+    rows = timed(of_method(measured.cells, name))
     return rows[(rows["n"] == n) & rows["at_least"].notna()]
 
 
