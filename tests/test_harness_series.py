@@ -245,7 +245,7 @@ def test_the_table_of_the_report() -> None:
     assert len(re.findall(r"\| +4 of 4 \|", text)) == 2
     assert "PIQP `update`" in text
     assert "OSQP" not in text.partition("## Series")[2].partition("##")[0]
-    assert "How stable" not in text  # cases are no repeats
+    assert "Repeatability" not in text  # cases are no repeats
 
 
 def test_a_report_without_a_library_and_with_cases_that_failed() -> None:

@@ -13,7 +13,7 @@ from synthetic_results import no_answer, row, write_rows
 
 from report.analysis.advice import advice
 from report.analysis.checks import planned_measurements
-from report.analysis.drawn import best
+from report.analysis.drawn import best_tolerances
 from report.analysis.precision import pareto, settings, swept, with_errors
 from report.document.blocks import Figure, Section, Table, Text
 from report.figures import style
@@ -78,9 +78,9 @@ def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> No
     rows += [answer(f"4386/{k}", "liar", 7, 2.0, 1e-9) for k in (200, 300, 400)]
     written = write(write_rows(tmp_path, rows)).read_text("utf-8")
     for title in (
-        *("Which settings for which accuracy", "Time against achieved accuracy", "Price list of accuracy"),
-        *("Tolerance asked, error achieved", "Residual against error", "Performance profiles"),
-        *("Many load cases on one assembly", "How stable the times are"),
+        *("Recommended settings by accuracy", "Time against achieved accuracy", "The cost of accuracy"),
+        *("Requested tolerance and achieved error", "Residuals and displacement error"),
+        *("Performance profiles", "Many load cases on one assembly", "Repeatability of the times"),
     ):
         assert f"## {title}\n" in written
     for picture in (tmp_path / "report").glob("*.png"):
@@ -150,14 +150,14 @@ def test_prices_are_the_fastest_measured_run_that_is_accurate_enough(tmp_path: P
     line = prices(results(tmp_path, sweep())).loc["honest (dual)"]
     # errors are half the tolerance: 10^-k is first met at k digits, which take 0.01 · 2^k s
     assert [line[f"seconds_1e-{k}"] for k in (3, 5, 7, 9)] == pytest.approx([0.08, 0.32, 1.28, 5.12])
-    assert line["factor_a_digit"] == pytest.approx(2.0)
+    assert line["factor_per_digit"] == pytest.approx(2.0)
 
 
-def test_the_factor_a_digit_follows_the_times(tmp_path: Path) -> None:
+def test_the_factor_per_digit_follows_the_times(tmp_path: Path) -> None:
     rows = [answer(LOW, "a", k, 0.01 * 5**k, 10.0**-k) for k in (3, 4, 5, 6)]
-    assert prices(results(tmp_path / "a", rows)).loc["a (dual)", "factor_a_digit"] == pytest.approx(5.0)
+    assert prices(results(tmp_path / "a", rows)).loc["a (dual)", "factor_per_digit"] == pytest.approx(5.0)
     short = [answer(LOW, "a", k, 0.01 * 5**k, 10.0 ** (-3 - k / 10)) for k in (3, 4, 5, 6)]
-    assert math.isnan(prices(results(tmp_path / "b", short)).loc["a (dual)", "factor_a_digit"])
+    assert math.isnan(prices(results(tmp_path / "b", short)).loc["a (dual)", "factor_per_digit"])
 
 
 def test_a_price_is_the_geometric_mean_over_the_scenes(tmp_path: Path) -> None:
@@ -186,7 +186,7 @@ def test_a_reference_too_coarse_for_an_accuracy_does_not_judge_it(tmp_path: Path
     line = prices(found).loc["honest (dual)"]
     assert line["state_1e-7"] == "reached"
     assert line["state_1e-9"] == "cannot be judged"
-    assert advised(found).loc[1e-9, "use"] == "cannot be judged: the references are known to 1.0e-9 mm"
+    assert advised(found).loc[1e-9, "use"] == "cannot be judged: the reference error bound is 1.0e-9 mm"
     many = table(amortised.section(found), "amortised")
     assert many.columns[2].show(many.data.iloc[-1].to_dict()) == "cannot be judged"  # type: ignore[arg-type]
 
@@ -217,7 +217,7 @@ def test_small_residuals_beside_a_large_error_are_named(tmp_path: Path) -> None:
     tiny = {"primal_residual": 1e-15, "dual_residual": 1e-12, "duality_gap": 1e-13}
     section = residual_error.section(results(tmp_path, changed(sweep(), "coarse", **tiny)))
     # the largest ratio: 5e-3 mm at 2 digits against 5e-11 mm of honest at 10
-    assert "A small residual is no proof. On scene" in text(section)
+    assert "A small residual does not prove a small error. On scene" in text(section)
     assert "coarse (dual) 1e-2 has residuals (1.0e-15 mm, 1.0e-12 N, 1.0e-13 N·mm)" in text(section)
     assert "an error of 5.0e-3 mm against 5.0e-11 mm" in text(section)
     line = table(section, "residual-error").data.set_index("method").loc["coarse (dual)"]
@@ -231,13 +231,13 @@ def test_residuals_that_do_tell_are_said_to(tmp_path: Path) -> None:
         if (e := r["displacement_error_mm"]) is not None
     ]
     section = residual_error.section(results(tmp_path, rows))
-    assert "did tell the two apart" in text(section)
+    assert "do tell them apart" in text(section)
 
 
 def test_one_small_residual_beside_a_large_one_deceives_nobody(tmp_path: Path) -> None:
     rows = [answer(LOW, "good", k, 1.0, 1e-9, primal_residual=1e-9, dual_residual=1e-9) for k in (5, 7, 9)]
     rows.append(answer(LOW, "bad", 7, 1.0, 1e-5, primal_residual=1e-12, dual_residual=1e-3))
-    assert "did tell the two apart" in text(residual_error.section(results(tmp_path, rows)))
+    assert "do tell them apart" in text(residual_error.section(results(tmp_path, rows)))
 
 
 def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
@@ -324,21 +324,21 @@ def test_unstable_times_are_warned_of_with_the_reason(tmp_path: Path) -> None:
     rows += repeats(9, (1.0, 3.0), iterations=[20, 31]) + repeats(6, (0.01, 0.03))
     rows.append(answer(LOW, "b", 9, 1.0, 1e-9))
     section = stability.section(results(tmp_path, rows))
-    assert "Of 4 times measured several times, 3 spread by more than 20%" in text(section)
+    assert "Of 4 times measured repeatedly, 3 vary by more than 20%" in text(section)
     assert "The other 1 time was measured once" in text(section)
     found = table(section, "unstable-times").data.set_index("label")
     line = found.loc["a (dual) 1e-8"]
     assert line[["median_s", "least_s", "most_s"]].tolist() == [1.6, 1.0, 2.0]
     assert line["spread"] == pytest.approx(1.0 / 1.6)
-    assert line["why"] == "the same iterations each time: the machine, slowest at noon"
-    assert found.loc["a (dual) 1e-9", "why"] == "20 to 31 iterations: the solver does not repeat itself"
+    assert line["why"] == "the same iterations each time, so the machine; slowest at noon"
+    assert found.loc["a (dual) 1e-9", "why"] == "20 to 31 iterations: the solver is not deterministic"
     assert found.loc["a (dual) 1e-6", "why"].startswith("shorter than 0.05 s")
 
 
 def test_the_best_of_several_tolerances_stands_for_a_solver(tmp_path: Path) -> None:
     found = results(tmp_path, sweep())
     # honest is within 1e-7 mm from 7 digits on, and the fastest there; liar at 10 digits alone
-    lines = best(found).drop_duplicates("label").set_index("method")["tolerance"]
+    lines = best_tolerances(found).drop_duplicates("label").set_index("method")["tolerance"]
     assert lines[["honest (dual)", "liar (dual)"]].tolist() == [1e-7, 1e-10]
     shown = table(summary.section(found), "summary").data["label"]
     assert {"honest (dual) 1e-7", "liar (dual) 1e-10"} < set(shown)

@@ -99,7 +99,7 @@ def test_the_report_and_its_files(swept: bool, tmp_path: Path) -> None:
     maps = pd.read_csv(tmp_path / "report" / "quantile-maps.csv")
     np.testing.assert_allclose(maps["q0.95_mm"], np.quantile(gaps, 0.95, axis=0))
     assert "239 within, 1 no answer" in text.replace("1 no answer, 239 within", "239 within, 1 no answer")
-    assert "76.9 cases a second of work" in text
+    assert "76.9 cases per second of work" in text
 
 
 def test_a_series_without_an_answer_or_nodes(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ CONFIDENCE = 0.95
 
 
 def quantile_maps(series: Series) -> Array:
-    """(len(QUANTILES) + 1, m) mm: the quantiles over the cases, contact by contact, and the mean."""
+    """(len(QUANTILES) + 1, m), mm: the quantiles over the cases for each contact, and the mean."""
     numbers, m = series.cases["case"].to_numpy(), series.gaps.shape[1]
     maps = np.empty((len(QUANTILES) + 1, m))
     width = max(AT_ONCE // max(len(numbers), 1), 1)
@@ -30,7 +30,7 @@ def quantile_maps(series: Series) -> Array:
 
 
 def exceedance(series: Series) -> pd.DataFrame:
-    """For gaps t in mm, the share of the cases whose largest gap exceeds t, and of all their contacts."""
+    """For gaps t in mm, the share of cases whose largest gap exceeds t, and the share of all contacts."""
     largest = np.sort(series.cases["max_gap_mm"].to_numpy())
     t = np.linspace(0.0, float(largest[-1]), LEVELS)
     numbers, m = series.cases["case"].to_numpy(), series.gaps.shape[1]
@@ -46,10 +46,10 @@ def exceedance(series: Series) -> pd.DataFrame:
 
 
 def convergence(series: Series) -> pd.DataFrame:
-    """Quantiles of the largest gap of a case over the first N cases, with a distribution-free interval.
+    """Quantiles of the largest gap per case over the first N cases, with a distribution-free interval.
 
-    The interval runs between the order statistics whose ranks hold the quantile with 95 % probability
-    (binomial), where there are enough cases for it; it presumes cases drawn independently.
+    The interval lies between the order statistics whose ranks contain the quantile with 95 % probability
+    (binomial), if there are enough cases for it. It assumes that the cases are drawn independently.
     """
     from scipy.stats import binom
 

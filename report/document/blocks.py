@@ -1,4 +1,4 @@
-"""What a section of the report is made of: text, tables and figures."""
+"""What a section of the report consists of: text, tables and figures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table as shown. `show` makes the text of a cell from its row of the data."""
+    """A column of a table as shown. `show` turns a row of the data into the text of a cell."""
 
     heading: str
     show: Callable[[Mapping[str, Any]], str]
@@ -44,7 +44,7 @@ def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: `columns` of it in the report, all of `data` with all its digits in NAME.csv beside it."""
+    """A table: its `columns` in the report, all of `data` with all digits in NAME.csv beside it."""
 
     kind: ClassVar[str] = "table"
     name: str
@@ -65,7 +65,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, saved as NAME.png; `caption` says what to see in it."""
+    """A picture, saved as NAME.png; `caption` explains it."""
 
     kind: ClassVar[str] = "figure"
     name: str
@@ -84,8 +84,8 @@ class Section:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a section stands in the report: by growing `number`. `about`: the results that it is given,
-    those on the rungs of ladders, those on all other scenes, or all.
+    """The place of a section in the report, by increasing `number`, and the results it is given: those on
+    the rungs of ladders, on all other scenes, or all.
     """
 
     number: int

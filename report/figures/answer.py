@@ -15,10 +15,10 @@ from . import style
 from .maps import Array, draw, grid_of, outline
 from .sheet import Sheet, sheet
 
-#: Marks of what stands on the junction, by the kind of the effect.
+#: Marks on the junction, by the kind of effect.
 MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 THINNEST = 0.02  # a map's shorter side over its longer one
-NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps below one another, all side by side
+NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
 
 
 def pair_name(pair: dict[str, Any]) -> str:
@@ -34,7 +34,7 @@ def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str
 
 
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
-    """Both gaps of each pair on one scale, that of their square roots; the closed contacts outlined."""
+    """Both gaps of each pair on one square-root scale; closed contacts are outlined."""
     before, after = arrays["gap_before"], arrays["gap_after"]
     titles = [f"gap {when}: {pair_name(pair)}" for pair in record["pairs"] for when in ("before", "after")]
     maps = _sheet(arrays["contact_nodes"], titles, 2, len(record["marks"]))
@@ -50,7 +50,7 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
 
 
 def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
-    """The forces on a scale of their square roots, so that small ones show."""
+    """The forces on a square-root scale, so that small ones are visible."""
     pairs, lam = record["pairs"], np.nan_to_num(arrays["lam"])
     titles = [f"contact forces: {pair_name(pair)}" for pair in pairs]
     maps = _sheet(arrays["contact_nodes"], titles, len(pairs), len(record["marks"]))
@@ -87,8 +87,9 @@ def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
 
 
 def _sheet(nodes: Array, titles: list[str], beside: int, marks: int) -> Sheet:
-    """Maps of what holds the nodes: below one another where that is a strip, all side by side where it stands
-    upright, else `beside` and at most three."""
+    """Maps of the bounding box of the nodes: stacked if it is a wide strip, all side by side if it is
+    upright, else `beside` and at most three per row.
+    """
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     thin = THINNEST * (high - low).max() or 1.0
     size, middle = np.maximum(high - low, thin), (low + high) / 2
@@ -103,7 +104,7 @@ def _outline(axes: Axes, nodes: Array, closed: Any, colour: str) -> None:
 
 
 def _mark(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
-    """Rings on a white rim, which stands out from any colour; what is inside them shows."""
+    """Rings with a white rim, visible on any colour without hiding what is inside them."""
     for kind, points in marks.items():
         x, y = np.array(points).T
         ring: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "none", "clip_on": False}

@@ -12,7 +12,7 @@ STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, 
 
 
 def staircase(axes: Axes, front: pd.DataFrame, time: str) -> None:
-    """A Pareto front as a staircase from the upper to the right edge of axes that are otherwise done."""
+    """Draws a Pareto front as a staircase from the upper to the right edge of axes whose limits are final."""
     if front.empty:
         return
     errors, seconds = front["error"].tolist(), front[time].tolist()

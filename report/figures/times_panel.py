@@ -22,16 +22,17 @@ OUTSIDE: dict[str, Any] = {
     "zorder": 5,
     "path_effects": [withStroke(linewidth=4, foreground="white")],
 }
-#: What the marks of `panel` mean, for captions.
+#: The meaning of the marks of `panel`, for captions.
 MARKS = (
-    "Crosses on a line, in its colour: answered, but not within {limit}. Open triangles stand at the time "
-    "limit of runs that did not finish; crosses at the upper edge, for runs that gave no answer for another "
-    "reason."
+    "Crosses on a line, in its colour: an answer outside {limit}. Open triangles: runs that did not finish, "
+    "at their time limit; crosses at the upper edge: runs without an answer for another reason."
 )
 
 
 def panel(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
-    """One size: a line a method of `styles`, and the marks of what is no answer within the limit."""
+    """Draws the cells of one size: one line per method of `styles`, and marks for answers outside the limit
+    and for missing ones.
+    """
     for method, look in styles.items():
         line = cells[cells["method"] == method].sort_values("active")  # broken where a time is missing
         axes.plot(line["active"], line["load_case_s"], **look)
@@ -47,6 +48,6 @@ def panel(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) ->
 
 
 def entries(cells: pd.DataFrame) -> list[Line2D]:
-    """Legend entries for those of the panel's marks that occur."""
+    """Legend entries for the marks that occur."""
     outside = [Line2D([], [], label="not within the limit", color=style.GREY, **OUTSIDE)]
     return [*(outside if cells["verdict"].isin(ANSWERED[1:]).any() else []), *unfinished.entries(cells)]

@@ -1,4 +1,4 @@
-"""The marks of runs that gave no answer, the same in every figure of times."""
+"""The marks of runs without an answer, the same in every figure of times."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from report.document.numbers import significant
 
 from . import style
 
-BESIDE = 5.5  # points between marks that would fall on one another
+BESIDE = 5.5  # points between marks that would coincide
 HOLLOW: dict[str, Any] = {"linestyle": "", "markersize": 6, "markerfacecolor": "none", "zorder": 4}
 
 
 def unfinished(
     axes: Axes, cells: pd.DataFrame, x: str, styles: dict[str, dict[str, Any]], *, inside: bool = False
 ) -> None:
-    """On a logarithmic axis of seconds: open triangles, in the colour of their method, at the time limit
-    of runs that it stopped; crosses at the upper edge for runs without an answer for another reason.
+    """On a logarithmic axis of seconds, open triangles in the colour of their method for runs stopped at the
+    time limit, and crosses at the upper edge for runs without an answer for another reason.
 
-    `x`: the column of their places along the axis; marks of one place stand side by side. The limit is
-    named right of the axes, or `inside` at the left.
+    x : the column of their places along the axis; marks at one place stand side by side. The limit is named
+    to the right of the axes, or if `inside`, within them on the left.
     """
     missed = cells[~cells["verdict"].isin(ANSWERED)]
     if missed.empty:
@@ -61,7 +61,7 @@ def _beside(
 
 
 def entries(cells: pd.DataFrame) -> list[Line2D]:
-    """Legend entries for those of the marks that occur."""
+    """Legend entries for the marks that occur."""
     missed = ~cells["verdict"].isin(ANSWERED)
     late = missed & (cells["status"] == "time_limit")
     notes = [(late, "not finished in time", "^"), (missed & ~late, "no answer", "x")]

@@ -22,7 +22,7 @@ FIGURES = ("max_gap_mm", "mean_gap_mm", "bound_mm", "displacement_error_mm", "se
 
 @dataclass(frozen=True)
 class Series:
-    """What a directory holds. cases : those with an answer, ascending; gaps : (cases, m) on disk, mm."""
+    """A series. cases : those with an answer, in order; gaps : (cases, m), mm, on disk."""
 
     facts: dict[str, Any]
     counts: dict[str, int]
@@ -34,7 +34,7 @@ class Series:
 
 
 def read(directory: Path) -> Series:
-    """Raises FileNotFoundError where the directory has no series."""
+    """Raises FileNotFoundError if the directory has no series."""
     facts = json.loads((directory / "series.json").read_text("utf-8"))
     counts: dict[str, int] = {}
     kept: list[tuple[Any, ...]] = []

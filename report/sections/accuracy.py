@@ -1,4 +1,4 @@
-"""Time against the accuracy that was achieved: a work–precision diagram a size."""
+"""Time against achieved accuracy: one work–precision diagram per size."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
 from harness.results.schema import ANSWERED
-from report.analysis.drawn import drawn, left_out, scenes, sizes
-from report.analysis.precision import ENOUGH, WRONG, in_view, pareto, with_errors
+from report.analysis.drawn import drawn_cells, omission_note, scenes, sizes
+from report.analysis.precision import CURVE_POINTS, LARGEST_ERROR_MM, in_view, pareto, with_errors
 from report.document.blocks import Figure, Place, Section, Text
 from report.figures import style, unfinished
 from report.figures.lines import looks
@@ -21,25 +21,25 @@ PLACE = Place(330)
 
 
 def section(results: Results) -> Section | None:
-    cells = in_view(with_errors(drawn(results)))
+    cells = in_view(with_errors(drawn_cells(results)))
     figures = [figure for n in sizes(results) if (figure := _figure(results, cells, n))]
     if not figures:
         return None
     words = (
-        "Seconds a load case against the displacement error that was achieved, both of the same run; down "
-        f"and left is better, and right of the dotted line at {results.limit} is not accurate enough. The "
-        "grey staircase is the Pareto front: its corners are beaten by nothing that is both faster and more "
-        f"accurate. Runs of one solver at {ENOUGH} tolerances or more are joined, the loosest first; bars "
-        "span the repeats. Open triangles stand at the time limit of runs that did not finish, crosses at "
-        "the upper edge for runs that gave no answer for another reason; both above the smallest error that "
-        "the solver did reach, at the right edge where it reached none. Errors smaller than the bound on the "
-        f"reference's own are drawn at that bound, those above {WRONG:g} mm there."
+        "Seconds per load case against the achieved displacement error of the same run; lower left is "
+        f"better, and right of the dotted line at {results.limit} the error is too large. The grey staircase "
+        "is the Pareto front: nothing is both faster and more accurate than its corners. Runs of a solver "
+        f"with at least {CURVE_POINTS} tolerances are joined; bars span the repeats. Open triangles: runs "
+        "that did not finish, at their time limit; crosses at the upper edge: runs without an answer for "
+        "another reason. Both are placed at the smallest error the solver did reach, or at the right edge if "
+        "it reached none. Errors below the reference error bound are drawn at that bound, errors above "
+        f"{LARGEST_ERROR_MM:g} mm at {LARGEST_ERROR_MM:g} mm."
     )
-    return Section("Time against achieved accuracy", [Text(words + left_out(results)), *figures])
+    return Section("Time against achieved accuracy", [Text(words + omission_note(results)), *figures])
 
 
 def _figure(results: Results, cells: pd.DataFrame, n: int) -> Figure | None:
-    """The scenes of a size with the fewest and with the most active contacts, side by side."""
+    """The scenes of a size with the fewest and the most active contacts, side by side."""
     of_size = [s for s in scenes(results, n) if cells.loc[cells["scene"] == s, "error"].notna().any()]
     ends = list(dict.fromkeys(of_size[:1] + of_size[-1:]))
     if not ends:
@@ -52,7 +52,7 @@ def _figure(results: Results, cells: pd.DataFrame, n: int) -> Figure | None:
     limit = cells["limit_mm"].max()
     limit = limit if limit > 0 else 1e-7
     low, high = min(cells["error"].min(), limit), max(cells["error"].max(), limit)
-    panels[0].set(xscale="log", yscale="log", xlim=(low / 4, high * 6), ylabel="time a load case, s")
+    panels[0].set(xscale="log", yscale="log", xlim=(low / 4, high * 6), ylabel="time per load case, s")
     panels[0].xaxis.set_major_locator(LogLocator(numticks=9))
     panels[0].xaxis.set_minor_locator(NullLocator())
     for axes, scene in zip(panels, ends, strict=True):

@@ -1,4 +1,4 @@
-"""Many load cases on one assembly: what is paid once is shared by them."""
+"""Many load cases on one assembly, which share the cost of conversion and preparation."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def section(results: Results) -> Section | None:
         return None
     caption = (
         f"*One load case, and one of {LOAD_CASES[-1]} on the same assembly*, on the middle scene of each "
-        "size: seconds a load case against the error achieved. Left, the solver's own conversion and "
-        f"preparation are paid in full; right, {LOAD_CASES[-1]} load cases share them. The Cholesky factor "
-        "of K and Q, which all solvers share, is in neither."
+        "size: seconds per load case against the achieved error. Left: one load case pays for the solver's "
+        f"own conversion and preparation; right: {LOAD_CASES[-1]} load cases share them. Neither includes "
+        "the Cholesky factor of K and Q, which all solvers share."
     )
     figure = Figure("amortised", caption, _drawing(results, answered))
     return Section("Many load cases on one assembly", [figure, _table(cells)])
@@ -58,7 +58,7 @@ def _drawing(results: Results, answered: pd.DataFrame) -> Drawing:
         for axes, load_cases in zip(line, ends, strict=True):
             cost = points["load_case_s"] + points["once_s"] / load_cases
             staircase(axes, pareto(points.assign(cost=cost), "cost"), "cost")
-        line[0].set_ylabel("time a load case, s")
+        line[0].set_ylabel("time per load case, s")
         style.plain_log(line[0].yaxis)
     for axes in panels[-1]:
         axes.set_xlabel("displacement error, mm (max norm)")
@@ -70,9 +70,9 @@ def _table(cells: pd.DataFrame) -> Table:
     columns = [number("n", "n", whole), number("error ≤, mm", "accuracy_mm", tidy_power)]
     columns += [Column(counted(k, "load case"), partial(_shown, load_cases=k), "left") for k in LOAD_CASES]
     caption = (
-        "*The fastest settings for so many load cases on one assembly*, with seconds a load case, its share "
-        "of what is paid once included: the geometric mean over the scenes of the size, of settings "
-        "that reach the error on all of them."
+        "*The fastest settings by the number of load cases on one assembly*, with the seconds per load case "
+        "including its share of conversion and preparation: the geometric mean over the scenes of the size, "
+        "for settings that reach the error on all of them."
     )
     return Table("amortised", caption, pd.DataFrame(lines), columns)
 

@@ -1,4 +1,4 @@
-"""The tolerance that was asked for against the error that came: whose tolerance can be trusted."""
+"""The requested tolerance against the achieved error: whose tolerance can be trusted."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ def section(results: Results) -> Section | None:
     if cells.empty:
         return None
     words = (
-        "*Error against the tolerance asked for*, the worst of the scenes of each size. Below the dotted "
-        "diagonal the error is smaller than the tolerance. A tolerance is the number given to the solver, "
-        "which may measure a gap, a force or an energy by it: what counts is whether its line follows the "
-        "diagonal, at whatever distance, and where it stops to. Runs without an answer are left out."
+        "*Error against the requested tolerance*, the worst over the scenes of each size. Below the dotted "
+        "diagonal the error is smaller than the tolerance. Solvers apply their tolerance to different "
+        "quantities (a gap, a force, an energy), so only the slope matters: whether a line runs parallel to "
+        "the diagonal, and where it levels off. Runs without an answer are omitted."
     )
     columns = [
         word("solver (form)", "method"),
-        number("said solved", "solved", whole),
+        number("reported solved", "solved", whole),
         number("error above the tolerance", "above_tolerance", whole),
         number("largest error / tolerance", "worst_ratio"),
         number(f"tolerance ≤ {results.limit.removesuffix(' mm')}", "tight", whole),
-        number(f"of these outside {results.limit}", "tight_outside", whole),
+        number(f"of these, error > {results.limit}", "tight_outside", whole),
     ]
     caption = (
-        "*Whose tolerance can be trusted*: runs, every repeat counted, of which the solver said that they "
-        "were solved. The bound on the reference's own error is taken off the error in its favour."
+        "*Whose tolerance can be trusted*: the runs that the solver reported as solved, counting every "
+        "repeat. The reference error bound is subtracted from the error, in the solver's favour."
     )
     figure = Figure("asked-achieved", words, _drawing(results, cells))
     table = Table("asked-achieved", caption, trust(results), columns)
-    return Section("Tolerance asked, error achieved", [figure, table])
+    return Section("Requested tolerance and achieved error", [figure, table])
 
 
 def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
@@ -55,14 +55,14 @@ def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
             line = worst[worst["method"] == method]
             axes.plot(line["tolerance"], line["error"], **look)
         axes.axline((1e-6, 1e-6), (1e-5, 1e-5), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
-        axes.set(xscale="log", yscale="log", title=f"n = {n:.0f}", xlabel="tolerance asked for")
+        axes.set(xscale="log", yscale="log", title=f"n = {n:.0f}", xlabel="requested tolerance")
     panels[0].set_ylabel("displacement error, mm")
     return drawing
 
 
 def trust(results: Results) -> pd.DataFrame:
-    """A line a method: of its runs called solved, how many miss the tolerance, and the limit although the
-    tolerance was no larger.
+    """One line per method: of its runs reported as solved, how many exceed the tolerance, and how many
+    exceed the limit although the tolerance was no larger.
     """
     rows = named(results.rows)
     said = (rows["status"] == "solved") & rows["displacement_error_mm"].notna() & (rows["tolerance"] > 0)

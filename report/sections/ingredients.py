@@ -1,4 +1,4 @@
-"""What each ingredient of a solver is worth: the solver without it, as a ratio to the whole."""
+"""Ablation: a solver without one of its ingredients, relative to the complete solver."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KEYS = ["solver", "form", "scene", "threads", "tolerance"]
 
 
 def section(results: Results) -> Section | None:
-    """Of solvers measured both as they are and as variants, in a run with yardsticks."""
+    """For solvers measured both complete and as variants, in a run with machine benchmarks."""
     if not results.rows["cholesky_s"].notna().any():
         return None
     cells = results.cells_by_threads()
@@ -32,18 +32,18 @@ def section(results: Results) -> Section | None:
         word("solver (form), variant", "method"),
         number("scenes", "scenes", whole),
         number("within", "within", whole),
-        Column("times as long", spread("ratio")),
+        Column("time relative to the complete solver", spread("ratio")),
         number("iterations", "iterations", whole),
-        number("of the whole", "iterations_plain", whole),
+        number("complete", "iterations_plain", whole),
         number("largest error, mm", "displacement_error_mm"),
     ]
     caption = (
-        "*One ingredient left out or exchanged*: seconds a load case to those of the solver as it is, on the "
-        "same scene with as many threads; the median over the scenes within the limit, and the least to the "
-        "most. Iterations: medians."
+        "*One ingredient omitted or replaced*: seconds per load case relative to the complete solver on the "
+        "same scene with as many threads; the median over the scenes within the limit, and in brackets the "
+        "range. Iterations: medians."
     )
     return Section(
-        "What each ingredient is worth", [Table("ingredients", caption, pd.DataFrame(lines), columns)]
+        "What each ingredient contributes", [Table("ingredients", caption, pd.DataFrame(lines), columns)]
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.drawn import left_out, sidelined
+from report.analysis.drawn import omission_note, rare_variants
 from report.analysis.precision import judged, with_errors
 from report.document.blocks import Figure, Place, Section, Table, number, word
 from report.document.numbers import counted, listed, whole
@@ -17,8 +17,8 @@ from report.results.reader import Results
 
 PLACE = Place(370)
 
-FEWEST = 5  # load cases that a profile stands on
-MOST = 0.75  # of the scenes that a method was asked for, to be compared
+FEWEST = 5  # load cases of a profile
+MOST = 0.75  # share of the scenes in the plan of a method, for it to be compared
 FACTORS = {1.0: "fastest", 2.0: "τ ≤ 2", 10.0: "τ ≤ 10"}
 
 
@@ -30,27 +30,27 @@ def section(results: Results) -> Section | None:
     others = asked(results)
     left = in_order(others[~others["method"].isin(times)], "method")
     caption = (
-        f"*Performance profiles over {counted(len(times), 'load case')}*: the share of them that a solver "
-        f"answers to within {results.limit}, with the best of its tolerances, in at most τ times the time of "
-        "the fastest. Left end: how often it is the fastest; right end: how many it answers at all. What "
-        "failed, missed the limit or was not run for want of time counts as never. Left out are load cases "
-        "that not every solver was asked for, or that nothing answered, or whose reference cannot judge the "
-        "limit."
-        + (f" Asked for fewer than three quarters of the scenes: {listed(left)}." if left else "")
-        + left_out(results)
+        f"*Performance profiles over {counted(len(times), 'load case')}*: the share that a solver answers "
+        f"within {results.limit}, with the best of its tolerances, in at most τ times the time of the "
+        "fastest. Left end: how often it is the fastest; right end: how many it answers at all. Failures, "
+        "answers outside the limit and runs not started for lack of time count as never. Load cases are "
+        "excluded if they are not in every solver's plan, if nothing answered them, or if the reference "
+        "cannot judge the limit."
+        + (f" In the plan for fewer than three quarters of the scenes: {listed(left)}." if left else "")
+        + omission_note(results)
     )
     figure = Figure("profiles", caption, _drawing(results, times))
     return Section("Performance profiles", [figure, _table(times, results)])
 
 
 def asked(results: Results) -> pd.DataFrame:
-    """The cells of the plan but for the sidelined variants, those not run for want of time among them."""
-    return results.cells[results.cells["status"] != "unsupported"].drop(sidelined(results).index)
+    """The cells of the plan without rare variants, including those not run for lack of time."""
+    return results.cells[results.cells["status"] != "unsupported"].drop(rare_variants(results).index)
 
 
 def compared(results: Results) -> pd.DataFrame:
-    """The cells, with errors, of the method asked for MOST of the scenes, on those scenes that all of them
-    were asked for.
+    """The cells, with errors, of the methods planned for MOST of the scenes, on the scenes planned for all
+    of these methods.
     """
     cells = asked(results)
     table = cells.pivot_table(index="scene", columns="method", values="n", aggfunc="size").notna()
@@ -60,7 +60,7 @@ def compared(results: Results) -> pd.DataFrame:
 
 
 def ratios(cells: pd.DataFrame) -> pd.DataFrame:
-    """Time over that of the fastest, by scene and method; infinite where the limit was not met."""
+    """Time over that of the fastest, by scene and method; infinite if the limit was not met."""
     known = [s for s, of in cells.groupby("scene") if judged(of, of["limit_mm"].max())]
     good = cells[(cells["error"] <= cells["limit_mm"]) & cells["scene"].isin(known)]
     times = good.pivot_table(index="scene", columns="method", values="load_case_s", aggfunc="min")
@@ -94,4 +94,4 @@ def _table(times: pd.DataFrame, results: Results) -> Table:
     for factor, heading in FACTORS.items():
         lines[f"within_{factor:g}"] = (times <= factor).sum().to_numpy()
         columns.append(number(heading, f"within_{factor:g}", whole))
-    return Table("profiles", "*The profiles in numbers*, of load cases.", lines, columns)
+    return Table("profiles", "*The profiles in numbers*: load cases.", lines, columns)

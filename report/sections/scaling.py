@@ -1,4 +1,4 @@
-"""How time and memory grow with the size: exponents in n over the scenes of one joint on finer grids."""
+"""How time and memory grow with the size: exponents in n for one joint on finer and finer grids."""
 
 from __future__ import annotations
 
@@ -21,19 +21,25 @@ PLACE = Place(160)
 FEWEST = 3  # sizes
 #: What grows, and its unit.
 GROWING = {
-    "load_case_s": "seconds a load case",
-    "once_s": "seconds to prepare, once an assembly",
+    "load_case_s": "seconds per load case",
+    "once_s": "seconds of preparation per assembly",
     "working_mib": "working memory, MiB",
 }
-SHORTEST = {"load_case_s": 1e-2, "once_s": 1e-2, "working_mib": 8.0}  # below, it is not Q that is measured
+SHORTEST = {
+    "load_case_s": 1e-2,
+    "once_s": 1e-2,
+    "working_mib": 8.0,
+}  # smaller values do not reflect the size of Q
 
 
 def section(results: Results) -> Section | None:
-    """Of the scenes scaling/…, in a run with yardsticks."""
+    """For the scenes scaling/…, in a run with machine benchmarks."""
     cells = results.cells[results.cells["scene"].str.startswith("scaling/")]
     if not cells["cholesky_s"].notna().any() or cells["n"].nunique() < FEWEST:
         return None
-    return Section("How the work grows", [_exponents(cells), _figures(cells), _figure(results, cells)])
+    return Section(
+        "Scaling with the problem size", [_exponents(cells), _figures(cells), _figure(results, cells)]
+    )
 
 
 def _exponents(cells: pd.DataFrame) -> Table:
@@ -58,9 +64,9 @@ def _exponents(cells: pd.DataFrame) -> Table:
         *(Column(f"exponent of {what}", _shown(name)) for name, what in GROWING.items()),
     ]
     caption = (
-        "*Exponents in n*, the slope of a straight line through the logarithms, with its standard error. "
-        "Only answers within the limit count. Working memory is the largest resident memory less what was "
-        "resident with the data loaded. Left out: times below 10 ms and memory below 8 MiB."
+        "*Exponents in n*: the slope of a straight line in log–log, with its standard error. Only answers "
+        "within the limit count. Working memory: the largest resident memory minus that resident after "
+        "loading the data. Times below 10 ms and memory below 8 MiB are excluded."
     )
     return Table("scaling-exponents", caption, pd.DataFrame(lines), columns)
 
@@ -83,13 +89,13 @@ def _figures(cells: pd.DataFrame) -> Table:
         number("m", "m", whole),
         number("active", "active", whole),
         word("solver (form)", "method"),
-        word("s a load case", "seconds"),
-        number("once, s", "once_s"),
+        word("s per load case", "seconds"),
+        number("per assembly, s", "once_s"),
         number("Cholesky of Q, s", "cholesky_s"),
         number("working memory, MiB", "working_mib", whole),
         number("Q, MiB", "q_mib", whole),
     ]
-    caption = "*The figures behind the exponents*, medians of the repeats. > : ended by the time limit."
+    caption = "*The data of the fits*, medians of the repeats. >: stopped at the time limit."
     return Table("scaling", caption, table, columns)
 
 
@@ -121,7 +127,7 @@ def _figure(results: Results, cells: pd.DataFrame) -> Figure:
     panels[1].set_xlabel("n")
     drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     caption = (
-        "*Time and working memory against the size*, one joint and load on finer and finer grids, on "
+        "*Time and working memory against the size*, for one joint and load on finer and finer grids, on "
         "logarithmic axes; answers within the limit only."
     )
     return Figure("scaling", caption, drawing)

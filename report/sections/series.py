@@ -1,4 +1,4 @@
-"""Series: load cases a second and their errors, solver by solver, and as ratios to the fastest library."""
+"""Series: load cases per second and their errors by solver, also relative to the fastest library."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ PLACE = Place(170)
 CASE = ["setup_s", "solve_s", "form_s"]
 ROUND = ["scene", "threads"]
 
-#: What each library has for the next load case on the same matrices.
+#: What each library offers for the next load case with the same matrices.
 REPEATED = {
     "piqp": "PIQP `update` of the vectors, no warm start",
-    "proxqp": "ProxQP `update` and a warm start (the dual form's from the case before, for it takes no "
-    "multipliers of bounds)",
+    "proxqp": "ProxQP `update` and a warm start (in the dual form from the previous case, since it "
+    "accepts no multipliers of bounds)",
     "clarabel": "Clarabel `update` of the vectors, no warm start",
     "osqp": "OSQP `update` and `warm_start` from the nearest case",
 }
@@ -42,27 +42,26 @@ def section(results: Results) -> Section | None:
         number("threads", "threads", whole),
         word("solver (form)", "label"),
         Column("within", lambda row: f"{row['within']} of {row['cases']}"),
-        number("s a case", "case_s"),
+        number("s per case", "case_s"),
         number("cases/s", "rate"),
-        number("first, s", "first_s"),
-        number("once, s", "once_s"),
+        number("first case, s", "first_s"),
+        number("per assembly, s", "once_s"),
         number("largest error, mm", "error_mm", power),
-        Column("to the fastest library", spread("to_library")),
+        Column("time relative to the fastest library", spread("to_library")),
     ]
     caption = (
-        "*Series: load cases on one assembly, in one process.* *A case*: update, solve and the dual form's p "
-        "and x, the median of the cases after the first (solved together, after the first so many). "
-        "*First*: with nothing solved before. *Once*: convert and prepare. *To the fastest library*: the "
-        "seconds of these cases as a ratio to the median of the library that is the fastest on the scene, "
-        "with as many threads; their median, and in brackets the least to the most. Only answers within the "
-        "limit count."
+        "*Series: load cases on one assembly, in one process.* *Per case*: update, solve and form, the "
+        "median over the cases after the first (if batched, after the first batch). *First case*: without "
+        "any before it. *Per assembly*: convert and prepare. *Relative to the fastest library*: the time of "
+        "these cases over the median of the fastest library on the scene with as many threads; the median, "
+        "and in brackets the range; 0.1 is ten times as fast. Only answers within the limit count."
     )
     return Section("Series of load cases", [Text(_ways(rows)), Table("series", caption, lines, columns)])
 
 
 def compared(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows of series with `case_s`, the seconds of a case; `later_s` the same where a case was solved before
-    and the answer is within the limit; `to_library`, later_s as a ratio to the fastest library's median.
+    """Rows of series with `case_s`, the seconds per case; `later_s`, the same if a case was solved before and
+    the answer is within the limit; `to_library`, later_s relative to the fastest library's median.
     """
     rows = rows.assign(case_s=rows[CASE].sum(axis=1))
     rows["later_s"] = rows["case_s"].where((rows["verdict"] == "within") & (rows["warm"] == 1))
@@ -92,9 +91,9 @@ def _line(group: pd.DataFrame) -> dict[str, Any]:
 
 
 def _ways(rows: pd.DataFrame) -> str:
-    """How the solvers come from one case to the next."""
+    """How the solvers proceed from one case to the next."""
     seen = [way for solver, way in REPEATED.items() if (rows["solver"] == solver).any()]
-    words = "Each solver takes one load case after another, by its own way from one to the next"
+    words = "Each solver takes one load case after another, each in its own way"
     words += f": {'; '.join(seen)}." if seen else "."
     if rows["batched"].notna().any():
         words += (

@@ -1,4 +1,4 @@
-"""Draws the answer of one scene: Markdown of one page, a PNG a field, CSV of the nodal results, VTU.
+"""Writes the answer of one scene: a page in Markdown, a PNG per field, CSV files of the nodal results, VTU.
 
 Reads solution.json and solution.npz of a directory, nothing else.
 """
@@ -54,14 +54,14 @@ def write(directory: Path) -> Path:
 
 
 def _nodes(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
-    """A row a node of each part."""
+    """One row per node of each part."""
     names = [part["name"] for part in record["parts"] for _ in range(part["start"], part["stop"])]
     columns = {"part": names} | _coordinates(arrays.get("nodes"), record["n"])
     return columns | {"displacement_mm": arrays["x"].tolist()}
 
 
 def _contacts(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
-    """A row a contact of each pair."""
+    """One row per contact of each pair."""
     names = [pair_name(pair) for pair in record["pairs"] for _ in range(pair["start"], pair["stop"])]
     columns = {"contact": names} | _coordinates(arrays.get("contact_nodes"), record["m"])
     return columns | {
@@ -85,7 +85,7 @@ def _write_csv(path: Path, columns: Columns) -> None:
 
 
 def _summary(record: dict[str, Any], arrays: dict[str, Array]) -> tuple[Rows, Rows]:
-    """What the page says of each part, and of each pair."""
+    """The figures of each part and of each pair on the page."""
     parts, pairs = [], []
     for part in record["parts"]:
         x = arrays["x"][part["start"] : part["stop"]]

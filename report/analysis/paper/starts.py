@@ -24,7 +24,7 @@ def scene_of(active: int) -> str:
 
 
 def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
-    """One record a load of Table 2: iterations, seconds and key of every start, ours and as printed."""
+    """One record per load of Table 2: iterations, seconds and key of every start, ours and as printed."""
     lines = []
     for active, printed in TABLE_2.items():
         of_scene = cells[cells["scene"] == scene_of(active)]
@@ -35,7 +35,7 @@ def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
             answered = row is not None and row["verdict"] in ANSWERED
             line[f"{start}_iterations"] = row["iterations"] if row and answered else None
             line[f"{start}_s"] = row["load_case_s"] if row and answered else None
-            line[f"{start}_says"] = seconds_text(row) if row else "not measured"
+            line[f"{start}_text"] = seconds_text(row) if row else "not measured"
             line[f"{start}_key"] = row["key"] if row else ""
             line[f"{start}_mu"] = figures_of(row, "start").get("mu") if row else None
             line[f"{start}_iterations_printed"], line[f"{start}_s_printed"] = printed.get(start, (None, None))
@@ -44,7 +44,7 @@ def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def no_more(line: Mapping[str, Any], suffix: str = "") -> bool | None:
-    """Whether Algorithm 5 needed no more iterations than STP1 and STP2; None where a number is missing."""
+    """Whether Algorithm 5 needed no more iterations than STP1 and STP2; None if a number is missing."""
     mine, *others = [as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)]
     if mine is None or not all(other is not None for other in others):
         return None

@@ -1,4 +1,4 @@
-"""The paper's claims, each with a verdict worked out from the rows."""
+"""The paper's claims, each with a verdict computed from the rows."""
 
 from __future__ import annotations
 
@@ -78,9 +78,9 @@ def _table(found: list[tuple[Claim, Verdict]]) -> Table:
         Column("verdict", lambda row: f"**{row['short']}**", "left"),
     ]
     caption = (
-        "*What the paper's sections 5 to 7 say, in our words, and what the rows say to it.* Every verdict is "
-        "worked out from the rows by a rule; the rules and the evidence follow, and the file has the keys of "
-        "all rows that a verdict stands on."
+        "*What sections 5 to 7 of the paper claim, in our words, and whether the rows confirm it.* Every "
+        "verdict is computed from the rows by a rule; the rules and the evidence follow, and the file has "
+        "the keys of all rows that a verdict is based on."
     )
     return Table("paper-claims", caption, pd.DataFrame(lines), columns)
 

@@ -46,9 +46,9 @@ def section(results: Results) -> Section | None:
 
 
 def _lines(cells: pd.DataFrame) -> pd.DataFrame:
-    """The cells of the paper's methods, each named in `method`, and those of the other solvers."""
+    """The cells of the paper's methods, with their name as `method`, and those of the other solvers."""
     named = [of_method(cells, name).assign(method=name) for name in METHODS]
-    return pd.concat([*named, cells[~cells["solver"].isin(["ipm", "gi"])]])
+    return pd.concat([*named, cells[~cells["solver"].isin({solver for solver, *_ in METHODS.values()})]])
 
 
 def _figure(cells: pd.DataFrame, n: int) -> Figure:
@@ -66,14 +66,14 @@ def _figure(cells: pd.DataFrame, n: int) -> Figure:
     caption = (
         f"*Working time against the active contacts, n = {n}*"
         + (f" (Figure {FIGURE[n]} of the paper)" if n in FIGURE else "")
-        + ": seconds a load case, without data preparation; below in number, above in % of m. Thick: "
-        "the paper's methods; thin: the other solvers. " + times_panel.MARKS.format(limit="the limit")
+        + ": seconds per load case, without data preparation; the number below, the percentage of m above. "
+        "Thick: the paper's methods; thin: the other solvers. " + times_panel.MARKS.format(limit="the limit")
     )
     return Figure(f"paper-figure-{n}", caption, drawing)
 
 
 def _order(lines: pd.DataFrame) -> list[str]:
-    """The method that occur: the paper's methods first."""
+    """The methods that occur, the paper's first."""
     found = in_order(lines, "method")
     return [name for name in METHODS if name in found] + [name for name in found if name not in METHODS]
 
@@ -94,9 +94,9 @@ def _crossings(cells: pd.DataFrame, shown: list[int]) -> Table:
         number("scenes compared", "scenes", whole),
     ]
     caption = (
-        "*Where one method overtakes the other* as more contacts close: the logarithm of the seconds a load "
-        "case, linear in the active share between two scenes. Where one of the two runs was stopped by the "
-        "clock only the interval is known."
+        "*Where one method overtakes the other* as more contacts close: linear interpolation of the "
+        "logarithm of the seconds per load case in the active share between two scenes. If one of the two "
+        "runs was stopped by the clock, only the interval is known."
     )
     return Table("paper-crossings", caption, pd.DataFrame(lines), columns)
 
@@ -118,7 +118,7 @@ def _worst(cells: pd.DataFrame, shown: list[int]) -> Table:
     columns += [Column(f"below that of {rival}?", _text(rival), "left") for rival in RIVALS]
     caption = (
         "*Is the interior-point method's worst case below Goldfarb–Idnani's?* The longest working time over "
-        "the scenes of a size; the better of the two forms is chosen for each scene. >: stopped by the clock."
+        "the scenes of a size; the better of the two forms is chosen on each scene. >: stopped by the clock."
     )
     return Table("paper-worst", caption, pd.DataFrame(lines), columns)
 
@@ -128,7 +128,7 @@ def _text(name: str) -> Callable[[Mapping[str, Any]], str]:
 
 
 def _times(cells: pd.DataFrame, n: int) -> Table:
-    """A line a scene, a column a method: the figure in numbers."""
+    """One line per scene, one column per method: the figure in numbers."""
     found = _lines(cells[cells["n"] == n])
     lines: dict[str, dict[str, Any]] = {}
     for row in records(found):
@@ -139,7 +139,7 @@ def _times(cells: pd.DataFrame, n: int) -> Table:
     table[names] = table[names].fillna("")
     columns = [word("scene", "scene"), Column("active", _active)]
     columns += [Column(name, _text(name)) for name in names]
-    caption = f"*The figure for n = {n} in numbers*: seconds a load case; > : stopped by the time limit."
+    caption = f"*The figure for n = {n} in numbers*: seconds per load case; >: stopped at the time limit."
     return Table(f"paper-times-{n}", caption, table, columns)
 
 

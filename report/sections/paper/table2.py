@@ -33,21 +33,21 @@ def _table(lines: list[dict[str, Any]], cells: pd.DataFrame) -> Table:
     for start, name in STARTS.items():
         columns += [
             Column(f"{name}: iterations", _pair(f"{start}_iterations", whole)),
-            Column(f"{name}: s", _pair(f"{start}_s", lambda s: significant(s), f"{start}_says")),
+            Column(f"{name}: s", _pair(f"{start}_s", lambda s: significant(s), f"{start}_text")),
         ]
     mu = sorted(ipm(cells)["tolerance"].dropna().unique())
     caption = (
         "*The starting points on the ten loads, ours | printed.* Ours: interior-point iterations to ε_μ = "
-        f"{' / '.join(map(tidy_power, mu))} N·mm (the paper does not state its own) and seconds a load case; "
-        "printed: Table 2 of the paper, seconds of its machine. STP1 and STP2 are as read from a secondary "
+        f"{' / '.join(map(tidy_power, mu))} N·mm (the paper does not state its own) and seconds per load "
+        "case; printed: Table 2 of the paper, on its machine. STP1 and STP2 are as read from a secondary "
         "source. Mehrotra's start is not in the paper."
     )
     return Table("paper-table2", caption, pd.DataFrame(lines), columns)
 
 
-def _pair(name: str, style: Callable[[object], str], says: str = "") -> Callable[[Mapping[str, Any]], str]:
+def _pair(name: str, style: Callable[[object], str], words: str = "") -> Callable[[Mapping[str, Any]], str]:
     def text(row: Mapping[str, Any]) -> str:
-        ours = row[says] if says else style(row[name])
+        ours = row[words] if words else style(row[name])
         printed = style(row[f"{name}_printed"])
         return ours if printed == MISSING else f"{ours} \\| {printed}"
 
@@ -85,7 +85,7 @@ def _against(rival: str, lines: list[dict[str, Any]]) -> str:
 
 
 def _starts(cells: pd.DataFrame) -> Table:
-    """Where each start lies, over the ten loads: why one needs more iterations than another."""
+    """Where each start lies over the ten loads, which explains the numbers of iterations."""
     scenes = [scene_of(active) for active in TABLE_2]
     of_loads = cells[cells["scene"].isin(scenes)]
     lines = []
@@ -110,8 +110,8 @@ def _starts(cells: pd.DataFrame) -> Table:
         Column("iterations", _range("iterations", whole)),
     ]
     caption = (
-        "*Where the starts lie*, least to most over the ten loads: the gap μ₀ from which the iteration has "
-        "to come down, and by how much y = Qλ − p is violated."
+        "*Where the starts lie*, the range over the ten loads: the gap μ₀ that the iteration has to reduce, "
+        "and the violation of y = Qλ − p."
     )
     return Table("paper-starts", caption, pd.DataFrame(lines), columns)
 

@@ -59,7 +59,7 @@ def _worst_below(measured: Measured) -> Iterator[Case]:
 
 @by_case("the size")
 def _good_when_known(measured: Measured) -> Iterator[Case]:
-    """The better form of Goldfarb–Idnani, chosen for each scene, against the interior-point method."""
+    """The better form of Goldfarb–Idnani on each scene against the interior-point method."""
     for n in sizes(measured.cells):
         found = _against(measured, n, BETTER)
         if not found:
@@ -85,7 +85,7 @@ def _against(measured: Measured, n: int, name: str) -> list[dict[str, Any]]:
 
 
 def _means(found: list[dict[str, Any]]) -> tuple[float, float, bool | None]:
-    """The two geometric means over the same scenes, and whether the first is the clearly smaller."""
+    """The two geometric means over the same scenes, and whether the first is clearly smaller."""
     mine, other = (geometric_mean(pd.Series([p[k] for p in found])) for k in ("at_least_a", "at_least_b"))
     cut = {f"cut_{k}": any(p[f"cut_{k}"] for p in found) for k in "ab"}
     return mine, other, is_faster({"at_least_a": mine, "at_least_b": other} | cut)
@@ -114,30 +114,30 @@ CLAIMS = [
         "agreement",
         "6",
         "The displacements of the two methods agree to 1e-7 mm.",
-        "The errors of both answers against the reference add up to at most that; it fails where they differ "
-        "by more.",
+        "The errors of both answers against the reference add up to at most that; it fails if they differ by "
+        "more.",
         _agree,
     ),
     Claim(
         "worst case",
         "6, Figures 5–7",
         "At large size the interior-point method's worst case is always below Goldfarb–Idnani's.",
-        "The longest time over the scenes of a size is below that of each form; the better form chosen on "
-        "each scene is given beside them and decides nothing.",
+        "The longest time over the scenes of a size is below that of each form; that of the better form on "
+        "each scene is given for information only.",
         _worst_below,
     ),
     Claim(
         "GI chosen well",
         "6",
-        "Goldfarb–Idnani is efficient where the size of the contact area is known beforehand.",
+        "Goldfarb–Idnani is efficient if the size of the contact area is known beforehand.",
         "Its better form on each scene is faster than the interior-point method in the geometric mean.",
         _good_when_known,
     ),
     Claim(
         "conclusion",
         "7",
-        "For large problems the interior-point method suits better than Goldfarb–Idnani.",
-        "At the largest size its mean and its worst case are below Goldfarb–Idnani's.",
+        "For large problems the interior-point method is better suited than Goldfarb–Idnani.",
+        "At the largest size its mean and worst case are below Goldfarb–Idnani's.",
         _conclusion,
     ),
 ]
