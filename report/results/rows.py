@@ -12,7 +12,7 @@ from harness.results.schema import of_kind
 from .older import as_today
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
-#: What tells the measurements of a run apart, but for their repeats and the cases of a series.
+#: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
 CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import jinja2
-
 from report.analysis.checks import warnings
 from report.document.blocks import Block, Figure, Section, Table
 from report.figures import style
 from report.results.reader import Results, read
 
 from .discovery import sections
+from .pages import template
 
 
 def write(directory: Path) -> Path:
@@ -41,15 +40,6 @@ def _made(results: Results) -> list[Section]:
     about = {"all": results, "ladders": results.on_ladders(True), "scenes": results.on_ladders(False)}
     made = [module.section(about[module.PLACE.about]) for module in sections()]
     return [section for section in made if section]
-
-
-def template(name: str) -> jinja2.Template:
-    """A template of report/writers/templates."""
-    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
-    environment = jinja2.Environment(
-        loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    return environment.get_template(name)
 
 
 def _save(section: Section, target: Path, machine: int) -> Section:

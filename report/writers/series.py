@@ -16,7 +16,8 @@ from report.figures import style
 from report.figures.maps import draw
 from report.results.series import Series, read
 
-from .markdown import save_block, template
+from .markdown import save_block
+from .pages import template
 
 MAPPED = (0.5, 0.95, 0.99)
 LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))

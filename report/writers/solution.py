@@ -10,14 +10,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
-from report.document.numbers import significant
 from report.figures import style
 from report.figures.answer import answer_figures, pair_name
 from report.figures.maps import Array
 
+from .pages import template
 from .vtu import write_vtu
 
 Columns = dict[str, list[Any]]
@@ -39,17 +38,12 @@ def write(directory: Path) -> Path:
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
-    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
-    environment = jinja2.Environment(
-        loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters["significant"] = significant
     path = directory / "answer.md"
-    template = environment.get_template("solution.md.j2")
     parts, pairs = _summary(record, arrays)
-    path.write_text(
-        template.render(record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu), "utf-8"
+    page = template("solution.md.j2").render(
+        record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu
     )
+    path.write_text(page, "utf-8")
     return path
 
 

@@ -103,7 +103,7 @@ def _setting(rows: dict[str, dict[str, Any] | None]) -> str:
         f"scene {row['scene']} ({row['active']:.0f} of {row['m']:.0f} active). Ours: CG to a relative "
         f"preconditioned residual of {listed([tidy_power(t) for t in tolerances])}, outer iterations to "
         f"ε_μ = {listed([tidy_power(t) for t in mu])} N·mm, nodes in lexicographic order unless the column "
-        "says open gaps last."
+        "states open gaps last."
     )
 
 

@@ -125,7 +125,8 @@ CLAIMS = [
     Claim(
         "half contact, dual",
         "6",
-        "With half of the contacts active it is for some problems also faster than on the dual problem.",
+        "With half of the contacts active it is, for some problems, also faster than Goldfarb–Idnani on the "
+        "dual problem.",
         "As before; one size on which it holds confirms it.",
         _half_dual,
     ),
