@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from harness.measurement.describe import Description
+from harness.measurement.resume import outdated
+from harness.measurement.row import Order, measured
 from harness.planning.plan import expand
 from harness.planning.suite import checked
 from harness.planning.timeouts import out_of_time_before
@@ -41,6 +44,23 @@ def test_limits_go_by_size(large):
 def test_too_slow_on_every_smaller_scene_is_not_run(large):
     rows = [row("4386/0107", 4386), row("4386/1471", 4386)]
     assert out_of_time_before(large, 6112, rows) == "4386/0107, 4386/1471"
+
+
+def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
+    (told,) = measured(Order([large], ["primal"], "4386/0107"), tmp_path).told
+    assert told == {"status": "not_run", "message": "too slow already on 4386/0107"}
+    assert not list(tmp_path.iterdir())
+    rows = [row("4386/0107", 4386), row("4386/1471", 4386, told["status"])]
+    assert out_of_time_before(large, 6112, rows) == "4386/0107, 4386/1471"
+    assert out_of_time_before(large, 6112, [row("6112/0600", 6112, told["status"], 40.0, tolerance=1e-3)])
+    assert not out_of_time_before(large, 6112, [row("6112/0600", 6112, told["status"], 39.0)])
+
+
+@pytest.mark.parametrize("status", ["time_limit", "not_run"])
+def test_a_row_out_of_time_stands_until_there_is_more_of_it(large, status):
+    known = {"scene_key": "s", "solver_version": "1", "solver_code": "c", "gated": large.gated}
+    rows = [row("6112/0600", 6112, status, t, limit_mm=large.limit_mm) | known for t in (40.0, 39.0)]
+    assert [outdated(r, large, Description(["primal"], "1", "c"), "s") for r in rows] == [False, True]
 
 
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-3])

@@ -14,8 +14,8 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import everything, no_answer, row, write_rows
 
+from report.analysis.drawn import drawn_cells, middle_scenes, omission_note
 from report.analysis.precision import pareto
-from report.analysis.shown import drawn, left_out, middle_scenes
 from report.analysis.standings import compare, standings
 from report.document.numbers import power, significant
 from report.figures import style
@@ -66,7 +66,7 @@ def test_standings_of_a_tiny_run(tiny: Path) -> None:
         {"a (dual)": 4.0, "b (primal)": 6.0, "c (dual)": math.nan, "d (dual)": math.nan}, nan_ok=True
     )
     assert table["within"].to_dict() == {"a (dual)": 2, "b (primal)": 2, "c (dual)": 1, "d (dual)": 0}
-    assert table.loc["d (dual)", ["outside", "outside_said_solved", "worst_error_mm"]].tolist() == [
+    assert table.loc["d (dual)", ["outside", "outside_claimed", "worst_error_mm"]].tolist() == [
         2,
         1,
         3e-6,
@@ -76,11 +76,11 @@ def test_standings_of_a_tiny_run(tiny: Path) -> None:
 
 def test_summary_says_which_solver_to_use(tiny: Path) -> None:
     text = write(tiny).read_text("utf-8")
-    assert "use **a (dual)**: within 1e-7 mm on both scenes, 4.00 s a load case" in text
-    assert "Next is b (primal), 1.5 times as long." in text
-    assert "At 100 active, c (dual) is faster (20 times)." in text
+    assert "use **a (dual)**: within 1e-7 mm on both scenes, 4.00 s per load case" in text
+    assert "Next is b (primal), which takes 1.5 times as long." in text
+    assert "At 100 active contacts, c (dual) is 20 times as fast." in text
     assert "1 run of 8 gave no answer (1 time limit)." in text
-    assert re.search(r"\| d \(dual\) +\| +0 of 2 \| +2 \(1 said solved\) \|", text)
+    assert re.search(r"\| d \(dual\) +\| +0 of 2 \| +2 \(1 reported solved\) \|", text)
 
 
 def test_a_failure_enters_no_mean_and_takes_its_scene_out_of_everyones(tmp_path: Path) -> None:
@@ -97,7 +97,9 @@ def test_lines_that_are_nearly_as_fast_are_named_as_such(tmp_path: Path) -> None
     rows = [row(LOW, solver, **times(solve_s=t)) for solver, t in (("a", 1.0), ("b", 1.1), ("c", 2.0))]
     text = write(write_rows(tmp_path, rows)).read_text("utf-8")
     assert "use **a (dual)**" in text
-    assert "As fast, to within 15%: b (dual) (1.10 s). Next is c (dual), 2.0 times as long." in text
+    assert (
+        "As fast, to within 15%: b (dual) (1.10 s). Next is c (dual), which takes 2.0 times as long." in text
+    )
 
 
 def test_no_solver_is_recommended_where_none_is_within_on_every_scene(tmp_path: Path) -> None:
@@ -122,8 +124,8 @@ def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
     text = write(write_rows(tmp_path, rows)).read_text("utf-8")
     assert "come from 2 machines: First (1 row) and Second (1 row)." in text
     first, second = re.split("# Machine 2: Second", text)
-    assert "1.00 s a load case" in first
-    assert "9.00 s a load case" in second
+    assert "1.00 s per load case" in first
+    assert "9.00 s per load case" in second
     own = pd.read_csv(tmp_path / "report" / "machine2-summary.csv")
     assert own["load_case_s_4386"].tolist() == pytest.approx([9.0])
 
@@ -188,7 +190,7 @@ def test_what_is_damaged_or_mixed_is_said(tmp_path: Path) -> None:
     assert "The file of scene 4386/1000 could not be read." in text
     assert "2 of 4 measurements" in text
     assert "a was run in several versions: 1.0 and 1.1." in text
-    assert "In 1 row (a) the threads in effect were not those asked for" in text
+    assert "In 1 row (a) the number of threads in effect was not the requested one" in text
     assert "measurements.jsonl, line 3, could not be read" in text
 
 
@@ -215,13 +217,13 @@ def variants(counts: dict[str, int]) -> list[dict[str, Any]]:
 def test_of_many_variants_those_run_on_few_scenes_are_not_drawn(tmp_path: Path) -> None:
     rows = [*variants({"": 4, "x": 3, "y": 2, "z": 1}), row("4386/0000", "b")]
     results = read(write_rows(tmp_path / "many", rows))
-    assert set(drawn(results)["series"]) == {"a (dual)", "a (dual) x", "a (dual) y", "b (dual)"}
-    assert "Not drawn: 1 variant of a run on fewer than half of its scenes" in left_out(results)
+    assert set(drawn_cells(results)["method"]) == {"a (dual)", "a (dual) x", "a (dual) y", "b (dual)"}
+    assert "Not drawn: 1 variant of a run on fewer than half of its scenes" in omission_note(results)
     text = write(tmp_path / "many").read_text("utf-8")
     assert re.search(r"\| a \(dual\) z +\| ✓ within", text)
     few = read(write_rows(tmp_path / "few", variants({"": 4, "x": 3, "z": 1})))
-    assert len(drawn(few)) == 8
-    assert left_out(few) == ""
+    assert len(drawn_cells(few)) == 8
+    assert omission_note(few) == ""
 
 
 def test_a_size_of_one_scene_is_left_out_beside_sizes_of_several(tmp_path: Path) -> None:

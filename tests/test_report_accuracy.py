@@ -13,8 +13,8 @@ from synthetic_results import no_answer, row, write_rows
 
 from report.analysis.advice import advice
 from report.analysis.checks import planned_measurements
+from report.analysis.drawn import best_tolerances
 from report.analysis.precision import pareto, settings, swept, with_errors
-from report.analysis.shown import best
 from report.document.blocks import Figure, Section, Table, Text
 from report.figures import style
 from report.results.reader import Results, read
@@ -58,7 +58,7 @@ def text(section: Section | None) -> str:
 
 
 def prices(found: Results) -> Any:
-    return table(price_list.section(found), "price-list").data.set_index("series")
+    return table(price_list.section(found), "price-list").data.set_index("method")
 
 
 def advised(found: Results) -> Any:
@@ -78,9 +78,9 @@ def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> No
     rows += [answer(f"4386/{k}", "liar", 7, 2.0, 1e-9) for k in (200, 300, 400)]
     written = write(write_rows(tmp_path, rows)).read_text("utf-8")
     for title in (
-        *("Which settings for which accuracy", "Time against achieved accuracy", "Price list of accuracy"),
-        *("Tolerance asked, error achieved", "Residual against error", "Performance profiles"),
-        *("Many load cases on one assembly", "How stable the times are"),
+        *("Recommended settings by accuracy", "Time against achieved accuracy", "The cost of accuracy"),
+        *("Requested tolerance and achieved error", "Residuals and displacement error"),
+        *("Performance profiles", "Many load cases on one assembly", "Repeatability of the times"),
     ):
         assert f"## {title}\n" in written
     for picture in (tmp_path / "report").glob("*.png"):
@@ -150,14 +150,14 @@ def test_prices_are_the_fastest_measured_run_that_is_accurate_enough(tmp_path: P
     line = prices(results(tmp_path, sweep())).loc["honest (dual)"]
     # errors are half the tolerance: 10^-k is first met at k digits, which take 0.01 · 2^k s
     assert [line[f"seconds_1e-{k}"] for k in (3, 5, 7, 9)] == pytest.approx([0.08, 0.32, 1.28, 5.12])
-    assert line["factor_a_digit"] == pytest.approx(2.0)
+    assert line["factor_per_digit"] == pytest.approx(2.0)
 
 
-def test_the_factor_a_digit_follows_the_times(tmp_path: Path) -> None:
+def test_the_factor_per_digit_follows_the_times(tmp_path: Path) -> None:
     rows = [answer(LOW, "a", k, 0.01 * 5**k, 10.0**-k) for k in (3, 4, 5, 6)]
-    assert prices(results(tmp_path / "a", rows)).loc["a (dual)", "factor_a_digit"] == pytest.approx(5.0)
+    assert prices(results(tmp_path / "a", rows)).loc["a (dual)", "factor_per_digit"] == pytest.approx(5.0)
     short = [answer(LOW, "a", k, 0.01 * 5**k, 10.0 ** (-3 - k / 10)) for k in (3, 4, 5, 6)]
-    assert math.isnan(prices(results(tmp_path / "b", short)).loc["a (dual)", "factor_a_digit"])
+    assert math.isnan(prices(results(tmp_path / "b", short)).loc["a (dual)", "factor_per_digit"])
 
 
 def test_a_price_is_the_geometric_mean_over_the_scenes(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_what_was_not_reached_is_shown_as_such(tmp_path: Path) -> None:
     rows = [*sweep(), answer(LOW, "once", 9, 1.0, 1e-9)]
     rows += [row(s, "lost", tolerance=1e-6, **no_answer("crashed")) for s in (LOW, HIGH)]
     found = table(price_list.section(results(tmp_path, rows)), "price-list")
-    shown = {record["series"]: record for record in found.data.to_dict("records")}
+    shown = {record["method"]: record for record in found.data.to_dict("records")}
     words = {
         name: [column.show(line) for column in found.columns[2:6]]  # type: ignore[arg-type]
         for name, line in shown.items()
@@ -186,13 +186,13 @@ def test_a_reference_too_coarse_for_an_accuracy_does_not_judge_it(tmp_path: Path
     line = prices(found).loc["honest (dual)"]
     assert line["state_1e-7"] == "reached"
     assert line["state_1e-9"] == "cannot be judged"
-    assert advised(found).loc[1e-9, "use"] == "cannot be judged: the references are known to 1.0e-9 mm"
+    assert advised(found).loc[1e-9, "use"] == "cannot be judged: the reference error bound is 1.0e-9 mm"
     many = table(amortised.section(found), "amortised")
     assert many.columns[2].show(many.data.iloc[-1].to_dict()) == "cannot be judged"  # type: ignore[arg-type]
 
 
 def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:
-    trust = asked_achieved.trust(results(tmp_path, sweep())).set_index("series")
+    trust = asked_achieved.trust(results(tmp_path, sweep())).set_index("method")
     assert trust.loc["liar (dual)", "worst_ratio"] == pytest.approx(900, rel=0.02)
     # its error is 900 times the tolerance, on two scenes: outside at 7, 8 and 9 digits, not at 10
     assert trust.loc["liar (dual)", ["solved", "above_tolerance", "tight", "tight_outside"]].tolist() == [
@@ -203,13 +203,13 @@ def test_a_tolerance_that_is_not_met_is_found_out(tmp_path: Path) -> None:
 
 def test_only_runs_called_solved_can_break_their_word(tmp_path: Path) -> None:
     rows = changed(sweep(), "liar", status="inaccurate")
-    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("series")
+    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("method")
     assert "liar (dual)" not in trust.index
 
 
 def test_what_the_reference_leaves_open_is_in_the_solvers_favour(tmp_path: Path) -> None:
     rows = [answer(LOW, "a", k, 1.0, 10.0**-k + 5e-11, reference_bound_mm=6e-11) for k in (6, 8, 10)]
-    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("series")
+    trust = asked_achieved.trust(results(tmp_path, rows)).set_index("method")
     assert trust.loc["a (dual)", "above_tolerance"] == 0
 
 
@@ -217,10 +217,10 @@ def test_small_residuals_beside_a_large_error_are_named(tmp_path: Path) -> None:
     tiny = {"primal_residual": 1e-15, "dual_residual": 1e-12, "duality_gap": 1e-13}
     section = residual_error.section(results(tmp_path, changed(sweep(), "coarse", **tiny)))
     # the largest ratio: 5e-3 mm at 2 digits against 5e-11 mm of honest at 10
-    assert "A small residual is no proof. On scene" in text(section)
+    assert "A small residual does not prove a small error. On scene" in text(section)
     assert "coarse (dual) 1e-2 has residuals (1.0e-15 mm, 1.0e-12 N, 1.0e-13 N·mm)" in text(section)
     assert "an error of 5.0e-3 mm against 5.0e-11 mm" in text(section)
-    line = table(section, "residual-error").data.set_index("series").loc["coarse (dual)"]
+    line = table(section, "residual-error").data.set_index("method").loc["coarse (dual)"]
     assert [line["small_residual"], line["outside"], line["worst_error_mm"]] == [8, 8, 5e-3]
 
 
@@ -231,13 +231,13 @@ def test_residuals_that_do_tell_are_said_to(tmp_path: Path) -> None:
         if (e := r["displacement_error_mm"]) is not None
     ]
     section = residual_error.section(results(tmp_path, rows))
-    assert "did tell the two apart" in text(section)
+    assert "do tell them apart" in text(section)
 
 
 def test_one_small_residual_beside_a_large_one_deceives_nobody(tmp_path: Path) -> None:
     rows = [answer(LOW, "good", k, 1.0, 1e-9, primal_residual=1e-9, dual_residual=1e-9) for k in (5, 7, 9)]
     rows.append(answer(LOW, "bad", 7, 1.0, 1e-5, primal_residual=1e-12, dual_residual=1e-3))
-    assert "did tell the two apart" in text(residual_error.section(results(tmp_path, rows)))
+    assert "do tell them apart" in text(residual_error.section(results(tmp_path, rows)))
 
 
 def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
     rows += [answer("4386/100", "seldom", 7, 0.01, 1e-9), answer("4386/100", "a", 9, 5.0, 1e-10)]
     late = answer("4386/105", "b", 7, 9.0, 1e-9) | no_answer("time_limit")
     rows += [answer("4386/105", "a", 7, 9.0, 1e-9), late, answer("4386/105", "c", 7, 0.1, 1e-6)]
-    found = table(profiles.section(results(tmp_path, rows)), "profiles").data.set_index("series")
+    found = table(profiles.section(results(tmp_path, rows)), "profiles").data.set_index("method")
     counts = found[["load_cases", "answered", "within_1", "within_2", "within_10"]]
     assert counts.loc["a (dual)"].tolist() == [6, 6, 4, 4, 6]  # ratios 1, 1, 1, 3, 8 and 1
     assert counts.loc["b (dual)"].tolist() == [6, 5, 3, 4, 5]  # ratios 3, 2, 1, 1, 1 and none
@@ -324,21 +324,21 @@ def test_unstable_times_are_warned_of_with_the_reason(tmp_path: Path) -> None:
     rows += repeats(9, (1.0, 3.0), iterations=[20, 31]) + repeats(6, (0.01, 0.03))
     rows.append(answer(LOW, "b", 9, 1.0, 1e-9))
     section = stability.section(results(tmp_path, rows))
-    assert "Of 4 times measured several times, 3 spread by more than 20%" in text(section)
+    assert "Of 4 times measured repeatedly, 3 vary by more than 20%" in text(section)
     assert "The other 1 time was measured once" in text(section)
     found = table(section, "unstable-times").data.set_index("label")
     line = found.loc["a (dual) 1e-8"]
     assert line[["median_s", "least_s", "most_s"]].tolist() == [1.6, 1.0, 2.0]
     assert line["spread"] == pytest.approx(1.0 / 1.6)
-    assert line["why"] == "the same iterations each time: the machine, slowest at noon"
-    assert found.loc["a (dual) 1e-9", "why"] == "20 to 31 iterations: the solver does not repeat itself"
+    assert line["why"] == "the same iterations each time, so the machine; slowest at noon"
+    assert found.loc["a (dual) 1e-9", "why"] == "20 to 31 iterations: the solver is not deterministic"
     assert found.loc["a (dual) 1e-6", "why"].startswith("shorter than 0.05 s")
 
 
 def test_the_best_of_several_tolerances_stands_for_a_solver(tmp_path: Path) -> None:
     found = results(tmp_path, sweep())
     # honest is within 1e-7 mm from 7 digits on, and the fastest there; liar at 10 digits alone
-    lines = best(found).drop_duplicates("label").set_index("series")["tolerance"]
+    lines = best_tolerances(found).drop_duplicates("label").set_index("method")["tolerance"]
     assert lines[["honest (dual)", "liar (dual)"]].tolist() == [1e-7, 1e-10]
     shown = table(summary.section(found), "summary").data["label"]
     assert {"honest (dual) 1e-7", "liar (dual) 1e-10"} < set(shown)

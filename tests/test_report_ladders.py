@@ -13,7 +13,15 @@ from matplotlib.image import imread
 from synthetic_results import no_answer, write_rows
 from synthetic_results import row as any_row
 
-from report.analysis.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, outcome
+from report.analysis.outcomes import (
+    CORRECT,
+    CORRECT_UNCLAIMED,
+    NO_ANSWER,
+    UNJUDGED,
+    WRONG_CLAIMED,
+    WRONG_UNCLAIMED,
+    outcome,
+)
 from report.figures import style
 from report.results.reader import read
 from report.sections.ladders import rungs_in_order
@@ -66,12 +74,12 @@ def directory(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("verdict", "status", "found"),
     [
-        ("within", "solved", RIGHT),
-        ("within", "iteration_limit", DOUBTED),
-        ("outside", "inaccurate", KNEW),
-        ("outside", "solved", LIED),
+        ("within", "solved", CORRECT),
+        ("within", "iteration_limit", CORRECT_UNCLAIMED),
+        ("outside", "inaccurate", WRONG_UNCLAIMED),
+        ("outside", "solved", WRONG_CLAIMED),
         ("cannot_be_judged", "solved", UNJUDGED),
-        ("no_answer", "time_limit", NONE),
+        ("no_answer", "time_limit", NO_ANSWER),
     ],
 )
 def test_outcomes(verdict: str, status: str, found: str) -> None:
@@ -81,7 +89,7 @@ def test_outcomes(verdict: str, status: str, found: str) -> None:
 def test_the_worst_answer_is_counted_and_named(directory: Path) -> None:
     write(directory)
     table = pd.read_csv(directory / "report" / "honesty.csv").set_index("label")
-    names = [RIGHT, DOUBTED, KNEW, LIED, NONE, UNJUDGED]
+    names = [CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, WRONG_CLAIMED, NO_ANSWER, UNJUDGED]
     assert table[names].T.to_dict("list") == {
         "ipm (dual)": [4, 0, 0, 0, 0, 0],
         "a (dual)": [1, 0, 1, 1, 1, 0],
@@ -110,10 +118,15 @@ def test_each_ladder_breaks_at_its_first_wrong_rung(directory: Path) -> None:
 
 def test_in_house_solvers_are_held_to_their_bound_up_to_1e12(directory: Path) -> None:
     text = write(directory).read_text("utf-8")
-    assert "right in 3 of 3 rows up to cond(K) = 1e12; in all their 4 rows, no wrong answer is called" in text
+    assert (
+        "correct in 3 of 3 rows up to cond(K) = 1e12; in all their 4 rows, no wrong answer is reported"
+        in text
+    )
     write_rows(directory, [r | (WRONG if r["solver"] == "ipm" and r["scene"] == EASY else {}) for r in ROWS])
     text = write(directory).read_text("utf-8")
-    assert "right in 2 of 3 rows up to cond(K) = 1e12; in all their 4 rows, 1 wrong answer is called" in text
+    assert (
+        "correct in 2 of 3 rows up to cond(K) = 1e12; in all their 4 rows, 1 wrong answer is reported" in text
+    )
 
 
 def test_what_the_model_refuses_is_listed_and_not_awaited(directory: Path) -> None:
@@ -125,7 +138,7 @@ def test_what_the_model_refuses_is_listed_and_not_awaited(directory: Path) -> No
 def test_rungs_and_scenes_are_reported_apart(directory: Path) -> None:
     text = write(directory).read_text("utf-8")
     assert re.findall("^## (.*)", text, re.M) == [
-        "Where each solver breaks, and whether it knows",
+        "Where each solver fails, and whether it reports it",
         "The rungs",
         "Machine and method",
     ]
@@ -138,7 +151,7 @@ def test_rungs_and_scenes_are_reported_apart(directory: Path) -> None:
 
 def test_without_a_rung_there_is_no_section_on_ladders(tmp_path: Path) -> None:
     text = write(write_rows(tmp_path, [any_row("4386/0052", "ipm")])).read_text("utf-8")
-    assert "breaks" not in text
+    assert "Where each solver fails" not in text
     assert not (tmp_path / "report" / "ladders.png").exists()
 
 

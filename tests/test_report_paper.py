@@ -30,11 +30,11 @@ from scipy.stats import linregress
 from synthetic_results import no_answer
 
 from report.analysis.fit import exponent
+from report.analysis.paper.crossings import BETTER, below, compared, worst
+from report.analysis.paper.selection import cells_of_paper, of_method
 from report.figures import style
-from report.sections import printed
+from report.results import printed
 from report.sections.paper import figures5_7, table1, table2, table3, table4
-from report.sections.paper.crossings import BETTER, below, compared, worst
-from report.sections.paper.selection import cells_of_paper, method
 from report.writers.markdown import write
 
 
@@ -165,7 +165,7 @@ def test_table_3_fits_what_the_rows_say_and_says_what_is_missing(tmp_path: Path)
     rows = changed(paper_rows(), lambda r: gi("primal")(r) and r["scene"] == "scaling/11308", **late(33.0))
     made = table3.section(results(tmp_path, rows))
     fits = made.blocks[0].data.set_index("quantity")  # type: ignore[union-attr]
-    assert fits.loc["s a CG iteration", "IPM"] == pytest.approx(2.0, abs=1e-4)
+    assert fits.loc["s per CG iteration", "IPM"] == pytest.approx(2.0, abs=1e-4)
     assert fits.loc["data preparation", ["IPM", "GI dual"]].tolist() == pytest.approx([3.0, 3.0])
     assert fits.loc["outer iterations", "IPM"] == pytest.approx(0.3, abs=0.05)
     assert fits.loc["working memory", "GI primal"] == pytest.approx(2.0, abs=1e-6)
@@ -207,7 +207,7 @@ def test_a_crossing_stands_where_it_was_put(tmp_path: Path) -> None:
     pair = compared(cells_of_paper(results(tmp_path, rows)), 4386, "GI dual", "IPM")
     assert [c.at for c in pair.crossings] == pytest.approx([0.3], abs=1e-9)
     assert (pair.faster_at_low, pair.crossings[0].faster) == ("IPM", "GI dual")
-    assert str(pair).endswith("at 5 % IPM is faster; at 30 % GI dual takes over")
+    assert str(pair).endswith("at 5 % IPM is faster; at 30 % GI dual becomes faster")
 
 
 def test_a_crossing_beside_a_stopped_run_is_an_interval(tmp_path: Path) -> None:
@@ -215,7 +215,7 @@ def test_a_crossing_beside_a_stopped_run_is_an_interval(tmp_path: Path) -> None:
     rows += _curve("GI dual", lambda s: 1.0, [0.1, 0.4, 0.8])
     stopped = changed(rows, lambda r: gi("dual")(r) and r["active"] < 300, **late(5.0))
     pair = compared(cells_of_paper(results(tmp_path, stopped)), 4386, "GI dual", "IPM")
-    assert str(pair) == "at 10 % IPM is faster; between 10 and 40 % GI dual takes over"
+    assert str(pair) == "at 10 % IPM is faster; between 10 and 40 % GI dual becomes faster"
     # stopped before the other's time: nothing follows
     early = changed(rows, lambda r: gi("dual")(r) and r["active"] < 300, **late(1.5))
     pair = compared(cells_of_paper(results(tmp_path / "early", early)), 4386, "GI dual", "IPM")
@@ -256,5 +256,5 @@ def test_runs_without_an_answer_stay_in_the_figures_and_tables(tmp_path: Path) -
 def test_of_several_tolerances_the_tightest(tmp_path: Path) -> None:
     at = ("4386/0052", 4386, 52)
     rows = [ipm_row(*at, tolerance=t, solve_s=s) for t, s in ((1e-8, 1.0), (1e-14, 3.0))]
-    cells = method(cells_of_paper(results(tmp_path, rows)), "IPM")
+    cells = of_method(cells_of_paper(results(tmp_path, rows)), "IPM")
     assert cells["load_case_s"].tolist() == [3.0]

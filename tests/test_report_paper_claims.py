@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from paper_results import Row, Rows, changed, gi, ipm, late, paper_rows, plain, results
 
+from report.analysis.paper.claims import CLAIMS
 from report.sections.paper import claims
 
 
@@ -97,7 +98,7 @@ CHANGES: list[tuple[str, Callable[[Row], bool], Row, str]] = [
 def test_a_verdict_follows_the_rows(
     tmp_path: Path, claim: str, chosen: Callable[[Row], bool], figures: Row, word: str
 ) -> None:
-    judge = next(c.judge for c in claims.CLAIMS if c.name == claim)
+    judge = next(c.judge for c in CLAIMS if c.name == claim)
     rows = changed(paper_rows(), chosen, **figures)
     assert claims.word_of(judge(claims.known_from(results(tmp_path, rows)))) == word
 
@@ -105,11 +106,11 @@ def test_a_verdict_follows_the_rows(
 def test_without_its_rows_a_claim_is_not_measured(tmp_path: Path) -> None:
     found = verdicts(tmp_path, [plain("4386/0052", 4386, 52, solver="piqp")])
     assert set(found.values()) == {"not measured"}
-    assert len(found) == len(claims.CLAIMS)
+    assert len(found) == len(CLAIMS)
 
 
 def test_every_claim_can_turn_out_otherwise() -> None:
-    assert {claim for claim, *_ in CHANGES} == {claim.name for claim in claims.CLAIMS}
+    assert {claim for claim, *_ in CHANGES} == {claim.name for claim in CLAIMS}
 
 
 def test_rows_are_found_by_what_was_run_not_by_its_name(tmp_path: Path) -> None:

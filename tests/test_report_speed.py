@@ -42,7 +42,7 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
     section = speed.section(results(tmp_path, rows))
     assert section is not None
     table, yardsticks, figure = section.blocks
-    line = table.data[table.data["series"] == "newton (dual)"].iloc[0]
+    line = table.data[table.data["method"] == "newton (dual)"].iloc[0]
     found = [line[name] for name in ("to_library", "to_library_least", "to_library_most")]
     assert found == pytest.approx([0.3, 0.1, 0.4])
     assert (line["scenes"], line["runs"]) == (2, 6)
@@ -82,7 +82,7 @@ def test_with_preparation_the_ratio_is_to_the_library_that_is_fastest_with_its_o
 def test_lines_of_several_numbers_of_threads_are_named_without_it(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0, threads=k) for k in (1, 2)]
     cases = speed.load_cases(results(tmp_path, rows))
-    assert cases["series"].tolist() == ["newton (dual)"] * 2
+    assert cases["method"].tolist() == ["newton (dual)"] * 2
 
 
 def test_a_code_of_the_same_method_that_ran_out_of_time_bounds_the_ratio(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_a_code_of_the_same_method_that_ran_out_of_time_bounds_the_ratio(tmp_pat
     assert section is not None
     (table,) = section.blocks
     assert table.data["ratio"].tolist() == pytest.approx([2 / 40, 2 / 50])
-    assert table.data["series"].tolist() == ["gi (primal)"] * 2
+    assert table.data["method"].tolist() == ["gi (primal)"] * 2
     assert "0.0500" in table.markdown
     assert "< 0.0400" in table.markdown
     assert "> 50" in table.markdown
@@ -106,7 +106,7 @@ def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path:
     rows += [timed(LOW, "ipm-fast", 9.0, variant="bad", verdict="outside")]
     section = ingredients.section(results(tmp_path, rows))
     assert section is not None
-    data = section.blocks[0].data.set_index("series")
+    data = section.blocks[0].data.set_index("method")
     line = data.loc["ipm-fast (dual) no finish"]
     assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
     assert data.loc["ipm-fast (dual) bad", "within"] == 0
@@ -120,7 +120,7 @@ def test_variants_that_are_not_drawn_stand_in_the_tables_alone(tmp_path: Path) -
     section = speed.section(results(tmp_path, rows))
     assert section is not None
     table, _, figure = section.blocks
-    assert table.data["series"].str.contains("without").sum() == 3
+    assert table.data["method"].str.contains("without").sum() == 3
     legend = [text.get_text() for text in figure.drawing.legends[0].get_texts()]
     assert legend == ["ipm-fast (dual)", "piqp (dual)"]
     assert "Not drawn: 3 variants of ipm-fast" in figure.caption
@@ -135,7 +135,7 @@ def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: P
         rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
     section = scaling.section(results(tmp_path, rows))
     assert section is not None
-    data = section.blocks[0].data.set_index("series")
+    data = section.blocks[0].data.set_index("method")
     assert data.loc["newton (dual)", "load_case_s"] == pytest.approx(1.5)
     assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
     assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)

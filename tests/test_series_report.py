@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from report.results import series as statistics
-from report.results.series import QUANTILES, convergence, exceedance, quantile_maps, read
+from report.analysis import remaining_gaps as statistics
+from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
+from report.results.series import Series, read
 from report.writers.series import write
 
 CASES, M = 240, 12
@@ -76,7 +77,7 @@ def test_the_interval_of_a_quantile_covers_it_as_often_as_it_says(tmp_path: Path
     hits = 0
     for _ in range(200):
         cases = pd.DataFrame({"max_gap_mm": rng.uniform(size=100)})
-        found = convergence(statistics.Series({}, {}, cases, series.gaps, None, series.fasteners, []))
+        found = convergence(Series({}, {}, cases, series.gaps, None, series.fasteners, []))
         row = found[(found["cases"] == 100) & (found["quantile"] == 0.5)].iloc[0]
         ordered = np.sort(cases["max_gap_mm"])
         assert (row["low_mm"], row["high_mm"]) == (ordered[39], ordered[60])
@@ -98,7 +99,7 @@ def test_the_report_and_its_files(swept: bool, tmp_path: Path) -> None:
     maps = pd.read_csv(tmp_path / "report" / "quantile-maps.csv")
     np.testing.assert_allclose(maps["q0.95_mm"], np.quantile(gaps, 0.95, axis=0))
     assert "239 within, 1 no answer" in text.replace("1 no answer, 239 within", "239 within, 1 no answer")
-    assert "76.9 cases a second of work" in text
+    assert "76.9 cases per second of work" in text
 
 
 def test_a_series_without_an_answer_or_nodes(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from report.figures import style
-from report.writers.solution import _figures
+from report.figures.answer import answer_figures
 
 KINDS = ("fasteners", "installed_fasteners", "clamps")
 
@@ -41,7 +41,7 @@ def figures(width: float, height: float, parts: int, kinds: int, name: str = "pa
         "nodes": np.tile(nodes, (parts, 1)),
         "contact_nodes": np.tile(nodes, (parts - 1, 1)),
     }
-    return _figures(record, arrays)
+    return answer_figures(record, arrays)
 
 
 def texts_of(figure: Figure) -> list[Text]:
@@ -114,7 +114,7 @@ def test_nodes_on_a_line_have_a_picture() -> None:
     }
     record = {"m": 0, "parts": [part], "pairs": [], "marks": {}}
     arrays = {"x": np.arange(4.0), "lam": np.empty(0), "nodes": nodes}
-    (figure,) = _figures(record, arrays).values()
+    (figure,) = answer_figures(record, arrays).values()
     axes, _ = figure.axes
     assert np.ptp(axes.get_xlim()) == pytest.approx(9.0)
     assert np.ptp(axes.get_ylim()) > 0

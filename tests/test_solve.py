@@ -84,7 +84,7 @@ value = 1e-3
 def _without_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes most of the time: only where a test looks at pictures."""
     if "pictures" not in request.fixturenames:
-        monkeypatch.setattr("report.writers.solution._figures", lambda *_: {})
+        monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: 
         np.testing.assert_allclose(found["x"][own], np.linalg.solve(K, f[own]), atol=1e-12)
     assert record["closest_mm"] == pytest.approx(found["gap_after"].min(), rel=1e-9)
     assert any("not called for" in line and "piqp was not run" in line for line in record["skipped"])
-    assert "No quadratic program was called for" in (tmp_path / "out" / "answer.md").read_text()
+    assert "No quadratic program was needed" in (tmp_path / "out" / "answer.md").read_text()
     assert "linear solve" in record["shown"]
 
 

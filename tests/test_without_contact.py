@@ -74,7 +74,7 @@ def test_its_page_has_no_contacts(path: Path) -> None:
     out = path.parent / "out"
     answered(path, out)
     page = (out / "answer.md").read_text()
-    assert "No quadratic program was called for: the scene has no contact." in page
+    assert "No quadratic program was needed: the scene has no contact." in page
     assert "displacement.png" in page
     assert not any(word in page for word in ("gap.png", "gap before", "closed contacts", "contacts.csv"))
     assert {file.name for file in out.iterdir()} == {

@@ -26,6 +26,7 @@ class Description:
     forms: list[Form]
     version: str
     code: str
+    in_house: bool = False
 
     @property
     def usual_form(self) -> Form:
@@ -61,7 +62,7 @@ def describe(suite: Suite) -> list[Description]:
 
 
 def main() -> None:
-    from solvers.registry import make_solver, solver_version
+    from solvers.registry import in_house, make_solver, solver_version
 
     question = json.loads(sys.stdin.read())
     plugin = Path(question["plugin"]) if question["plugin"] else None
@@ -70,7 +71,9 @@ def main() -> None:
         try:
             solver = make_solver(name, options, plugin)
             code = code_of(solver)
-            found.append(asdict(Description(list(solver.forms), solver_version(name, plugin), code)))
+            found.append(
+                asdict(Description(list(solver.forms), solver_version(name, plugin), code, in_house(name)))
+            )
         except InputError as error:
             faults += [asdict(fault) for fault in error.faults]
     print()

@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from harness.planning.plan import Measurement
+from harness.planning.timeouts import OUT_OF_TIME
 from harness.results import records
 from harness.results.records import Row
 from problems.scene import read_scene
@@ -49,6 +50,6 @@ def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> b
     drawn = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
     solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
     before = (*solved, asked, row.get("gated"), drawn)
-    out_of_time = row["status"] == "time_limit" and row["time_limit_s"] < m.time_limit_s
+    out_of_time = row["status"] in OUT_OF_TIME and row["time_limit_s"] < m.time_limit_s
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
     return now != before or out_of_time or out_of_memory

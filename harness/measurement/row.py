@@ -12,6 +12,7 @@ from typing import Any
 
 from harness.planning.plan import Measurement
 from harness.results.records import Row
+from harness.results.schema import MEASURED, MEASURED_OF_CASES, STEPS
 from harness.verification.ground_truth import Ground
 from harness.verification.judge import Judgement
 from problems.build import prepared
@@ -22,16 +23,6 @@ from solvers.base import Form
 from .describe import Description
 from .machine import installed_version, machine
 from .process import measure
-
-#: A row's fields that the worker tells of; null where it does not.
-TOLD = (
-    *("status", "message", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s"),
-    *("form_s", "load_s", "solver_reported_s", "data_mib", "peak_rss_mib", "threads", "kernels", "details"),
-    *("cholesky_s", "product_s", "stderr", "answer"),
-)
-#: The same of a case of a series: how many were solved at once, and whether others were before.
-TOLD_OF_SERIES = ("batched", "warm")
-CLOCKS = ("load_s", "form_s", "convert_s", "prepare_s", "setup_s", "solve_s")
 
 
 @dataclass(frozen=True)
@@ -63,7 +54,7 @@ def measured(order: Order, answers: Path) -> Measured:
     """Carry out the order; the answers' files go into that directory."""
     start, batch = time.monotonic(), order.batch
     if order.hopeless:
-        not_run: Row = {"status": "time_limit", "message": f"not run: too slow already on {order.hopeless}"}
+        not_run: Row = {"status": "not_run", "message": f"too slow already on {order.hopeless}"}
         told = [not_run] * len(batch)
     elif batch[0].form in order.forms:
         told = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
@@ -108,11 +99,15 @@ def one_row(
     limit_mm, judgement = base.limit_mm(m.limit_mm), Judgement("no_answer", base.reference.bound_mm)
     if told.get("answer"):
         judgement = base.judge_file(answer, limit_mm)
-    of_series: Row = {"case": m.case, "series": series, **{name: told.get(name) for name in TOLD_OF_SERIES}}
+    of_series: Row = {
+        "case": m.case,
+        "series": series,
+        **{name: told.get(name) for name in MEASURED_OF_CASES},
+    }
     if m.case is None:
         of_series = {}
-    told = {name: told.get(name) for name in TOLD}
-    known = [told[name] for name in CLOCKS if told[name] is not None]
+    told = {name: told.get(name) for name in MEASURED}
+    known = [told[name] for name in ("load_s", *STEPS) if told[name] is not None]
     return {
         "key": m.key,
         **{name: getattr(m, name) for name in ("suite", "scene", "source", "solver", "form", "variant")},
@@ -130,6 +125,7 @@ def one_row(
         "overhead_s": elapsed - sum(known) if m.case is None else None,
         "machine": here,
         "scene_key": base.scene.key,
+        "in_house": solver.in_house,
         "solver_version": solver.version,
         "solver_code": solver.code,
         "rivetbench_version": installed_version("rivetbench"),

@@ -7,6 +7,9 @@ from problems.scene import read_scene
 
 from .plan import Measurement
 
+#: The statuses of a measurement that ran out of its time, or was not started because it would have.
+OUT_OF_TIME = ("time_limit", "not_run")
+
 
 def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
     """The scenes that show that m would run out of time, or "".
@@ -22,7 +25,7 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
     own = [row for row in rows if tuple(row[name] for name in same) == mine]
     looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
     for row in looser:
-        if row["status"] == "time_limit" and m.time_limit_s <= row["time_limit_s"]:
+        if row["status"] in OUT_OF_TIME and m.time_limit_s <= row["time_limit_s"]:
             return f"{m.scene} at {row['tolerance']:g}"
     if read_scene(m.source).on_ladder:
         return ""
@@ -33,6 +36,6 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
     late = [
         row
         for row in there
-        if row["status"] == "time_limit" and m.time_limit_s <= growth * row["time_limit_s"]
+        if row["status"] in OUT_OF_TIME and m.time_limit_s <= growth * row["time_limit_s"]
     ]
     return ", ".join(sorted({row["scene"] for row in late})) if len(late) == len(there) else ""

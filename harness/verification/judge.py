@@ -20,16 +20,14 @@ that, an answer within the limit may have it either way.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
+from harness.results.schema import Verdict
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 
 from .reference import Reference
-
-Verdict = Literal["within", "outside", "cannot_be_judged", "no_answer"]
 
 #: The accuracy asked for, max-norm of the displacement difference, mm.
 LIMIT_MM = 1e-7

@@ -1,1 +1,1 @@
-"""What the rows mean: standings, fits, precision, advice, checks."""
+"""What the rows mean: rankings, fits, accuracy, advice, warnings."""

@@ -12,13 +12,13 @@ from .standings import TIE, geometric_mean, preferred, seconds_within
 
 
 def advice(results: Results, n: int) -> str | None:
-    """A paragraph for one size: the fastest of the lines that are within the limit on all its scenes."""
+    """A paragraph for one size: the fastest of the lines within the limit on all its scenes."""
     cells = results.of_size(n)
     if cells.empty:
         return None
     seconds = seconds_within(cells)
     complete = seconds.dropna(axis=1)
-    words = _best(results, cells, complete) if complete.columns.size else _nobody(results, seconds)
+    words = _best(results, cells, complete) if complete.columns.size else _none_complete(results, seconds)
     return f"- **{_range(cells)}:** {' '.join([*words, *_unanswered(cells)])}"
 
 
@@ -28,7 +28,7 @@ def _range(cells: pd.DataFrame) -> str:
     if pd.isna(least):
         return f"n = {n}, {counted(scenes, 'scene')}"
     active = f"{least:.0f}" if least == most else f"{least:.0f} to {most:.0f}"
-    return f"n = {n}, {counted(scenes, 'scene')}, {active} active"
+    return f"n = {n}, {counted(scenes, 'scene')}, {active} active contacts"
 
 
 def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list[str]:
@@ -38,10 +38,10 @@ def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list
     every = {1: "the one scene", 2: "both scenes"}.get(scenes, f"all {scenes} scenes")
     mean = "" if scenes == 1 else " (geometric mean)"
     once = cells.loc[cells["label"] == best, "once_s"].median()
-    prepared = f", after {significant(once, 2)} s once an assembly" if once >= 0.005 else ""
+    prepared = f", after {significant(once, 2)} s per assembly" if once >= 0.005 else ""
     words = [
         f"use **{best}**: within {results.limit} on {every}, "
-        f"{significant(time)} s a load case{mean}{prepared}."
+        f"{significant(time)} s per load case{mean}{prepared}."
     ]
     ties = [str(label) for label in means.index[1:] if means[label] <= TIE * time]
     if ties:
@@ -49,16 +49,20 @@ def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list
         words.append(f"As fast, to within {TIE - 1:.0%}: {listed(pairs)}.")
     behind = [str(label) for label in means.index if means[label] > TIE * time]
     if behind:
-        words.append(f"Next is {behind[0]}, {significant(means[behind[0]] / time, 2)} times as long.")
+        words.append(
+            f"Next is {behind[0]}, which takes {significant(means[behind[0]] / time, 2)} times as long."
+        )
     elif not ties:
-        words.append("No other is within the limit on every scene.")
+        words.append("No other solver is within the limit on every scene.")
     return words + _beaten(cells, [best, *ties])
 
 
 def _beaten(cells: pd.DataFrame, best: list[str]) -> list[str]:
-    """Where another line is clearly faster than the one recommended."""
-    series = cells.loc[cells["label"].isin(best), "series"]
-    rivals = cells["label"].isin(best) | ~cells["series"].isin(series)  # not the same at other tolerances
+    """On which scenes another line is clearly faster than the one recommended."""
+    method = cells.loc[cells["label"].isin(best), "method"]
+    rivals = cells["label"].isin(best) | ~cells["method"].isin(
+        method
+    )  # not the same method at other tolerances
     seconds = seconds_within(cells[rivals])
     active = cells.drop_duplicates("scene").set_index("scene")["active"]
     recommended = seconds[best].min(axis=1)
@@ -70,18 +74,18 @@ def _beaten(cells: pd.DataFrame, best: list[str]) -> list[str]:
         times = (recommended[scenes] / seconds.loc[scenes, label]).max()
         at = listed([f"{active[scene]:.0f}" for scene in scenes])
         upto = "up to " if len(scenes) > 1 else ""
-        words.append(f"At {at} active, {label} is faster ({upto}{significant(times, 2)} times).")
+        words.append(f"At {at} active contacts, {label} is {upto}{significant(times, 2)} times as fast.")
     return words
 
 
-def _nobody(results: Results, seconds: pd.DataFrame) -> list[str]:
+def _none_complete(results: Results, seconds: pd.DataFrame) -> list[str]:
     counts = seconds.notna().sum()
     if not counts.size:
         return [f"no answer is within {results.limit}."]
     most = [str(label) for label in counts.index[counts == counts.max()]]
     verb = "is" if len(most) == 1 else "are each"
     return [
-        f"nothing is within {results.limit} on every scene. "
+        f"no solver is within {results.limit} on every scene. "
         f"{listed(most)} {verb} within it on {counts.max()} of {len(seconds)}."
     ]
 

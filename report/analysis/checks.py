@@ -1,4 +1,4 @@
-"""What a reader must know before believing the figures: mixtures and damage in the results."""
+"""What a reader must know before trusting the figures: mixed and damaged results."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from typing import Any
 from report.document.numbers import counted, listed
 from report.results.reader import Results
 
+from .code import code_warnings
+
 
 def warnings(results: Results) -> list[str]:
-    """One sentence a fault, the gravest first."""
+    """One sentence per fault, the gravest first."""
     checks = (_machines, _unfinished, _versions, _threads)
-    return [*(sentence for check in checks for sentence in check(results)), *results.warnings]
+    found = [sentence for check in checks for sentence in check(results)]
+    return [*code_warnings(results.rows), *found, *results.warnings]
 
 
 def _machines(results: Results) -> list[str]:
@@ -34,19 +37,19 @@ def _unfinished(results: Results) -> list[str]:
         return []
     return [
         f"The run is not finished: {made} of {planned} measurements of {suite.get('name', 'the suite')} "
-        "are there. Run it again into the same directory and it goes on."
+        "are done. Run it again with the same directory to continue."
     ]
 
 
 def _scenes_to_measure(results: Results) -> list[str]:
-    """The suite's scenes without those that the model is to refuse."""
+    """The suite's scenes without those that the model rejects, as it should."""
     problems = results.problems
     refused = set(problems.loc[problems["refused"].notna(), "scene"]) if "refused" in problems else set()
     return [scene for scene in results.suite.get("scenes", []) if scene not in refused]
 
 
 def planned_measurements(suite: dict[str, Any]) -> int:
-    """How many rows the expanded suite file asks for; what two entries ask for counts once."""
+    """How many rows the expanded suite file plans; what two entries plan counts once."""
     planned = set()
     for solver in suite.get("solver", []):
         patterns = solver.get("scenes", ["*"])
@@ -80,6 +83,6 @@ def _threads(results: Results) -> list[str]:
         return []
     solvers = listed(sorted(other["solver"].unique()))
     return [
-        f"In {counted(len(other), 'row')} ({solvers}) the threads in effect were not those asked for: "
-        "the tables give those in effect."
+        f"In {counted(len(other), 'row')} ({solvers}) the number of threads in effect was not the "
+        "requested one; the tables give the one in effect."
     ]

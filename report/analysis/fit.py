@@ -1,4 +1,4 @@
-"""Exponents: the slope of a straight line through the logarithms."""
+"""Exponents: the slope of a straight line in log–log."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FEWEST = 5  # sizes that a fit is asked to stand on
+FEWEST = 5  # sizes that a fit should have
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Exponent:
 
 
 def exponent(n: Sequence[float], y: Sequence[float]) -> Exponent | None:
-    """Least squares in log–log; what is missing or not positive takes no part. None below three points.
+    """Least squares in log–log; missing and non-positive values are ignored. None below three sizes.
 
     The standard error is sqrt(Σr² / (k − 2) / Σ(log n − mean)²), r the residuals of k points.
     """

@@ -1,4 +1,4 @@
-"""How a measurement on a rung ended: right or wrong, and whether the solver knew."""
+"""How a measurement on a rung ended: correct or wrong, and whether the solver reported it as solved."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from typing import Any
 
 import pandas as pd
 
-RIGHT, DOUBTED = "right, called solved", "right, not called solved"
-KNEW, LIED = "wrong, not called solved", "wrong, called solved"
-NONE, UNJUDGED = "no answer", "cannot be judged"
+CORRECT, CORRECT_UNCLAIMED = "correct, reported solved", "correct, not reported solved"
+WRONG_UNCLAIMED, WRONG_CLAIMED = "wrong, not reported solved", "wrong, reported solved"
+NO_ANSWER, UNJUDGED = "no answer", "cannot be judged"
 
 
 def outcome(row: Mapping[str, Any] | pd.Series[Any]) -> str:
-    """Right is within the row's limit."""
-    said_solved = row["status"] == "solved"
+    """Correct: within the row's limit."""
+    claimed = row["status"] == "solved"
     match row["verdict"]:
         case "within":
-            return RIGHT if said_solved else DOUBTED
+            return CORRECT if claimed else CORRECT_UNCLAIMED
         case "outside":
-            return LIED if said_solved else KNEW
+            return WRONG_CLAIMED if claimed else WRONG_UNCLAIMED
         case "cannot_be_judged":
             return UNJUDGED
-    return NONE
+    return NO_ANSWER
 
 
 def with_outcomes(cells: pd.DataFrame) -> pd.DataFrame:
@@ -32,6 +32,6 @@ def with_outcomes(cells: pd.DataFrame) -> pd.DataFrame:
     return taken.assign(ladder=names[1], rung=names[2], outcome=taken.apply(outcome, axis=1))
 
 
-def holds(cells: pd.DataFrame) -> pd.Series[bool]:
-    """Where the answer is right, whatever was said of it."""
-    return cells["outcome"].isin([RIGHT, DOUBTED])
+def is_correct(cells: pd.DataFrame) -> pd.Series[bool]:
+    """Where the answer is correct, whatever the solver reported."""
+    return cells["outcome"].isin([CORRECT, CORRECT_UNCLAIMED])

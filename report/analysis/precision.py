@@ -1,75 +1,66 @@
-"""What the sections on accuracy share: errors, the Pareto front, and which settings reach an accuracy."""
+"""Errors, Pareto fronts and the settings that reach an accuracy: shared by the sections on accuracy."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from report.figures import style
 from report.results.reader import Results
 
-from .shown import drawn, styles_of
+from .drawn import drawn_cells
 
-#: mm: the accuracies that prices and advice are given for.
+#: The accuracies for which costs and settings are given, mm.
 ACCURACIES = (1e-3, 1e-5, 1e-7, 1e-9)
-#: So many tolerances of one series on one scene make a curve; fewer are points.
-ENOUGH = 3
-EXACT = 1e-16  # mm: what an error of zero counts as
-WRONG = 1.0  # mm: more than any gap here
-#: A reference whose bound exceeds this share of an accuracy cannot judge it.
-SHARE = 0.1
+#: The fewest tolerances of one method on one scene that make a curve; fewer are points.
+CURVE_POINTS = 3
+ZERO_ERROR_MM = 1e-16  # counts as an error of zero
+LARGEST_ERROR_MM = 1.0  # more than any gap here; larger errors are drawn there
+#: A reference whose error bound exceeds this share of an accuracy cannot judge it.
+BOUND_SHARE = 0.1
 
 
 def with_errors(cells: pd.DataFrame) -> pd.DataFrame:
-    """The cells with `error`, mm: the displacement error, never below the bound on the reference's own,
-    missing where there was no answer.
+    """The cells with `error`, mm: the displacement error, at least the reference error bound; missing if
+    there was no answer.
     """
     bound = cells.groupby("scene")["reference_bound_mm"].transform("max")
     measured = cells["displacement_error_mm"].where(cells["load_case_s"].notna())
-    return cells.assign(reference_bound_mm=bound, error=measured.clip(lower=bound).clip(lower=EXACT))
+    return cells.assign(reference_bound_mm=bound, error=measured.clip(lower=bound).clip(lower=ZERO_ERROR_MM))
 
 
 def in_view(cells: pd.DataFrame) -> pd.DataFrame:
-    """For figures: errors above WRONG are drawn there."""
-    return cells.assign(error=cells["error"].clip(upper=WRONG))
+    """For figures: larger errors become LARGEST_ERROR_MM."""
+    return cells.assign(error=cells["error"].clip(upper=LARGEST_ERROR_MM))
 
 
 def curves(cells: pd.DataFrame) -> set[str]:
-    """The series with ENOUGH tolerances on a scene."""
-    tolerances = cells.groupby(["series", "scene"])["tolerance"].nunique()
-    return set(tolerances.index.get_level_values("series")[tolerances >= ENOUGH])
-
-
-def looks(results: Results, cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """The looks of the series in some of the cells drawn: those without a curve there are marks alone."""
-    joined = curves(cells)
-    styles = styles_of(results, cells)
-    return {s: look if s in joined else style.marker_only(look) for s, look in styles.items()}
+    """The methods with at least CURVE_POINTS tolerances on a scene."""
+    tolerances = cells.groupby(["method", "scene"])["tolerance"].nunique()
+    return set(tolerances.index.get_level_values("method")[tolerances >= CURVE_POINTS])
 
 
 def swept(results: Results) -> pd.DataFrame:
-    """The cells drawn, with errors; none of them where no series has a curve."""
-    cells = with_errors(drawn(results))
+    """The cells drawn, with errors; none if no method has a curve."""
+    cells = with_errors(drawn_cells(results))
     return cells if curves(cells) else cells.iloc[:0]
 
 
 def pareto(points: pd.DataFrame, time: str = "load_case_s") -> pd.DataFrame:
-    """The points that no other beats in both `error` and `time`, by growing error."""
+    """The points that no other beats in both `error` and `time`, by increasing error."""
     ordered = points.sort_values(["error", time])
     return ordered[ordered[time] < ordered[time].cummin().shift(fill_value=math.inf)]
 
 
 def judged(cells: pd.DataFrame, accuracy: float) -> bool:
-    """Whether the references of some cells are good enough to say that an error is ≤ accuracy."""
-    return not cells["reference_bound_mm"].max() > SHARE * accuracy
+    """Whether the references of some cells are accurate enough to decide that an error is ≤ accuracy."""
+    return not cells["reference_bound_mm"].max() > BOUND_SHARE * accuracy
 
 
 def settings(cells: pd.DataFrame, accuracy: float, load_cases: float = math.inf) -> pd.Series[float]:
-    """Seconds a load case by label, the fastest first, of those with an error ≤ accuracy on every scene
-    of `cells`: the geometric mean over the scenes. What is paid once an assembly is shared by `load_cases`.
+    """Seconds per load case by label, the fastest first, of those with an error ≤ accuracy on every scene of
+    `cells`: the geometric mean over the scenes. The time per assembly is shared by `load_cases`.
     """
     cost = cells["load_case_s"] + cells["once_s"].fillna(0.0) / load_cases
     good = cells.assign(cost=cost)[cells["error"] <= accuracy]

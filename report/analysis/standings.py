@@ -1,8 +1,8 @@
-"""How the solvers stand: answers within the limit first, then time.
+"""The ranking of the solvers: answers within the limit first, then time.
 
-Times of different solvers are averaged only over the same scenes. At each size, the lines that are
-within the limit on more than half of its scenes are compared, by the geometric mean over those
-scenes that all of them answered within the limit. What failed is counted and enters no mean.
+Times of different solvers are averaged only over the same scenes. At each size, the lines within the limit on
+more than half of its scenes are compared by the geometric mean over those scenes that all of them answered
+within the limit. Failures are counted, but enter no mean.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import pandas as pd
 from report.results.labels import in_order
 from report.results.reader import Results
 
-#: Lines at most this many times slower than the fastest count as equally fast: single runs on a
-#: shared machine differ by as much.
+#: Lines that take at most this many times as long as the fastest count as equally fast: single runs on
+#: a shared machine vary by as much.
 TIE = 1.15
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """The geometric means of one size: seconds a load case by label, over `common` of `scenes`."""
+    """The geometric means at one size: seconds per load case by label, over `common` of `scenes`."""
 
     n: int
     scenes: list[str]
@@ -36,25 +36,22 @@ def geometric_mean(values: pd.Series[float]) -> float:
 
 
 def seconds_within(cells: pd.DataFrame) -> pd.DataFrame:
-    """Seconds a load case by scene (rows) and label (columns), missing where not within the limit."""
+    """Seconds per load case by scene (rows) and label (columns), missing if not within the limit."""
     within = cells[(cells["verdict"] == "within") & cells["load_case_s"].notna()]
     table = within.pivot_table(index="scene", columns="label", values="load_case_s", aggfunc="first")
     return table.reindex(index=cells.drop_duplicates("scene").sort_values("active")["scene"])
 
 
 def preferred(seconds: pd.Series[float], cells: pd.DataFrame) -> pd.DataFrame:
-    """A line a series with the setting to use, the fastest first: `label` (the index), `series`,
-    `tolerance` and `seconds`.
+    """One line per method with the setting to use, the fastest first: `label` (the index), `method`,
+    `tolerance` and `seconds`. It is the tightest of the tolerances that are as fast as the method's fastest.
 
-    It is the tightest tolerance of those that are as fast as the series' fastest: what costs nothing
-    is not given away.
-
-    seconds : by label, of the settings that come into question.
+    seconds : by label, of the settings to choose from.
     """
-    known = cells.drop_duplicates("label").set_index("label")[["series", "tolerance"]].loc[seconds.index]
+    known = cells.drop_duplicates("label").set_index("label")[["method", "tolerance"]].loc[seconds.index]
     known = known.assign(seconds=seconds)
-    as_fast = known["seconds"] <= TIE * known.groupby("series")["seconds"].transform("min")
-    tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("series")
+    as_fast = known["seconds"] <= TIE * known.groupby("method")["seconds"].transform("min")
+    tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("method")
     return tightest.sort_values("seconds")
 
 
@@ -67,8 +64,8 @@ def compare(results: Results, n: int) -> Comparison:
 
 
 def standings(results: Results) -> pd.DataFrame:
-    """One line a label, the best first: share of scenes within the limit, then time relative to the
-    fastest on the scenes it did answer.
+    """One line per label, the best first: by the share of scenes within the limit, then by time relative to
+    the fastest on the scenes it answered.
     """
     cells = results.cells[results.cells["status"] != "unsupported"]
     comparisons = [compare(results, n) for n in results.sizes]
@@ -82,13 +79,13 @@ def standings(results: Results) -> pd.DataFrame:
         outside = line[line["verdict"] == "outside"]
         record = {
             "label": label,
-            "series": line["series"].iloc[0],
+            "method": line["method"].iloc[0],
             "solver": line["solver"].iloc[0],
             "form": line["form"].iloc[0],
             "scenes": len(line),
             "within": int(verdicts.get("within", 0)),
             "outside": len(outside),
-            "outside_said_solved": int((outside["status"] == "solved").sum()),
+            "outside_claimed": int((outside["status"] == "solved").sum()),
             "cannot_be_judged": int(verdicts.get("cannot_be_judged", 0)),
             "no_answer": len(missed),
             "no_answer_because": ", ".join(f"{k} {_words(s)}" for s, k in Counter(missed).most_common()),

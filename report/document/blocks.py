@@ -1,10 +1,10 @@
-"""What a section of the report is made of: text, tables and figures."""
+"""What a section of the report consists of: text, tables and figures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
@@ -22,7 +22,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table as shown. `show` makes the text of a cell from its row of the data."""
+    """A column of a table as shown. `show` turns a row of the data into the text of a cell."""
 
     heading: str
     show: Callable[[Mapping[str, Any]], str]
@@ -37,9 +37,14 @@ def word(heading: str, name: str) -> Column:
     return Column(heading, lambda row: str(row[name] or MISSING).replace("|", r"\|"), "left")
 
 
+def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The lines of a frame as dictionaries."""
+    return frame.to_dict("records")  # type: ignore[return-value]
+
+
 @dataclass(frozen=True)
 class Table:
-    """A table: `columns` of it in the report, all of `data` with all its digits in NAME.csv beside it."""
+    """A table: its `columns` in the report, all of `data` with all digits in NAME.csv beside it."""
 
     kind: ClassVar[str] = "table"
     name: str
@@ -49,9 +54,9 @@ class Table:
 
     @property
     def markdown(self) -> str:
-        records: list[dict[str, Any]] = self.data.to_dict("records")  # type: ignore[assignment]
+        lines = records(self.data)
         shown = pd.DataFrame(
-            {c.heading: [c.show(record) for record in records] for c in self.columns}, dtype=object
+            {c.heading: [c.show(line) for line in lines] for c in self.columns}, dtype=object
         )
         align = [c.align for c in self.columns]
         text = shown.to_markdown(index=False, disable_numparse=True, colalign=align)
@@ -60,7 +65,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, saved as NAME.png; `caption` says what to see in it."""
+    """A picture, saved as NAME.png; `caption` explains it."""
 
     kind: ClassVar[str] = "figure"
     name: str
@@ -75,3 +80,13 @@ Block = Text | Table | Figure
 class Section:
     title: str
     blocks: list[Block]
+
+
+@dataclass(frozen=True)
+class Place:
+    """The place of a section in the report, by increasing `number`, and the results it is given: those on
+    the rungs of ladders, on all other scenes, or all.
+    """
+
+    number: int
+    about: Literal["scenes", "ladders", "all"] = "scenes"

@@ -1,4 +1,4 @@
-"""Figures as text: three significant digits, '–' where there is none."""
+"""Numbers as text: three significant digits, '–' if there is none."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ MISSING = "–"
 
 
 def significant(value: object, digits: int = 3) -> str:
-    """0.0912, 12.3, 1230; powers of ten (4.1e-9) below 0.001 and from 100 000."""
+    """0.0912, 12.3, 1230; with a power of ten (4.1e-9) below 0.001 and from 100 000."""
     number = as_number(value)
     if number is None:
         return MISSING
@@ -35,7 +35,7 @@ def power(value: object, digits: int = 3) -> str:
 
 
 def tidy_power(value: object) -> str:
-    """1e-7, 2.5e-7: a power of ten with no digit more than needed."""
+    """1e-7, 2.5e-7: with a power of ten and no more digits than needed."""
     mantissa, _, exponent = power(value).partition("e")
     return f"{float(mantissa):g}e{exponent}" if exponent else mantissa
 
@@ -52,7 +52,7 @@ def signed(value: object) -> str:
 
 
 def as_number(value: object) -> float | None:
-    """The value as a float, None where it is missing, not finite or not a number."""
+    """The value as a float; None if it is missing, not finite or not a number."""
     if isinstance(value, bool) or value is None:
         return None
     try:
@@ -68,12 +68,12 @@ def listed(words: list[str]) -> str:
 
 
 def span(least: str, most: str) -> str:
-    """'3 to 8', or '3' where both are the same."""
+    """'3 to 8', or '3' if both are the same."""
     return least if least == most else f"{least} to {most}"
 
 
 def spread(name: str) -> Callable[[Mapping[str, Any]], str]:
-    """Of a row, '0.12 (0.1 to 0.2)': its value of that name, and those that end in _least and _most."""
+    """For a row, '0.12 (0.1 to 0.2)': its value of that name, and those with the endings _least and _most."""
 
     def text(row: Mapping[str, Any]) -> str:
         middle = significant(row[name])

@@ -1,1 +1,1 @@
-"""How figures look."""
+"""The figures: their style, and drawings that several sections share."""

@@ -1,4 +1,4 @@
-"""The map: every solver on every rung of every ladder, as a picture."""
+"""Every solver on every rung of every ladder, as one picture."""
 
 from __future__ import annotations
 
@@ -9,22 +9,29 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from report.analysis.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED
+from report.analysis.outcomes import (
+    CORRECT,
+    CORRECT_UNCLAIMED,
+    NO_ANSWER,
+    UNJUDGED,
+    WRONG_CLAIMED,
+    WRONG_UNCLAIMED,
+)
 
 from . import style
 
 ROW, COLUMN = 0.18, 0.15  # inches
 GAP = 0.6  # between ladders, in columns
-ABROAD = 1.9  # inches beside the cells, for the names of the lines
+LABELS = 1.9  # inches to the left of the cells, for the names of the lines
 
-#: Face, hatch and mark of an outcome: told apart by brightness too.
+#: Face, hatch and mark of an outcome, distinct in greyscale too.
 LOOKS: dict[str, tuple[str, str, str]] = {
-    RIGHT: (style.BLUE, "", ""),
-    DOUBTED: ("#A9CFE8", "", ""),
+    CORRECT: (style.BLUE, "", ""),
+    CORRECT_UNCLAIMED: ("#A9CFE8", "", ""),
     UNJUDGED: ("white", "", "?"),
-    NONE: ("#E6E6E6", "", "–"),
-    KNEW: ("white", "//////", ""),
-    LIED: (style.VERMILLION, "", "×"),
+    NO_ANSWER: ("#E6E6E6", "", "–"),
+    WRONG_UNCLAIMED: ("white", "//////", ""),
+    WRONG_CLAIMED: (style.VERMILLION, "", "×"),
 }
 
 
@@ -45,8 +52,8 @@ def ladder_map(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[st
 
 
 def _panels(ladders: dict[str, list[str]]) -> list[list[str]]:
-    """The ladders, row by row of the picture, as many as fit beside each other."""
-    room = (style.WIDTH - ABROAD) / COLUMN
+    """The ladders row by row, as many as fit side by side."""
+    room = (style.WIDTH - LABELS) / COLUMN
     panels: list[list[str]] = [[]]
     used = 0.0
     for name, rungs in ladders.items():
@@ -76,7 +83,7 @@ def _panel(
             textcoords="offset points", ha="center", fontsize=8, weight="bold", annotation_clip=False,
         )  # fmt: skip
         x += GAP
-    room = (style.WIDTH - ABROAD) / COLUMN
+    room = (style.WIDTH - LABELS) / COLUMN
     axes.set(xlim=(-0.6, max(x - GAP, room) - 0.4), ylim=(len(order) - 0.4, -0.6))
     axes.set_xticks(ticks, names, rotation=90, fontsize=6.5)
     axes.set_yticks(range(len(order)), order, fontsize=8)
@@ -89,5 +96,5 @@ def _cell(axes: Axes, x: float, y: float, outcome: str) -> None:
     face, hatch, mark = LOOKS[outcome]
     looks: Any = {"facecolor": face, "hatch": hatch, "edgecolor": "#999999", "linewidth": 0.4}
     axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, **looks))
-    ink = "white" if outcome == LIED else "#555555"
+    ink = "white" if outcome == WRONG_CLAIMED else "#555555"
     axes.text(x, y + 0.03, mark, ha="center", va="center", color=ink, fontsize=8, weight="bold")

@@ -1,4 +1,4 @@
-"""Maps of the junction: a field of the contact nodes, and the borders of a part of them."""
+"""Maps of the junction: a field on the contact nodes, and the outline of some of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Grid = tuple[Array, Array, NDArray[np.intp]]
 
 
 def grid_of(nodes: Array) -> Grid | None:
-    """x, y and the place of each node where the nodes are a full tensor grid, else None."""
+    """x, y and the place of each node if the nodes are a full tensor grid, else None."""
     x, column = np.unique(np.round(nodes[:, 0], 6), return_inverse=True)
     y, row = np.unique(np.round(nodes[:, 1], 6), return_inverse=True)
     place = row * len(x) + column
@@ -22,7 +22,7 @@ def grid_of(nodes: Array) -> Grid | None:
 
 
 def draw(axes: Axes, nodes: Array, values: Array, norm: Normalize, colours: str) -> ScalarMappable:
-    """A field of the nodes in true proportions: cells where they are a grid, dots where they are not."""
+    """A field on the nodes in true proportions: cells if they are a grid, otherwise dots."""
     axes.set(aspect="equal", ylabel="y, mm")
     axes.grid(visible=False)
     grid = grid_of(nodes)
@@ -50,5 +50,5 @@ def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
 
 
 def _edges(nodes: Array) -> Array:
-    """The borders of the cells that belong to nodes: half-way between them, and the ends of the grid."""
+    """The borders of the nodes' cells: half-way between the nodes, and the ends of the grid."""
     return np.concatenate([nodes[:1], (nodes[1:] + nodes[:-1]) / 2, nodes[-1:]])

@@ -1,4 +1,4 @@
-"""The figure at the head of a report: every solver on every scene."""
+"""The first figure of a report: every solver on every scene."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from . import style
 
 ROW = 0.26  # inches
 GAP = 0.3  # between sizes, in columns
-HEADED = 1.8  # columns that the heading of a size takes at least
-FEWEST = 7.0  # columns that the figure has room for at least: cells of few scenes stay small
-WIDEST = 19.0  # columns of a strip at most, unless one size has more
-SLOWEST = 100.0  # times the fastest of a scene: the pale end of the shading
+HEADED = 1.8  # columns, the least width of the heading of a size
+FEWEST = 7.0  # columns, the least width of the figure: cells of few scenes stay small
+WIDEST = 19.0  # columns, the largest width of a strip, unless one size has more
+SLOWEST = 100.0  # times as long as the fastest of a scene: the pale end of the shading
 SHORT = {"memory_limit": "memory", "iteration_limit": "iterations", "unsupported": "n/a"}
 
 
 def scoreboard(cells: pd.DataFrame, standings: pd.DataFrame) -> Figure:
-    """A row a line of the standings, a column a scene by size and active contacts; what is too wide
+    """One row per line of the standings, one column per scene by size and active contacts; what is too wide
     continues in a further strip below.
 
-    Where the answer is within the limit, seconds a load case on a shade of blue (dark: the fastest of
-    the scene; pale: 100 times as long); where it is not, its error in mm on hatching; where there is
-    none, the reason. At the right, the number of scenes within the limit.
+    If the answer is within the limit, seconds per load case on a shade of blue (dark: the fastest of the
+    scene; pale: 100 times as long); if it is not, its error in mm on hatching; if there is none, the reason.
+    On the right, the number of scenes within the limit.
     """
     scenes = cells.drop_duplicates("scene").sort_values(["n", "active", "scene"])
     places = _strips(scenes)
@@ -49,7 +49,7 @@ def scoreboard(cells: pd.DataFrame, standings: pd.DataFrame) -> Figure:
 
 
 def _strips(scenes: pd.DataFrame) -> list[dict[str, float]]:
-    """The place of each scene in its strip: sizes side by side as far as there is room."""
+    """The place of each scene in its strip: as many sizes side by side as fit."""
     strips: list[dict[str, float]] = [{}]
     start = 0.0
     for _, group in scenes.groupby("n"):

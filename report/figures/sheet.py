@@ -1,7 +1,7 @@
 """A sheet of maps of one region, each in true proportions, with one colour bar.
 
-All its sizes are known beforehand. A layout engine would find them by drawing every label several times,
-which takes longer than the picture.
+All sizes are known in advance. A layout engine would find them by drawing every label several times, which
+takes longer than the picture.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from .maps import Array
 
 # inches
 LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.2, 0.35, 0.5
-BESIDE, BELOW = 0.5, 0.4  # between maps: below one there is the next one's title
+BESIDE, BELOW = 0.5, 0.4  # between maps; the title of the next one is below a map
 NAME_LEFT, NAME_BELOW = 0.6, 0.27  # of an axis, from the map
-LOWEST, TALLEST = 0.4, 5.5  # a row, which holds "y, mm"; a map
-LETTER = 0.09  # of a title, at most on average
+LOWEST, TALLEST = 0.4, 5.5  # of a row, which has room for "y, mm"; of a map
+LETTER = 0.09  # of a title, an upper bound on average
 ENTRY, LINE = 1.7, 0.22  # of a legend
-BAR, FROM_MAPS, SHORTEST = 0.18, 0.25, 1.0  # a colour bar: its width, its distance, its least height
+BAR, FROM_MAPS, SHORTEST = 0.18, 0.25, 1.0  # of a colour bar: width, distance, least height
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Sheet:
     legend_columns: int
 
     def finished(self, drawn: ScalarMappable, label: str) -> Figure:
-        """The sheet with the colour bar of what was drawn, and a legend of the labelled marks."""
+        """The sheet with the colour bar of what was drawn and a legend of the labelled marks."""
         self.figure.colorbar(drawn, cax=self.bar, label=label)
         found = [axes.get_legend_handles_labels() for axes in self.axes]
         named = {text: mark for marks, texts in found for mark, text in zip(marks, texts, strict=True)}
@@ -43,9 +43,9 @@ class Sheet:
 
 
 def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int) -> Sheet:
-    """An empty map of one region for each title, row by row; the outer ones have numbers at their axes.
+    """An empty map of one region for each title, row by row; the outer ones have tick labels.
 
-    low, high : the region's corners (x, y), mm. marks : so many kinds go into the legend.
+    low, high : the region's corners (x, y), mm. marks : the number of legend entries.
     """
     rows = -(-len(titles) // columns)
     ratio = (high[1] - low[1]) / (high[0] - low[0])
@@ -70,7 +70,7 @@ def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int) 
         row, column = divmod(k, columns)
         axes = placed(LEFT + column * across, tall - top - row * down - height, width, height)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, mm", ylabel="y, mm")
-        axes.set_title(title, y=1.0)  # given places spare a search for them
+        axes.set_title(title, y=1.0)  # a given place spares a search for it
         axes.xaxis.set_label_coords(0.5, -NAME_BELOW / height)
         axes.yaxis.set_label_coords(-NAME_LEFT / width, 0.5)
         axes.grid(visible=False)

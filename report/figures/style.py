@@ -1,8 +1,8 @@
 """One look for all figures, readable in greyscale and by colour-blind readers.
 
-A solver keeps its colour and marker in every figure of every report; filled markers on solid lines are
-the dual form, hollow ones on dashed lines the primal; variants differ in dashes, tint and
-the part of the marker that is filled. Colours are those of Okabe and Ito (2008), without their yellow.
+A solver keeps its colour and marker in every figure of every report. Its forms differ in dashes and in the
+face of the marker, its variants in dashes, tint and the part of the marker that is filled. The colours are
+those of Okabe and Ito (2008), without their yellow.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ if TYPE_CHECKING:
 BLUE, VERMILLION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, ORANGE, BLACK, GREY = "#56B4E9", "#E69F00", "#000000", "#7F7F7F"
 
-WIDTH = 9.0  # inches; at 100 pixels an inch this is the width of a page of text on a screen
+WIDTH = 9.0  # inches; at 100 pixels per inch the width of a page of text on a screen
 DPI = 160
 COLUMNS = 4  # of a legend below a figure
 
+#: The solvers of the published reports, which look the same in all of them.
 KNOWN = {
     "ipm": (BLUE, "o"),
     "gi": (VERMILLION, "s"),
@@ -45,17 +46,31 @@ KNOWN = {
     "quadprog": (GREEN, "<"),
     "highs": (PURPLE, ">"),
 }
-#: For solvers not named above: each pair differs from theirs. Open triangles are kept for unfinished runs.
+#: For all other solvers, by name; each pair differs from those above. Open triangles mark unfinished runs.
 SPARE = [(color, marker) for marker in "dvH8" for color in (BLACK, GREY, ORANGE, BLUE, VERMILLION, SKY)]
-#: Marker size, tint (0: the full colour, 1: white), filled part of the marker and dashes of a solver's
-#: first, second, … variant: the dual form's and the primal's.
-VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "right"], Any, Any], ...] = (
-    (6.5, 0.0, "full", "-", (0, (4, 2))),
-    (6.5, 0.3, "bottom", (0, (1, 1.2)), (0, (2, 1, 1, 1))),
-    (7.5, 0.0, "left", (0, (7, 1.5, 1, 1.5)), (0, (6, 2, 1, 2, 1, 2))),
-    (5.5, 0.45, "top", (0, (3, 1, 1, 1, 1, 1)), (0, (1, 3))),
-    (8.5, 0.3, "right", (0, (10, 2)), (0, (8, 4))),
+#: Marker size, tint (0: the full colour, 1: white) and filled part of the marker of a solver's first,
+#: second, … variant of a form.
+VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "right"]], ...] = (
+    (6.5, 0.0, "full"),
+    (6.5, 0.3, "bottom"),
+    (7.5, 0.0, "left"),
+    (5.5, 0.45, "top"),
+    (8.5, 0.3, "right"),
 )
+#: Dashes of the same variants, by form; an unknown form looks like the last.
+DASHES: dict[str, tuple[Any, ...]] = {
+    "dual": ("-", (0, (1, 1.2)), (0, (7, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)), (0, (10, 2))),
+    "primal": ((0, (4, 2)), (0, (2, 1, 1, 1)), (0, (6, 2, 1, 2, 1, 2)), (0, (1, 3)), (0, (8, 4))),
+    "sparse": ((0, (6, 1.5, 1.5, 1.5)), (0, (2, 2)), (0, (9, 2, 2, 2)), (0, (1, 2, 3, 2)), (0, (12, 4))),
+}
+#: Tint of the marker's face, by form: filled, hollow, pale.
+FACES = {"dual": 0.0, "primal": 1.0, "sparse": 0.65}
+#: The same in words, for captions.
+FORMS = {
+    "dual": "solid and filled: dual form",
+    "primal": "dashed and hollow: primal form",
+    "sparse": "dash-dotted and pale: sparse form",
+}
 
 RC: Any = {
     "font.size": 9.0,
@@ -83,7 +98,7 @@ RC: Any = {
 
 
 def applied() -> AbstractContextManager[None]:
-    """The look, for the time of a `with` block: importing this module changes no global setting."""
+    """The style within a `with` block: importing this module changes no global setting."""
     return mpl.rc_context(RC)
 
 
@@ -99,31 +114,41 @@ def figure_above(height: float, handles: list[Line2D]) -> Figure:
 
 
 def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
-    """Keyword arguments of `Axes.plot` for each series of some cells: filled markers on solid lines for
-    the dual form, hollow ones on dashed lines for the primal.
-    """
+    """Keyword arguments of `Axes.plot` for each method of some cells."""
     unknown = sorted(set(cells["solver"]) - set(KNOWN))
     looks = KNOWN | {solver: SPARE[i % len(SPARE)] for i, solver in enumerate(unknown)}
     styles: dict[str, dict[str, Any]] = {}
     for (solver, form), lines in cells.groupby(["solver", "form"]):
         full, marker = looks[solver]
-        for i, series in enumerate(sorted(lines["series"].unique())):
-            size, tint, filled, solid, dashed = VARIANTS[i % len(VARIANTS)]
-            red, green, blue = (c + tint * (1 - c) for c in to_rgb(full))
-            color = to_hex((red, green, blue))
-            styles[series] = {
+        known = form if form in FORMS else "sparse"
+        for i, method in enumerate(sorted(lines["method"].unique())):
+            size, tint, filled = VARIANTS[i % len(VARIANTS)]
+            color = _tinted(full, tint)
+            styles[method] = {
                 "color": color,
                 "marker": marker,
                 "markersize": size,
                 "markeredgecolor": color,
-                "markerfacecolor": color if form == "dual" else "white",
+                "markerfacecolor": _tinted(color, FACES[known]),
                 "markeredgewidth": 1.3,
                 "fillstyle": filled,
                 "markerfacecoloralt": "white",
-                "linestyle": solid if form == "dual" else dashed,
+                "linestyle": DASHES[known][i % len(VARIANTS)],
                 "linewidth": 1.6,
             }
     return styles
+
+
+def _tinted(color: str, tint: float) -> str:
+    """A colour mixed with white."""
+    red, green, blue = (c + tint * (1 - c) for c in to_rgb(color))
+    return to_hex((red, green, blue))
+
+
+def forms_text(cells: pd.DataFrame) -> str:
+    """How the forms of some cells look: 'Solid and filled: dual form; dashed and hollow: primal form.'"""
+    words = "; ".join(words for form, words in FORMS.items() if (cells["form"] == form).any())
+    return f" {words[0].upper()}{words[1:]}." if words else ""
 
 
 def line_only(style: dict[str, Any]) -> dict[str, Any]:
@@ -135,11 +160,11 @@ def marker_only(style: dict[str, Any]) -> dict[str, Any]:
 
 
 def legend_entries(styles: dict[str, dict[str, Any]]) -> list[Line2D]:
-    return [Line2D([], [], label=series, **look) for series, look in styles.items()]
+    return [Line2D([], [], label=method, **look) for method, look in styles.items()]
 
 
 def percent_above(axes: Axes, whole: float) -> None:
-    """A second axis above the first, in % of `whole`."""
+    """A second axis at the top, in % of `whole`."""
     there_and_back = (partial(np.multiply, 100 / whole), partial(np.multiply, whole / 100))
     axis = axes.secondary_xaxis("top", functions=there_and_back)
     axis.xaxis.set_major_formatter(lambda value, _: f"{value:g} %")

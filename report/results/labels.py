@@ -1,19 +1,16 @@
-"""The name of a line in tables and figures: what was run, in as few words as tell it apart."""
+"""The name of a line in tables and figures: what was run, in as few words as distinguish it."""
 
 from __future__ import annotations
 
 import pandas as pd
 
+from harness.results.schema import FORMS
 from report.document.numbers import counted, tidy_power
-
-#: In-house first, then the libraries; what is not named here follows by name.
-IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
-ORDER = (*IN_HOUSE, "piqp", "proxqp", "clarabel", "osqp", "daqp", "quadprog", "highs")
 
 
 def named(cells: pd.DataFrame) -> pd.DataFrame:
-    """Cells with `series`, 'solver (form)' with the variant if it has one and the number of threads
-    where several were used, and `label`, the same with the tolerance where there are several.
+    """Cells with `method`, 'solver (form)' with the variant if it has one and the number of threads
+    if several were used, and `label`, the same with the tolerance if there are several.
     """
     variant = cells["variant"].map(lambda name: f" {name}" if name else "")
     threads = cells["threads"].map(lambda k: f" × {counted(int(k), 'thread')}")
@@ -21,17 +18,24 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
     by_line = cells.groupby(["solver", "form", "variant"], dropna=False)
     threads = threads.where(by_line["threads"].transform("nunique") > 1, "")
     tolerance = tolerance.where(by_line["tolerance"].transform("nunique") > 1, "")
-    series = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
-    return cells.assign(series=series, label=series + tolerance)
-
-
-def rank(solver: str, form: str) -> tuple[int, str, bool]:
-    """Sort key of lines: known solvers in their order, the dual form before the primal."""
-    return (ORDER.index(solver) if solver in ORDER else len(ORDER), solver, form != "dual")
+    method = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
+    return cells.assign(method=method, label=method + tolerance)
 
 
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
-    """The labels (or series) of some cells in the one order used everywhere."""
+    """The labels (or method, or solvers) of some cells in the one order used everywhere: in-house solvers
+    first, then by name, and the forms of a solver in the order of FORMS.
+    """
     lines = cells.drop_duplicates(name)
-    ranks = [rank(solver, form) for solver, form in zip(lines["solver"], lines["form"], strict=True)]
-    return [label for _, label in sorted(zip(ranks, lines[name].astype(str), strict=True))]
+    places = [
+        (not own, solver, form_place(form), str(label))
+        for own, solver, form, label in zip(
+            lines["in_house"], lines["solver"], lines["form"], lines[name], strict=True
+        )
+    ]
+    return [label for *_, label in sorted(places)]
+
+
+def form_place(form: str) -> int:
+    """The place of a form in the order of FORMS; a form not named there comes last."""
+    return FORMS.index(form) if form in FORMS else len(FORMS)

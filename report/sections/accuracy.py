@@ -1,56 +1,58 @@
-"""Time against the accuracy that was achieved: a work–precision diagram a size."""
+"""Time against achieved accuracy: one work–precision diagram per size."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from report.analysis.precision import ENOUGH, WRONG, in_view, looks, pareto, with_errors
-from report.analysis.shown import drawn, left_out, scenes, sizes
-from report.document.blocks import Figure, Section, Text
-from report.figures import marks, style
-from report.results.reader import ANSWERED, Results
+from harness.results.schema import ANSWERED
+from report.analysis.drawn import drawn_cells, omission_note, scenes, sizes
+from report.analysis.precision import CURVE_POINTS, LARGEST_ERROR_MM, in_view, pareto, with_errors
+from report.document.blocks import Figure, Place, Section, Text
+from report.figures import style, unfinished
+from report.figures.lines import looks
+from report.figures.pareto_front import staircase
+from report.results.reader import Results
 
-STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, "solid_joinstyle": "miter"}
+PLACE = Place(330)
 
 
 def section(results: Results) -> Section | None:
-    cells = in_view(with_errors(drawn(results)))
+    cells = in_view(with_errors(drawn_cells(results)))
     figures = [figure for n in sizes(results) if (figure := _figure(results, cells, n))]
     if not figures:
         return None
     words = (
-        "Seconds a load case against the displacement error that was achieved, both of the same run; down "
-        f"and left is better, and right of the dotted line at {results.limit} is not accurate enough. The "
-        "grey staircase is the Pareto front: its corners are beaten by nothing that is both faster and more "
-        f"accurate. Runs of one solver at {ENOUGH} tolerances or more are joined, the loosest first; bars "
-        "span the repeats. Open triangles stand at the time limit of runs that did not finish, crosses at "
-        "the upper edge for runs that gave no answer for another reason; both above the smallest error that "
-        "the solver did reach, at the right edge where it reached none. Errors smaller than the bound on the "
-        f"reference's own are drawn at that bound, those above {WRONG:g} mm there."
+        "Seconds per load case against the achieved displacement error of the same run; lower left is "
+        f"better, and right of the dotted line at {results.limit} the error is too large. The grey staircase "
+        "is the Pareto front: nothing is both faster and more accurate than its corners. Runs of a solver "
+        f"with at least {CURVE_POINTS} tolerances are joined; bars span the repeats. Open triangles: runs "
+        "that did not finish, at their time limit; crosses at the upper edge: runs without an answer for "
+        "another reason. Both are placed at the smallest error the solver did reach, or at the right edge if "
+        "it reached none. Errors below the reference error bound are drawn at that bound, errors above "
+        f"{LARGEST_ERROR_MM:g} mm at {LARGEST_ERROR_MM:g} mm."
     )
-    return Section("Time against achieved accuracy", [Text(words + left_out(results)), *figures])
+    return Section("Time against achieved accuracy", [Text(words + omission_note(results)), *figures])
 
 
 def _figure(results: Results, cells: pd.DataFrame, n: int) -> Figure | None:
-    """The scenes of a size with the fewest and with the most active contacts, side by side."""
+    """The scenes of a size with the fewest and the most active contacts, side by side."""
     of_size = [s for s in scenes(results, n) if cells.loc[cells["scene"] == s, "error"].notna().any()]
     ends = list(dict.fromkeys(of_size[:1] + of_size[-1:]))
     if not ends:
         return None
     cells = cells[cells["scene"].isin(ends)]
     styles = looks(results, cells)
-    handles = [*style.legend_entries(styles), *marks.entries(cells)]
+    handles = [*style.legend_entries(styles), *unfinished.entries(cells)]
     drawing = style.figure_above(3.4, handles)
     panels = drawing.subplots(1, len(ends), sharex=True, sharey=True, squeeze=False)[0]
     limit = cells["limit_mm"].max()
     limit = limit if limit > 0 else 1e-7
     low, high = min(cells["error"].min(), limit), max(cells["error"].max(), limit)
-    panels[0].set(xscale="log", yscale="log", xlim=(low / 4, high * 6), ylabel="time a load case, s")
+    panels[0].set(xscale="log", yscale="log", xlim=(low / 4, high * 6), ylabel="time per load case, s")
     panels[0].xaxis.set_major_locator(LogLocator(numticks=9))
     panels[0].xaxis.set_minor_locator(NullLocator())
     for axes, scene in zip(panels, ends, strict=True):
@@ -69,8 +71,8 @@ def _figure(results: Results, cells: pd.DataFrame, n: int) -> Figure | None:
 
 
 def _curves(axes: Axes, points: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
-    for series, line in points.groupby("series"):
-        look = styles[str(series)]
+    for method, line in points.groupby("method"):
+        look = styles[str(method)]
         ordered = line.sort_values("tolerance", ascending=False)
         axes.plot(ordered["error"], ordered["load_case_s"], **look)
         several = line[line["most_s"] > line["least_s"]]
@@ -78,17 +80,7 @@ def _curves(axes: Axes, points: pd.DataFrame, styles: dict[str, dict[str, Any]])
 
 
 def _unfinished(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> None:
-    missed = cells[~cells["verdict"].isin(ANSWERED)].drop_duplicates(["series", "status"])
-    reached = missed["series"].map(cells.groupby("series")["error"].min())
+    missed = cells[~cells["verdict"].isin(ANSWERED)].drop_duplicates(["method", "status"])
+    reached = missed["method"].map(cells.groupby("method")["error"].min())
     at = reached.fillna(axes.get_xlim()[1] / 2)
-    marks.unfinished(axes, missed.assign(at=at), "at", styles, inside=True)
-
-
-def staircase(axes: Axes, front: pd.DataFrame, time: str) -> None:
-    """A Pareto front as a staircase from the upper to the right edge of axes that are otherwise done."""
-    if front.empty:
-        return
-    errors, seconds = front["error"].tolist(), front[time].tolist()
-    (_, right), (_, top) = axes.get_xlim(), axes.get_ylim()
-    across, up = np.array([errors[0], *errors, right]), np.array([top, *seconds, seconds[-1]])
-    axes.plot(across, up, drawstyle="steps-post", scalex=False, scaley=False, **STAIRCASE)
+    unfinished.unfinished(axes, missed.assign(at=at), "at", styles, inside=True)

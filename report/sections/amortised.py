@@ -1,4 +1,4 @@
-"""Many load cases on one assembly: what is paid once is shared by them."""
+"""Many load cases on one assembly, which share the cost of conversion and preparation."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.precision import ACCURACIES, in_view, judged, looks, pareto, settings, swept
-from report.analysis.shown import middle_scenes
-from report.document.blocks import Column, Figure, Section, Table, number
+from report.analysis.drawn import middle_scenes
+from report.analysis.precision import ACCURACIES, in_view, judged, pareto, settings, swept
+from report.document.blocks import Column, Figure, Place, Section, Table, number
 from report.document.numbers import MISSING, counted, significant, tidy_power, whole
 from report.figures import style
+from report.figures.lines import looks
+from report.figures.pareto_front import staircase
 from report.results.reader import Results
 
-from .accuracy import staircase
+PLACE = Place(380)
 
 LOAD_CASES = (1, 10, 100, 1000)
 PANEL = 2.6  # inches
@@ -29,9 +31,9 @@ def section(results: Results) -> Section | None:
         return None
     caption = (
         f"*One load case, and one of {LOAD_CASES[-1]} on the same assembly*, on the middle scene of each "
-        "size: seconds a load case against the error achieved. Left, the solver's own conversion and "
-        f"preparation are paid in full; right, {LOAD_CASES[-1]} load cases share them. The Cholesky factor "
-        "of K and Q, which all solvers share, is in neither."
+        "size: seconds per load case against the achieved error. Left: one load case pays for the solver's "
+        f"own conversion and preparation; right: {LOAD_CASES[-1]} load cases share them. Neither includes "
+        "the Cholesky factor of K and Q, which all solvers share."
     )
     figure = Figure("amortised", caption, _drawing(results, answered))
     return Section("Many load cases on one assembly", [figure, _table(cells)])
@@ -48,15 +50,15 @@ def _drawing(results: Results, answered: pd.DataFrame) -> Drawing:
         points = answered[answered["scene"] == scene]
         for axes, load_cases in zip(line, ends, strict=True):
             shown = points.assign(cost=points["load_case_s"] + points["once_s"] / load_cases)
-            for series, look in styles.items():
-                curve = shown[shown["series"] == series].sort_values("tolerance", ascending=False)
+            for method, look in styles.items():
+                curve = shown[shown["method"] == method].sort_values("tolerance", ascending=False)
                 axes.plot(curve["error"], curve["cost"], **look)
             axes.set_yscale("log")
             axes.set_title(f"n = {points['n'].iloc[0]:.0f}, {counted(load_cases, 'load case')}")
         for axes, load_cases in zip(line, ends, strict=True):
             cost = points["load_case_s"] + points["once_s"] / load_cases
             staircase(axes, pareto(points.assign(cost=cost), "cost"), "cost")
-        line[0].set_ylabel("time a load case, s")
+        line[0].set_ylabel("time per load case, s")
         style.plain_log(line[0].yaxis)
     for axes in panels[-1]:
         axes.set_xlabel("displacement error, mm (max norm)")
@@ -68,9 +70,9 @@ def _table(cells: pd.DataFrame) -> Table:
     columns = [number("n", "n", whole), number("error ≤, mm", "accuracy_mm", tidy_power)]
     columns += [Column(counted(k, "load case"), partial(_shown, load_cases=k), "left") for k in LOAD_CASES]
     caption = (
-        "*The fastest settings for so many load cases on one assembly*, with seconds a load case, its share "
-        "of what is paid once included: the geometric mean over the scenes of the size, of settings "
-        "that reach the error on all of them."
+        "*The fastest settings by the number of load cases on one assembly*, with the seconds per load case "
+        "including its share of conversion and preparation: the geometric mean over the scenes of the size, "
+        "for settings that reach the error on all of them."
     )
     return Table("amortised", caption, pd.DataFrame(lines), columns)
 

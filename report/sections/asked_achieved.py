@@ -1,4 +1,4 @@
-"""The tolerance that was asked for against the error that came: whose tolerance can be trusted."""
+"""The requested tolerance against the achieved error: whose tolerance can be trusted."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.precision import in_view, looks, swept
-from report.document.blocks import Figure, Section, Table, number, word
+from report.analysis.precision import in_view, swept
+from report.document.blocks import Figure, Place, Section, Table, number, word
 from report.document.numbers import whole
 from report.figures import style
+from report.figures.lines import looks
 from report.results.labels import in_order, named
 from report.results.reader import Results
+
+PLACE = Place(350)
 
 
 def section(results: Results) -> Section | None:
@@ -20,26 +23,26 @@ def section(results: Results) -> Section | None:
     if cells.empty:
         return None
     words = (
-        "*Error against the tolerance asked for*, the worst of the scenes of each size. Below the dotted "
-        "diagonal the error is smaller than the tolerance. A tolerance is the number given to the solver, "
-        "which may measure a gap, a force or an energy by it: what counts is whether its line follows the "
-        "diagonal, at whatever distance, and where it stops to. Runs without an answer are left out."
+        "*Error against the requested tolerance*, the worst over the scenes of each size. Below the dotted "
+        "diagonal the error is smaller than the tolerance. Solvers apply their tolerance to different "
+        "quantities (a gap, a force, an energy), so only the slope matters: whether a line runs parallel to "
+        "the diagonal, and where it levels off. Runs without an answer are omitted."
     )
     columns = [
-        word("solver (form)", "series"),
-        number("said solved", "solved", whole),
+        word("solver (form)", "method"),
+        number("reported solved", "solved", whole),
         number("error above the tolerance", "above_tolerance", whole),
         number("largest error / tolerance", "worst_ratio"),
         number(f"tolerance ≤ {results.limit.removesuffix(' mm')}", "tight", whole),
-        number(f"of these outside {results.limit}", "tight_outside", whole),
+        number(f"of these, error > {results.limit}", "tight_outside", whole),
     ]
     caption = (
-        "*Whose tolerance can be trusted*: runs, every repeat counted, of which the solver said that they "
-        "were solved. The bound on the reference's own error is taken off the error in its favour."
+        "*Whose tolerance can be trusted*: the runs that the solver reported as solved, counting every "
+        "repeat. The reference error bound is subtracted from the error, in the solver's favour."
     )
     figure = Figure("asked-achieved", words, _drawing(results, cells))
     table = Table("asked-achieved", caption, trust(results), columns)
-    return Section("Tolerance asked, error achieved", [figure, table])
+    return Section("Requested tolerance and achieved error", [figure, table])
 
 
 def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
@@ -47,19 +50,19 @@ def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
     drawing = style.figure_above(3.2, style.legend_entries(styles))
     panels = drawing.subplots(1, len(sizes), sharex=True, sharey=True, squeeze=False)[0]
     for axes, n in zip(panels, sizes, strict=True):
-        worst = cells[cells["n"] == n].groupby(["series", "tolerance"], as_index=False)["error"].max()
-        for series, look in styles.items():
-            line = worst[worst["series"] == series]
+        worst = cells[cells["n"] == n].groupby(["method", "tolerance"], as_index=False)["error"].max()
+        for method, look in styles.items():
+            line = worst[worst["method"] == method]
             axes.plot(line["tolerance"], line["error"], **look)
         axes.axline((1e-6, 1e-6), (1e-5, 1e-5), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
-        axes.set(xscale="log", yscale="log", title=f"n = {n:.0f}", xlabel="tolerance asked for")
+        axes.set(xscale="log", yscale="log", title=f"n = {n:.0f}", xlabel="requested tolerance")
     panels[0].set_ylabel("displacement error, mm")
     return drawing
 
 
 def trust(results: Results) -> pd.DataFrame:
-    """A line a series: of its runs called solved, how many miss the tolerance, and the limit although the
-    tolerance was no larger.
+    """One line per method: of its runs reported as solved, how many exceed the tolerance, and how many
+    exceed the limit although the tolerance was no larger.
     """
     rows = named(results.rows)
     said = (rows["status"] == "solved") & rows["displacement_error_mm"].notna() & (rows["tolerance"] > 0)
@@ -68,9 +71,9 @@ def trust(results: Results) -> pd.DataFrame:
     rows = rows.assign(ratio=error / rows["tolerance"], tight=rows["tolerance"] <= rows["limit_mm"])
     rows["broken"] = rows["tight"] & (error > rows["limit_mm"])
     lines: list[dict[str, Any]] = []
-    for series in in_order(rows, "series"):
-        runs = rows[rows["series"] == series]
-        line = {"series": series, "solved": len(runs), "above_tolerance": int((runs["ratio"] > 1).sum())}
+    for method in in_order(rows, "method"):
+        runs = rows[rows["method"] == method]
+        line = {"method": method, "solved": len(runs), "above_tolerance": int((runs["ratio"] > 1).sum())}
         line |= {"tight": int(runs["tight"].sum()), "tight_outside": int(runs["broken"].sum())}
         lines.append(line | {"worst_ratio": runs["ratio"].max()})
     return pd.DataFrame(lines)

@@ -9,24 +9,26 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from report.analysis.shown import best, left_out, middle_scenes, of_tolerances
-from report.document.blocks import Figure, Section
+from report.analysis.drawn import best_tolerances, middle_scenes, omission_note, tolerance_note
+from report.document.blocks import Figure, Place, Section
 from report.document.numbers import significant, whole
 from report.figures import style
-from report.results.reader import TIMES, Results
+from report.results.reader import Results
+
+PLACE = Place(400)
 
 ROW = 0.2  # inches
 STEPS = {
     "convert_s": ("convert: data into the solver's format", "#B8B8B8", None),
-    "prepare_s": ("prepare: once an assembly", style.GREEN, None),
-    "setup_s": ("set up: once a load case", style.ORANGE, "////"),
+    "prepare_s": ("prepare: once per assembly", style.GREEN, None),
+    "setup_s": ("set up: once per load case", style.ORANGE, "////"),
     "solve_s": ("solve", style.BLUE, None),
-    "form_s": ("dual form: forming p, recovering x", style.SKY, "...."),
+    "form_s": ("form: its load vector, and x from its solution", style.SKY, "...."),
 }
 
 
 def section(results: Results) -> Section | None:
-    cells = best(results)
+    cells = best_tolerances(results)
     shown = [
         lines for scene in middle_scenes(results) if len(lines := _answered(cells[cells["scene"] == scene]))
     ]
@@ -41,12 +43,12 @@ def section(results: Results) -> Section | None:
     handles = [Patch(facecolor=color, hatch=hatch, label=text) for text, color, hatch in STEPS.values()]
     drawing.legend(handles=handles, loc="outside lower center", ncols=3)
     caption = (
-        "*Where the time goes*, on the middle scene of each size, the fastest at the top; at the right, all "
-        "steps together in seconds, and iterations × milliseconds of solve an iteration (of an active-set "
-        "method, changes of its set). Runs without an answer are left out. What all solvers share, the "
-        "Cholesky factor of K and Q, was built before and is not in it."
-        + of_tolerances(results)
-        + left_out(results)
+        "*Where the time goes*, on the middle scene of each size, the fastest first; on the right, the "
+        "total in seconds, and iterations × milliseconds of solve per iteration (for an active-set method, "
+        "per change of the active set). Runs without an answer are omitted. The Cholesky factor of K and Q, "
+        "which all solvers share, is built beforehand and not included."
+        + tolerance_note(results)
+        + omission_note(results)
     )
     return Section("Where the time goes", [Figure("time-steps", caption, drawing)])
 
@@ -58,8 +60,7 @@ def _answered(cells: pd.DataFrame) -> pd.DataFrame:
 def _panel(axes: Axes, lines: pd.DataFrame) -> None:
     places = np.arange(len(lines))
     left = np.zeros(len(lines))
-    for name in TIMES:
-        _, color, hatch = STEPS[name]
+    for name, (_, color, hatch) in STEPS.items():
         share = (100 * lines[name].fillna(0) / lines["total_s"]).to_numpy(dtype=float)
         look: dict[str, Any] = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.6}
         axes.barh(places, share, left=left, height=0.72, **look)
@@ -71,7 +72,7 @@ def _panel(axes: Axes, lines: pd.DataFrame) -> None:
             text += f",  {whole(line['iterations'])} × {each} ms"
         axes.annotate(text, (100, place), (6, 0), textcoords="offset points", va="center", fontsize=8.5)
     axes.set(xlim=(0, 100), ylim=(len(lines) - 0.5, -0.5))
-    axes.set_yticks(places, lines["series"])
+    axes.set_yticks(places, lines["method"])
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
     n, active = lines["n"].iloc[0], lines["active"].iloc[0]

@@ -1,4 +1,4 @@
-"""Every measurement: one table a size and active count."""
+"""Every measurement: one table per scene."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Block, Column, Section, Table, Text, number, word
+from harness.results.schema import VERDICTS
+from report.document.blocks import Block, Column, Place, Section, Table, Text, number, word
 from report.document.numbers import MISSING, power, significant, whole
-from report.results.reader import VERDICTS, Results
+from report.results.reader import Results
+
+PLACE = Place(420)
 
 FIGURES = [
     *("scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeats"),
@@ -27,8 +30,8 @@ def section(results: Results) -> Section | None:
         return None
     blocks: list[Block] = [
         Text(
-            "One table a scene: answers within the limit first, then by total time. Times in seconds; what "
-            "the columns mean stands in the last section."
+            "One table per scene: answers within the limit first, then by total time. Times in seconds; the "
+            "last section explains the columns."
         )
     ]
     for n in [*results.sizes, None]:
@@ -48,13 +51,13 @@ def _table(scene: str, cells: pd.DataFrame) -> Table:
         Column("verdict", lambda row: MARKS.get(row["verdict"], MISSING), "left"),
         Column("status", lambda row: str(row["status"]).replace("_", " "), "left"),
         number("error, mm", "displacement_error_mm", power),
-        number("contacts differing", "contact_mismatch", whole),
+        number("contact mismatches", "contact_mismatch", whole),
         Column("iterations (inner)", _iterations),
         number("convert", "convert_s"),
         number("prepare", "prepare_s"),
         number("set-up", "setup_s"),
         number("solve", "solve_s"),
-        number("dual form", "form_s"),
+        number("form", "form_s"),
         Column("total", _total),
         Column("peak, MiB", _peak),
     ]
@@ -71,7 +74,7 @@ def _iterations(row: Mapping[str, Any]) -> str:
 
 
 def _total(row: Mapping[str, Any]) -> str:
-    """The seconds, or for a run that was stopped by the clock, its limit."""
+    """The seconds, or the time limit of a run that was stopped by it."""
     if row["verdict"] == "no_answer" and row["status"] == "time_limit" and row["time_limit_s"] > 0:
         return f"> {row['time_limit_s']:.4g} s (time limit)"
     return significant(row["total_s"])

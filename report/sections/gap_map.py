@@ -1,4 +1,4 @@
-"""Gap maps: the gap between the parts before and after, and the contact forces."""
+"""Maps of the gap between the parts before and after, and of the contact forces."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, PowerNorm
 
-from report.analysis.shown import middle_scene
-from report.document.blocks import Block, Figure, Section, Text
+from report.analysis.drawn import middle_scene
+from report.document.blocks import Block, Figure, Place, Section, Text
 from report.figures import style
 from report.figures.maps import Array, draw, grid_of, outline
 from report.results.reader import Results
+
+PLACE = Place(410)
 
 
 def section(results: Results) -> Section | None:
@@ -53,8 +55,8 @@ def _figure(scene: str, n: int, arrays: dict[str, Array]) -> Figure:
     panels[2].set_xlabel("x, mm")
     caption = (
         f"*Scene {scene} (n = {n}): the gap before and after, and the contact forces.* Both gaps share one "
-        f"scale; the panels have the strip's true proportions. Outlined: the {closed.sum()} closed contacts"
+        f"scale; proportions are true. Outlined: the {closed.sum()} closed contacts"
         + (f"; circles: the {len(fasteners)} fasteners" if len(fasteners) else "")
-        + ". The scale of the forces is that of their square roots, so that small ones show."
+        + ". The force scale is that of the square root, so that small forces are visible."
     )
     return Figure("gap-map", caption, drawing)

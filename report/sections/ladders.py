@@ -1,4 +1,4 @@
-"""The ladders: where each solver breaks, and whether it knows."""
+"""The ladders: where each solver fails, and whether it reports the failure."""
 
 from __future__ import annotations
 
@@ -7,14 +7,25 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.outcomes import DOUBTED, KNEW, LIED, NONE, RIGHT, UNJUDGED, holds, with_outcomes
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.analysis.outcomes import (
+    CORRECT,
+    CORRECT_UNCLAIMED,
+    NO_ANSWER,
+    UNJUDGED,
+    WRONG_CLAIMED,
+    WRONG_UNCLAIMED,
+    is_correct,
+    with_outcomes,
+)
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, word
 from report.document.numbers import MISSING, counted, power, whole
 from report.figures.ladder_map import ladder_map
-from report.results.labels import IN_HOUSE, in_order
+from report.results.labels import in_order
 from report.results.reader import Results
 
-CONDITION = 1e12  # of K: up to it the in-house solvers are to hold
+PLACE = Place(10, "ladders")
+
+CONDITION = 1e12  # of K: up to it the in-house solvers are required to be correct
 
 
 def section(results: Results) -> Section | None:
@@ -25,24 +36,24 @@ def section(results: Results) -> Section | None:
     ladders = rungs_in_order(results, cells)
     blocks: list[Block] = [
         Text(
-            "A rung is right within max(1e-7 mm, 100 cond(K) 2⁻⁵³ max|x*|): what conditioning leaves to a "
-            "solver that works in float64. " + in_house(results, cells)
+            "An answer on a rung is correct if its error is at most max(1e-7 mm, 100 cond(K) 2⁻⁵³ max|x*|): "
+            "what conditioning allows a solver that works in float64. " + in_house(results, cells)
         ),
         Figure(
             "ladders",
-            "*Every solver on every rung; each ladder grows harder to the right.* Dark: right, and called "
-            "solved; pale: right, though the solver would not say so; hatched: wrong, and the solver knew; "
-            "×: wrong and called solved; –: no answer.",
+            "*Every solver on every rung; each ladder grows harder to the right.* Dark: correct and reported "
+            "as solved; pale: correct, but not reported as solved; hatched: wrong, and not reported as "
+            "solved; ×: wrong, but reported as solved; –: no answer.",
             ladder_map(cells, order, ladders),
         ),
         honesty(cells, order),
         breaking_points(cells, order, ladders),
     ]
-    return Section("Where each solver breaks, and whether it knows", blocks)
+    return Section("Where each solver fails, and whether it reports it", blocks)
 
 
 def rungs_in_order(results: Results, cells: pd.DataFrame) -> dict[str, list[str]]:
-    """The rungs of each ladder, as the suite lists them; what it does not list, as it was measured."""
+    """The rungs of each ladder in the order of the suite, others in the order of measurement."""
     listed = [scene for scene in results.suite.get("scenes", []) if scene in set(cells["scene"])]
     ladders: dict[str, list[str]] = {}
     for scene in dict.fromkeys([*listed, *cells["scene"]]):
@@ -52,17 +63,17 @@ def rungs_in_order(results: Results, cells: pd.DataFrame) -> dict[str, list[str]
 
 
 def in_house(results: Results, cells: pd.DataFrame) -> str:
-    """How the in-house solvers keep what is asked of them."""
-    own = cells[cells["solver"].isin(IN_HOUSE)]
+    """Whether the in-house solvers meet their requirements."""
+    own = cells[cells["in_house"]]
     if own.empty or not {"scene", "cond_K"} <= set(results.problems):
         return ""
     known = results.problems.drop_duplicates("scene", keep="last").set_index("scene")["cond_K"]
     asked = own[own["scene"].map(known) <= CONDITION * (1 + 1e-6)]
-    wrong = int((own["outcome"] == LIED).sum())
+    wrong = int((own["outcome"] == WRONG_CLAIMED).sum())
     return (
-        f"The in-house solvers are right in {int(holds(asked).sum())} of {counted(len(asked), 'row')} up to "
-        f"cond(K) = 1e12; in all their {counted(len(own), 'row')}, {wrong or 'no'} wrong "
-        f"{'answers are' if wrong > 1 else 'answer is'} called solved."
+        f"The in-house solvers are correct in {int(is_correct(asked).sum())} of "
+        f"{counted(len(asked), 'row')} up to cond(K) = 1e12; in all their {counted(len(own), 'row')}, "
+        f"{wrong or 'no'} wrong {'answers are' if wrong > 1 else 'answer is'} reported as solved."
     )
 
 
@@ -73,22 +84,27 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
         share = line["displacement_error_mm"] / line["limit_mm"]
         counts = line["outcome"].value_counts()
         record: dict[str, Any] = {"label": label, "rungs": len(line)}
-        record |= {name: int(counts.get(name, 0)) for name in (RIGHT, DOUBTED, KNEW, LIED, NONE, UNJUDGED)}
+        record |= {
+            name: int(counts.get(name, 0))
+            for name in (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, WRONG_CLAIMED, NO_ANSWER, UNJUDGED)
+        }
         solved = line["status"] == "solved"
         record["worst_share"] = share[solved].max()
         record["backward_error"] = line.loc[solved, "backward_error"].median()
-        record["where"] = ", ".join(_short(line[line["outcome"] == LIED]))
+        record["where"] = ", ".join(_short(line[line["outcome"] == WRONG_CLAIMED]))
         records.append(record)
     columns = [word("solver (form)", "label"), number("rungs", "rungs", whole)]
-    columns += [number(name, name, whole) for name in (RIGHT, DOUBTED, KNEW, NONE)]
-    columns.append(Column("**wrong, called solved**", _bold(LIED)))
     columns += [
-        number("largest error / limit of what was called solved", "worst_share", power),
-        number("median backward error of it", "backward_error", power),
+        number(name, name, whole) for name in (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, NO_ANSWER)
+    ]
+    columns.append(Column("**wrong, reported solved**", _bold(WRONG_CLAIMED)))
+    columns += [
+        number("largest error / limit, reported solved", "worst_share", power),
+        number("median backward error, reported solved", "backward_error", power),
     ]
     caption = (
-        "*Honesty.* A wrong answer that is called solved is the worst that a solver can give. Backward "
-        "error: what the answer leaves of the optimality conditions, as a share of the terms in them."
+        "*Wrong answers reported as solved* are the worst outcome. Backward error: the residual of the "
+        "optimality conditions, relative to the terms in them."
     )
     return Table("honesty", caption, pd.DataFrame(records), columns)
 
@@ -103,17 +119,17 @@ def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, li
         records.append(record)
     columns = [word("solver (form)", "label"), *(word(ladder, ladder) for ladder in ladders)]
     caption = (
-        "*Breaking points: the first rung of each ladder without a right answer.* ×: it was called solved. "
-        f"{MISSING}: right on every rung."
+        "*Breaking points: the first rung of each ladder without a correct answer.* ×: reported as solved. "
+        f"{MISSING}: correct on every rung."
     )
     return Table("breaking-points", caption, pd.DataFrame(records), columns)
 
 
 def _first_broken(line: pd.DataFrame, rungs: list[str]) -> str:
-    broken = line[~holds(line)].set_index("rung")["outcome"]
+    broken = line[~is_correct(line)].set_index("rung")["outcome"]
     for rung in rungs:
         if rung in broken:
-            return f"{rung} ×" if broken[rung] == LIED else rung
+            return f"{rung} ×" if broken[rung] == WRONG_CLAIMED else rung
     return MISSING
 
 

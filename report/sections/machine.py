@@ -1,4 +1,4 @@
-"""The machine, the versions, how it was measured, and what the columns mean."""
+"""The machine, the code, the method of measurement, and what the columns mean."""
 
 from __future__ import annotations
 
@@ -6,27 +6,37 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Block, Section, Table, Text, word
+from report.analysis.code import commits_text
+from report.document.blocks import Block, Place, Section, Table, Text, word
 from report.document.numbers import listed, tidy_power
-from report.results.labels import ORDER
+from report.results.labels import in_order
 from report.results.reader import Results
 
+PLACE = Place(900, "all")
+
+FORMS = {
+    "primal": "*Primal*: min ½xᵀKx − fᵀx, Aᵀx ≤ g, in the displacements x of the junction.",
+    "dual": "*Dual*: min ½λᵀQλ − pᵀλ, λ ≥ 0, in the contact forces λ, with Q = AᵀK⁻¹A, p = AᵀK⁻¹f − g, "
+    "x = K⁻¹(f − Aλ).",
+    "sparse": "*Sparse*: min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ g, in all unknowns û of the finite-element model, "
+    "without condensation.",
+}
 MEANING = """\
-- **solver (form)**: what was run. *Primal*: min ½xᵀKx − fᵀx, Aᵀx ≤ g, in the displacements x. *Dual*:
-  min ½λᵀQλ − pᵀλ, λ ≥ 0, in the contact forces λ, with Q = AᵀK⁻¹A, p = AᵀK⁻¹f − g, x = K⁻¹(f − Aλ).
-- **error**: max |x − x*| in mm against the reference answer x*, worked out from the saved answer.
-- **verdict**: the judge's, from the error alone. *Within* or *outside* the limit; *cannot be judged* where
-  the reference's own error bound is too wide; *no answer* where there is none.
-- **status**: what the solver said (solved, inaccurate, iteration limit, failed), or what ended it (time
-  limit, memory limit, crashed). *Unsupported*: the solver does not take this form.
-- **contacts differing**: contacts closed in the answer and open in the reference, or the reverse.
-- **iterations (inner)**: outer ones, for an active-set method its changes of the set; inner ones in brackets,
-  for instance conjugate-gradient iterations.
-- **convert**, **prepare**: once an assembly: data into the solver's format; factorisations.
-- **set-up**, **solve**: once a load case.
-- **dual form**: what this form costs a load case beside the solver: forming p before, recovering x after.
-- **a load case**: set-up + solve + dual form. **total**: that, convert and prepare.
-- **peak**: the largest resident memory of the measuring process, with the data it had mapped."""
+- **error**: max |x − x*| in mm, x* the reference answer, computed from the saved answer.
+- **verdict**: the judge's, from the error alone. *Within* or *outside* the limit; *cannot be judged* if the
+  reference error bound is too large; *no answer* if there is none.
+- **status**: what the solver reported (solved, inaccurate, iteration limit, failed), or what ended the run
+  (time limit, memory limit, crashed). *Unsupported*: the solver does not take this form. *Not run*: predicted
+  to exceed the time limit, so not started.
+- **contact mismatches**: contacts closed in the answer and open in the reference, or vice versa.
+- **iterations (inner)**: outer iterations, for an active-set method changes of the active set; in brackets
+  inner ones, such as conjugate-gradient iterations.
+- **convert**, **prepare**: once per assembly: data into the solver's format; factorisations.
+- **set-up**, **solve**: once per load case.
+- **form**: what the form costs per load case in addition to the solver: its load vector before the solve
+  (p of the dual), and the displacements x after it.
+- **time per load case**: set-up + solve + form. **Total**: that, convert and prepare.
+- **peak**: the largest resident memory of the measuring process, including mapped data."""
 
 
 def section(results: Results) -> Section | None:
@@ -36,13 +46,18 @@ def section(results: Results) -> Section | None:
         _machine(results),
         _versions(results.rows),
         Text("### Method\n\n" + _method(results)),
-        Text("### What the columns mean\n\n" + MEANING),
+        Text("### What the columns mean\n\n" + _forms(results.rows) + MEANING),
         Text(
-            "### Once more\n\nFrom the directory that holds `measurements.jsonl`:\n\n"
+            "### Reproduce this run\n\nFrom the directory that holds `measurements.jsonl`:\n\n"
             "```\npython -m harness run suite.toml --out again\n```"
         ),
     ]
     return Section("Machine and method", blocks)
+
+
+def _forms(rows: pd.DataFrame) -> str:
+    words = " ".join(text for form, text in FORMS.items() if (rows["form"] == form).any())
+    return f"- **solver (form)**: what was run. {words}\n"
 
 
 def _machine(results: Results) -> Table:
@@ -52,6 +67,7 @@ def _machine(results: Results) -> Table:
         "threads in effect": _values(rows["threads"]),
         "BLAS kernels in effect": _values(rows["kernels"]),
         "rivetbench": _values(rows["rivetbench_version"]),
+        "commit": commits_text(rows),
         "measured": _period(rows["recorded_at"]),
     }
     table = pd.DataFrame([{"what": k, "value": v} for k, v in facts.items() if v])
@@ -73,7 +89,7 @@ def _flat(facts: dict[str, Any], above: str = "") -> dict[str, str]:
 
 
 def _values(column: pd.Series[Any]) -> str:
-    """The distinct values of a column, in words."""
+    """The distinct values of a column as text."""
     values = [v for v in column.dropna().unique() if v != ""]
     return listed([f"{v:.10g}" if isinstance(v, float) else str(v) for v in values]) if values else ""
 
@@ -84,11 +100,11 @@ def _period(times: pd.Series[Any]) -> str:
 
 
 def _versions(rows: pd.DataFrame) -> Table:
-    found = rows.groupby("solver")["solver_version"].agg(_values).reset_index()
-    order = {solver: i for i, solver in enumerate(ORDER)}
-    found = found.sort_values("solver", key=lambda names: names.map(lambda s: (order.get(s, len(order)), s)))
-    columns = [word("solver", "solver"), word("version", "solver_version")]
-    return Table("versions", "*The solvers.*", found, columns)
+    found = rows.groupby("solver")[["solver_version", "solver_code"]].agg(_values)
+    found = found.reindex(in_order(rows, "solver")).reset_index()
+    columns = [word("solver", "solver"), word("version", "solver_version"), word("code", "solver_code")]
+    caption = "*The solvers.* Code: a fingerprint of the project's code that implements or calls the solver."
+    return Table("versions", caption, found, columns)
 
 
 def _method(results: Results) -> str:
@@ -98,12 +114,12 @@ def _method(results: Results) -> str:
         for name, unit in (("time_limit_s", "s"), ("memory_limit_mib", "MiB"))
         if rows[name].notna().any()
     ]
-    stopped = f" Each is stopped from outside at its limits ({', '.join(limits)})." if limits else ""
+    stopped = f" It is terminated at its limits ({', '.join(limits)})." if limits else ""
     asked = [tidy_power(t) for t in sorted(rows["tolerance"].dropna().unique())]
-    tolerances = f" The solvers were asked for a tolerance of {listed(asked)}." if asked else ""
+    tolerances = f" The requested tolerances are {listed(asked)}." if asked else ""
     return (
-        "Each measurement is a process of its own; thread counts are set before numpy is loaded and the "
-        f"clock starts after the imports.{stopped}{tolerances} Solvers read the same tolerance differently: "
-        f"compare them by the error they achieve. An answer counts when it is within {results.limit} of the "
-        "reference, whatever the solver says of itself."
+        "Each measurement runs in its own process; thread counts are set before numpy is loaded, and the "
+        f"clock starts after the imports.{stopped}{tolerances} Solvers interpret a tolerance differently, so "
+        "compare them by the error they achieve. An answer counts if it is within "
+        f"{results.limit} of the reference, whatever the solver reports."
     )

@@ -1,14 +1,15 @@
-"""The problems: their size, their conditioning beside the paper's, and how well the answer is known."""
+"""The problems: their size, their conditioning beside the paper's, and the reference error bound."""
 
 from __future__ import annotations
 
 import pandas as pd
 
-from report.document.blocks import Block, Section, Table, number, word
+from report.document.blocks import Block, Place, Section, Table, number, word
 from report.document.numbers import MISSING, as_number, power, signed, whole
+from report.results.printed import TABLE_4
 from report.results.reader import Results
 
-from .printed import TABLE_4
+PLACE = Place(310)
 
 PRINTED = {n: cond for _, n, _, cond in TABLE_4}
 
@@ -56,12 +57,12 @@ def _scenes(table: pd.DataFrame) -> Table:
         word("title", "title"),
         number("active", "active", whole),
         number("% of m", "active_share", _percent),
-        number("reference known to, mm", "reference_bound_mm", power),
-        word("by", "reference_route"),
+        number("reference error bound, mm", "reference_bound_mm", power),
+        word("reference computed by", "reference_route"),
     ]
     caption = (
-        "*The scenes.* Active: contacts closed in the reference answer. Known to: the bound on the "
-        "reference's own error; an answer is judged only where it is well below the limit."
+        "*The scenes.* Active: contacts closed in the reference answer. An answer is judged only if the "
+        "reference error bound is well below the limit."
     )
     return Table("scenes", caption, table[names], columns)
 

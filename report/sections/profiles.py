@@ -6,16 +6,19 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
+from report.analysis.drawn import omission_note, rare_variants
 from report.analysis.precision import judged, with_errors
-from report.analysis.shown import left_out, sidelined, styles_of
-from report.document.blocks import Figure, Section, Table, number, word
+from report.document.blocks import Figure, Place, Section, Table, number, word
 from report.document.numbers import counted, listed, whole
 from report.figures import style
+from report.figures.lines import styles_of
 from report.results.labels import in_order
 from report.results.reader import Results
 
-FEWEST = 5  # load cases that a profile stands on
-MOST = 0.75  # of the scenes that a series was asked for, to be compared
+PLACE = Place(370)
+
+FEWEST = 5  # load cases of a profile
+MOST = 0.75  # share of the scenes in the plan of a method, for it to be compared
 FACTORS = {1.0: "fastest", 2.0: "τ ≤ 2", 10.0: "τ ≤ 10"}
 
 
@@ -25,53 +28,53 @@ def section(results: Results) -> Section | None:
     if len(times) < FEWEST or len(times.columns) < 2:
         return None
     others = asked(results)
-    left = in_order(others[~others["series"].isin(times)], "series")
+    left = in_order(others[~others["method"].isin(times)], "method")
     caption = (
-        f"*Performance profiles over {counted(len(times), 'load case')}*: the share of them that a solver "
-        f"answers to within {results.limit}, with the best of its tolerances, in at most τ times the time of "
-        "the fastest. Left end: how often it is the fastest; right end: how many it answers at all. What "
-        "failed, missed the limit or was not run for want of time counts as never. Left out are load cases "
-        "that not every solver was asked for, or that nothing answered, or whose reference cannot judge the "
-        "limit."
-        + (f" Asked for fewer than three quarters of the scenes: {listed(left)}." if left else "")
-        + left_out(results)
+        f"*Performance profiles over {counted(len(times), 'load case')}*: the share that a solver answers "
+        f"within {results.limit}, with the best of its tolerances, in at most τ times the time of the "
+        "fastest. Left end: how often it is the fastest; right end: how many it answers at all. Failures, "
+        "answers outside the limit and runs not started for lack of time count as never. Load cases are "
+        "excluded if they are not in every solver's plan, if nothing answered them, or if the reference "
+        "cannot judge the limit."
+        + (f" In the plan for fewer than three quarters of the scenes: {listed(left)}." if left else "")
+        + omission_note(results)
     )
     figure = Figure("profiles", caption, _drawing(results, times))
     return Section("Performance profiles", [figure, _table(times, results)])
 
 
 def asked(results: Results) -> pd.DataFrame:
-    """The cells of the plan but for the sidelined variants, those not run for want of time among them."""
-    return results.cells[results.cells["status"] != "unsupported"].drop(sidelined(results).index)
+    """The cells of the plan without rare variants, including those not run for lack of time."""
+    return results.cells[results.cells["status"] != "unsupported"].drop(rare_variants(results).index)
 
 
 def compared(results: Results) -> pd.DataFrame:
-    """The cells, with errors, of the series asked for MOST of the scenes, on those scenes that all of them
-    were asked for.
+    """The cells, with errors, of the methods planned for MOST of the scenes, on the scenes planned for all
+    of these methods.
     """
     cells = asked(results)
-    table = cells.pivot_table(index="scene", columns="series", values="n", aggfunc="size").notna()
+    table = cells.pivot_table(index="scene", columns="method", values="n", aggfunc="size").notna()
     often = table.columns[table.mean() >= MOST]
     common = table.index[table[often].all(axis=1)]
-    return with_errors(cells[cells["series"].isin(often) & cells["scene"].isin(common)])
+    return with_errors(cells[cells["method"].isin(often) & cells["scene"].isin(common)])
 
 
 def ratios(cells: pd.DataFrame) -> pd.DataFrame:
-    """Time over that of the fastest, by scene and series; infinite where the limit was not met."""
+    """Time over that of the fastest, by scene and method; infinite if the limit was not met."""
     known = [s for s, of in cells.groupby("scene") if judged(of, of["limit_mm"].max())]
     good = cells[(cells["error"] <= cells["limit_mm"]) & cells["scene"].isin(known)]
-    times = good.pivot_table(index="scene", columns="series", values="load_case_s", aggfunc="min")
-    times = times.reindex(columns=in_order(cells, "series"))
+    times = good.pivot_table(index="scene", columns="method", values="load_case_s", aggfunc="min")
+    times = times.reindex(columns=in_order(cells, "method"))
     return times.div(times.min(axis=1), axis=0).fillna(np.inf)
 
 
 def _drawing(results: Results, times: pd.DataFrame) -> Drawing:
-    styles = styles_of(results, results.cells[results.cells["series"].isin(times)])
+    styles = styles_of(results, results.cells[results.cells["method"].isin(times)])
     right = 1.3 * float(times.where(np.isfinite(times)).max().max())
     drawing = style.figure(3.6)
     axes = drawing.subplots()
-    for series, look in styles.items():
-        met, counts = np.unique(times[series][np.isfinite(times[series])], return_counts=True)
+    for method, look in styles.items():
+        met, counts = np.unique(times[method][np.isfinite(times[method])], return_counts=True)
         shares = counts.cumsum() / len(times)
         axes.plot(met, shares, **style.marker_only(look))
         taus, steps = np.array([1.0, *met, max(right, 2.0)]), np.array([0.0, *shares, shares.max(initial=0)])
@@ -84,11 +87,11 @@ def _drawing(results: Results, times: pd.DataFrame) -> Drawing:
 
 
 def _table(times: pd.DataFrame, results: Results) -> Table:
-    lines = pd.DataFrame({"series": times.columns, "load_cases": len(times)})
+    lines = pd.DataFrame({"method": times.columns, "load_cases": len(times)})
     lines["answered"] = np.isfinite(times).sum().to_numpy()
-    columns = [word("solver (form)", "series"), number("load cases", "load_cases", whole)]
+    columns = [word("solver (form)", "method"), number("load cases", "load_cases", whole)]
     columns.append(number(f"within {results.limit}", "answered", whole))
     for factor, heading in FACTORS.items():
         lines[f"within_{factor:g}"] = (times <= factor).sum().to_numpy()
         columns.append(number(heading, f"within_{factor:g}", whole))
-    return Table("profiles", "*The profiles in numbers*, of load cases.", lines, columns)
+    return Table("profiles", "*The profiles in numbers*: load cases.", lines, columns)

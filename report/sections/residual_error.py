@@ -1,4 +1,4 @@
-"""KKT residuals against the displacement error: a small residual is no proof of a small error."""
+"""KKT residuals against the displacement error: a small residual does not prove a small error."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.precision import EXACT, swept
-from report.analysis.shown import styles_of
-from report.document.blocks import Block, Figure, Section, Table, Text, number, word
+from report.analysis.precision import ZERO_ERROR_MM, swept
+from report.document.blocks import Block, Figure, Place, Section, Table, Text, number, word
 from report.document.numbers import power, tidy_power, whole
 from report.figures import style
+from report.figures.lines import styles_of
 from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(360)
 
 RESIDUALS = {"primal_residual": "mm", "dual_residual": "N", "duality_gap": "N·mm"}
 
@@ -25,18 +27,18 @@ def section(results: Results) -> Section | None:
     cells = swept(results).dropna(subset=["error", *RESIDUALS])
     if cells.empty:
         return None
-    cells = cells.assign(**{name: cells[name].abs().clip(lower=EXACT) for name in RESIDUALS})
+    cells = cells.assign(**{name: cells[name].abs().clip(lower=ZERO_ERROR_MM) for name in RESIDUALS})
     caption = (
-        "*Displacement error against the residuals* of every answer, all scenes. Were a residual a proof, "
-        f"nothing would stand at the upper left. Dotted: {results.limit}. A residual of zero is drawn at "
-        f"{tidy_power(EXACT)}."
+        "*Displacement error against the residuals* of every answer on all scenes. If a small residual "
+        f"implied a small error, the upper left would be empty. Dotted: {results.limit}. A residual of zero "
+        f"is drawn at {tidy_power(ZERO_ERROR_MM)}."
     )
     blocks: list[Block] = [
         Text(sentence(cells, results)),
         Figure("residual-error", caption, _drawing(results, cells)),
         _table(cells, results),
     ]
-    return Section("Residual against error", blocks)
+    return Section("Residuals and displacement error", blocks)
 
 
 def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
@@ -44,8 +46,8 @@ def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
     drawing = style.figure_above(3.2, style.legend_entries(styles))
     panels = drawing.subplots(1, len(RESIDUALS), sharey=True)
     for axes, (name, unit) in zip(panels, RESIDUALS.items(), strict=True):
-        for series, look in styles.items():
-            line = cells[cells["series"] == series]
+        for method, look in styles.items():
+            line = cells[cells["method"] == method]
             axes.plot(line[name], line["error"], **look)
         axes.set(xscale="log", yscale="log", xlabel=f"{name.replace('_', ' ')}, {unit}")
         axes.axhline(cells["limit_mm"].max(), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
@@ -54,25 +56,25 @@ def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
 
 
 def sentence(cells: pd.DataFrame, results: Results) -> str:
-    """The starkest pair on one scene: an answer outside the limit, all three residuals of which are no
-    larger, and one smaller, than those of an answer within it.
+    """The starkest pair on one scene: an answer outside the limit whose three residuals are no larger, and
+    one smaller, than those of an answer within it.
     """
     pair = deceptive(cells)
     if pair is None:
         return (
             f"No answer outside {results.limit} has all three residuals as small as those of an answer "
-            "within it on the same scene: here the residuals together did tell the two apart."
+            "within it on the same scene: here the three residuals together do tell them apart."
         )
     bad, good = cells.loc[[*pair]].to_dict("records")
     return (
-        f"A small residual is no proof. On scene {bad['scene']}, {bad['label']} has residuals "
-        f"({_residuals(bad)}) no larger than {good['label']} ({_residuals(good)}), and yet "
-        f"an error of {power(bad['error'], 2)} mm against {power(good['error'], 2)} mm."
+        f"A small residual does not prove a small error. On scene {bad['scene']}, {bad['label']} has "
+        f"residuals ({_residuals(bad)}) no larger than {good['label']} ({_residuals(good)}), but an error of "
+        f"{power(bad['error'], 2)} mm against {power(good['error'], 2)} mm."
     )
 
 
 def deceptive(cells: pd.DataFrame) -> tuple[int, int] | None:
-    """Index of the two answers of `sentence`, of all such pairs that with the largest ratio of errors."""
+    """Index of the two answers of `sentence`: of all such pairs the one with the largest ratio of errors."""
     most, pair = 0.0, None
     for _, scene in cells.groupby("scene"):
         bad, good = scene[scene["error"] > scene["limit_mm"]], scene[scene["error"] <= scene["limit_mm"]]
@@ -94,18 +96,18 @@ def _residuals(line: dict[Hashable, object]) -> str:
 
 def _table(cells: pd.DataFrame, results: Results) -> Table:
     lines = []
-    for series in in_order(cells, "series"):
-        runs = cells[cells["series"] == series]
+    for method in in_order(cells, "method"):
+        runs = cells[cells["method"] == method]
         small = runs[runs["primal_residual"] <= runs["limit_mm"]]
-        line = {"series": series, "answers": len(runs), "small_residual": len(small)}
+        line = {"method": method, "answers": len(runs), "small_residual": len(small)}
         line |= {"outside": int((small["error"] > small["limit_mm"]).sum())}
         lines.append(line | {"worst_error_mm": small["error"].max()})
     columns = [
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         number("answers", "answers", whole),
         number(f"primal residual ≤ {results.limit}", "small_residual", whole),
-        number("of these outside it", "outside", whole),
+        number("of these, error outside", "outside", whole),
         number("their largest error, mm", "worst_error_mm", power),
     ]
-    caption = "*What a primal residual within the limit is worth*: how often the error was not."
+    caption = "*What a primal residual within the limit implies*: how often the error was outside it."
     return Table("residual-error", caption, pd.DataFrame(lines), columns)

@@ -1,13 +1,16 @@
-"""The rungs themselves, what was not solved on them, and what the model refuses."""
+"""The rungs themselves, the measurements on them without a correct answer, and what the model rejects."""
 
 from __future__ import annotations
 
 import pandas as pd
 
+from harness.results.schema import LADDERS
 from report.analysis.outcomes import with_outcomes
-from report.document.blocks import Block, Section, Table, number, word
+from report.document.blocks import Block, Place, Section, Table, number, word
 from report.document.numbers import as_number, power, whole
-from report.results.reader import RUNGS, Results
+from report.results.reader import Results
+
+PLACE = Place(20, "ladders")
 
 FIGURES = (
     *("label", "scene", "status", "verdict", "outcome", "displacement_error_mm", "limit_mm"),
@@ -18,7 +21,7 @@ FIGURES = (
 def section(results: Results) -> Section | None:
     if results.cells.empty or "scene" not in results.problems:
         return None
-    known = results.problems[results.problems["scene"].str.startswith(RUNGS)]
+    known = results.problems[results.problems["scene"].str.startswith(LADDERS)]
     known = known.drop_duplicates("scene", keep="last")
     blocks: list[Block] = [_taken(results, known)]
     broken = with_outcomes(results.cells).query("verdict != 'within'")
@@ -39,18 +42,18 @@ def _taken(results: Results, known: pd.DataFrame) -> Table:
     table["limit_mm"] = table["scene"].map(limits)
     columns = [
         word("rung", "scene"),
-        word("what it is", "title"),
+        word("description", "title"),
         number("n", "n", whole),
         number("m", "m", whole),
         number("active", "active", whole),
         number("cond(K)", "cond_K", power),
         number("limit, mm", "limit_mm", power),
-        number("answer known to, mm", "reference_bound_mm", power),
-        word("by", "reference_route"),
+        number("reference error bound, mm", "reference_bound_mm", power),
+        word("reference computed by", "reference_route"),
     ]
     caption = (
-        "*The rungs that are measured.* Chosen, exact: K, f and g were made from the answer without any "
-        "rounding, so it is the truth; else the reference's own proven bound."
+        "*The measured rungs.* Chosen, exact: K, f and g were made from a chosen answer without rounding, so "
+        "the reference is exact; otherwise the bound is proven with the reference."
     )
     return Table("rungs", caption, table, columns)
 
@@ -64,13 +67,13 @@ def _broken(cells: pd.DataFrame) -> Table:
         number("limit, mm", "limit_mm", power),
         number("backward error", "backward_error", power),
     ]
-    caption = "*Every row without a right answer.*"
+    caption = "*Every measurement without a correct answer.*"
     return Table("rungs-broken", caption, cells.sort_values(["scene", "label"])[[*FIGURES]], columns)
 
 
 def _refused(known: pd.DataFrame) -> Table:
     table = known[["scene", "title", "refused"]].copy()
-    table["refused"] = table["refused"].replace("", "**taken, though the model cannot carry it**")
-    columns = [word("rung", "scene"), word("what it is", "title"), word("what the model says", "refused")]
-    caption = "*What the model refuses, as it should*: a clear error, and no plausible wrong answer."
+    table["refused"] = table["refused"].replace("", "**accepted, although the model does not cover it**")
+    columns = [word("rung", "scene"), word("description", "title"), word("error message", "refused")]
+    caption = "*What the model rejects, as it should*: a clear error rather than a plausible wrong answer."
     return Table("rungs-refused", caption, table, columns)

@@ -1,4 +1,4 @@
-"""An in-house code beside the libraries' codes of its own kind of method."""
+"""An in-house code beside library codes of the same kind of method."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.timed import records, seconds_text, timed
-from report.document.blocks import Column, Section, Table, number, word
+from report.analysis.seconds import seconds_text, timed
+from report.document.blocks import Column, Place, Section, Table, number, records, word
 from report.document.numbers import significant, whole
 from report.results.reader import Results
 
-#: Ours, the form, and the other code of a dual active-set method.
+PLACE = Place(140)
+
+#: The in-house code, the form, and the library of the same method, a dual active-set method.
 PAIRS = (("gi", "dual", "daqp"), ("gi", "primal", "quadprog"))
 
 
 def section(results: Results) -> Section | None:
-    """In a run with yardsticks, of every scene that both codes were measured on."""
+    """In a run with machine benchmarks, for every scene that both codes were measured on."""
     if not results.cells["cholesky_s"].notna().any():
         return None
     cells = timed(results.cells_by_threads())
@@ -28,15 +30,15 @@ def section(results: Results) -> Section | None:
         word("scene", "scene"),
         number("active", "active", whole),
         number("threads", "threads", whole),
-        word("this", "series"),
+        word("in-house", "method"),
         word("s", "text"),
-        word("the other", "series_other"),
+        word("library", "method_other"),
         word("s ", "text_other"),
         Column("ratio", _ratio),
     ]
     caption = (
-        "*Goldfarb and Idnani's method beside the libraries' dual active-set codes*: seconds a load case, "
-        "medians of the repeats. Where the other has no answer in time, the ratio is at most what is shown."
+        "*Goldfarb and Idnani's method beside the libraries' dual active-set codes*: seconds per load case, "
+        "medians of the repeats, and their ratio, an upper bound if the library ran out of time."
     )
     return Section(
         "Against codes of the same method", [Table("same-method", caption, pd.DataFrame(lines), columns)]
@@ -44,11 +46,11 @@ def section(results: Results) -> Section | None:
 
 
 def _lines(cells: pd.DataFrame, solver: str, form: str, other: str) -> list[dict[str, Any]]:
-    """A line a scene and number of threads that both were measured on."""
+    """One line per scene and number of threads that both were measured on."""
     keys = ["scene", "threads"]
     mine = cells[(cells["solver"] == solver) & (cells["form"] == form) & (cells["verdict"] == "within")]
     theirs = cells[(cells["solver"] == other) & (cells["form"] == form) & cells["at_least"].notna()]
-    both = mine.merge(theirs[[*keys, "series", "text", "at_least", "cut"]], on=keys, suffixes=("", "_other"))
+    both = mine.merge(theirs[[*keys, "method", "text", "at_least", "cut"]], on=keys, suffixes=("", "_other"))
     return records(
         both.assign(ratio=both["load_case_s"] / both["at_least_other"]).sort_values(["n", "active"])
     )

@@ -1,4 +1,4 @@
-"""How time and memory grow with the size: exponents in n over the scenes of one joint on finer grids."""
+"""How time and memory grow with the size: exponents in n for one joint on finer and finer grids."""
 
 from __future__ import annotations
 
@@ -8,38 +8,46 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from report.analysis.fit import exponent
-from report.analysis.shown import styles_of
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Column, Figure, Section, Table, number, word
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Column, Figure, Place, Section, Table, number, records, word
 from report.document.numbers import MISSING, whole
 from report.figures import style
+from report.figures.lines import styles_of
 from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(160)
 
 FEWEST = 3  # sizes
 #: What grows, and its unit.
 GROWING = {
-    "load_case_s": "seconds a load case",
-    "once_s": "seconds to prepare, once an assembly",
+    "load_case_s": "seconds per load case",
+    "once_s": "seconds of preparation per assembly",
     "working_mib": "working memory, MiB",
 }
-SHORTEST = {"load_case_s": 1e-2, "once_s": 1e-2, "working_mib": 8.0}  # below, it is not Q that is measured
+SHORTEST = {
+    "load_case_s": 1e-2,
+    "once_s": 1e-2,
+    "working_mib": 8.0,
+}  # smaller values do not reflect the size of Q
 
 
 def section(results: Results) -> Section | None:
-    """Of the scenes scaling/…, in a run with yardsticks."""
+    """For the scenes scaling/…, in a run with machine benchmarks."""
     cells = results.cells[results.cells["scene"].str.startswith("scaling/")]
     if not cells["cholesky_s"].notna().any() or cells["n"].nunique() < FEWEST:
         return None
-    return Section("How the work grows", [_exponents(cells), _figures(cells), _figure(results, cells)])
+    return Section(
+        "Scaling with the problem size", [_exponents(cells), _figures(cells), _figure(results, cells)]
+    )
 
 
 def _exponents(cells: pd.DataFrame) -> Table:
     within = cells[cells["verdict"] == "within"]
     lines: list[dict[str, Any]] = []
-    for series in in_order(within, "series"):
-        mine = within[within["series"] == series].sort_values("n")
-        line: dict[str, Any] = {"series": series, "sizes": len(mine), "largest": mine["n"].max()}
+    for method in in_order(within, "method"):
+        mine = within[within["method"] == method].sort_values("n")
+        line: dict[str, Any] = {"method": method, "sizes": len(mine), "largest": mine["n"].max()}
         for name in GROWING:
             fit = exponent(mine["n"].tolist(), _fitted(mine, name).tolist())
             line |= {name: fit and fit.slope, f"{name}_shown": str(fit) if fit else MISSING}
@@ -47,18 +55,18 @@ def _exponents(cells: pd.DataFrame) -> Table:
     once = within.drop_duplicates("scene")
     for name, what in (("cholesky_s", "one Cholesky of Q"), ("product_s", "one product Qv")):
         fit = exponent(once["n"].tolist(), once[name].tolist())
-        lines.append({"series": what, "sizes": len(once), "largest": once["n"].max()})
+        lines.append({"method": what, "sizes": len(once), "largest": once["n"].max()})
         lines[-1] |= {"load_case_s": fit and fit.slope, "load_case_s_shown": str(fit) if fit else MISSING}
     columns = [
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         number("sizes", "sizes", whole),
         number("largest n", "largest", whole),
         *(Column(f"exponent of {what}", _shown(name)) for name, what in GROWING.items()),
     ]
     caption = (
-        "*Exponents in n*, the slope of a straight line through the logarithms, with its standard error. "
-        "Only answers within the limit count. Working memory is the largest resident memory less what was "
-        "resident with the data loaded. Left out: times below 10 ms and memory below 8 MiB."
+        "*Exponents in n*: the slope of a straight line in log–log, with its standard error. Only answers "
+        "within the limit count. Working memory: the largest resident memory minus that resident after "
+        "loading the data. Times below 10 ms and memory below 8 MiB are excluded."
     )
     return Table("scaling-exponents", caption, pd.DataFrame(lines), columns)
 
@@ -72,22 +80,22 @@ def _shown(name: str) -> Any:
 
 
 def _figures(cells: pd.DataFrame) -> Table:
-    names = in_order(cells, "series")
-    table = cells.assign(place=cells["series"].map(names.index)).sort_values(["n", "place"])
+    names = in_order(cells, "method")
+    table = cells.assign(place=cells["method"].map(names.index)).sort_values(["n", "place"])
     table = table.assign(seconds=[seconds_text(cell) for cell in records(table)])
     table["q_mib"] = 8 * table["m"] ** 2 / 2**20
     columns = [
         number("n", "n", whole),
         number("m", "m", whole),
         number("active", "active", whole),
-        word("solver (form)", "series"),
-        word("s a load case", "seconds"),
-        number("once, s", "once_s"),
+        word("solver (form)", "method"),
+        word("s per load case", "seconds"),
+        number("per assembly, s", "once_s"),
         number("Cholesky of Q, s", "cholesky_s"),
         number("working memory, MiB", "working_mib", whole),
         number("Q, MiB", "q_mib", whole),
     ]
-    caption = "*The figures behind the exponents*, medians of the repeats. > : ended by the time limit."
+    caption = "*The data of the fits*, medians of the repeats. >: stopped at the time limit."
     return Table("scaling", caption, table, columns)
 
 
@@ -97,8 +105,8 @@ def _figure(results: Results, cells: pd.DataFrame) -> Figure:
     panels: list[Axes] = list(drawing.subplots(2, 1, sharex=True))
     styles = styles_of(results, within)
     for axes, name in zip(panels, ("load_case_s", "working_mib"), strict=True):
-        for series, look in styles.items():
-            line = within[within["series"] == series].sort_values("n")
+        for method, look in styles.items():
+            line = within[within["method"] == method].sort_values("n")
             axes.plot(line["n"], _fitted(line, name).where(lambda v: v > 0), **look)
         axes.set(xscale="log", yscale="log", ylabel=GROWING[name])
     data = within.groupby("n")[["cholesky_s", "m"]].median()
@@ -119,7 +127,7 @@ def _figure(results: Results, cells: pd.DataFrame) -> Figure:
     panels[1].set_xlabel("n")
     drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     caption = (
-        "*Time and working memory against the size*, one joint and load on finer and finer grids, on "
+        "*Time and working memory against the size*, for one joint and load on finer and finer grids, on "
         "logarithmic axes; answers within the limit only."
     )
     return Figure("scaling", caption, drawing)

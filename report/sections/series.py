@@ -1,4 +1,4 @@
-"""Series: load cases a second and their errors, solver by solver, and as ratios to the fastest library."""
+"""Series: load cases per second and their errors by solver, also relative to the fastest library."""
 
 from __future__ import annotations
 
@@ -6,19 +6,23 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Column, Section, Table, Text, number, word
+from harness.results.schema import ANSWERED
+from report.document.blocks import Column, Place, Section, Table, Text, number, word
 from report.document.numbers import power, spread, whole
-from report.results.labels import IN_HOUSE, named
-from report.results.reader import ANSWERED, CELL, Results
+from report.results.labels import named
+from report.results.reader import Results
+from report.results.rows import CELL
+
+PLACE = Place(170)
 
 CASE = ["setup_s", "solve_s", "form_s"]
 ROUND = ["scene", "threads"]
 
-#: What each library has for the next load case on the same matrices.
+#: What each library offers for the next load case with the same matrices.
 REPEATED = {
     "piqp": "PIQP `update` of the vectors, no warm start",
-    "proxqp": "ProxQP `update` and a warm start (the dual form's from the case before, for it takes no "
-    "multipliers of bounds)",
+    "proxqp": "ProxQP `update` and a warm start (in the dual form from the previous case, since it "
+    "accepts no multipliers of bounds)",
     "clarabel": "Clarabel `update` of the vectors, no warm start",
     "osqp": "OSQP `update` and `warm_start` from the nearest case",
 }
@@ -38,31 +42,30 @@ def section(results: Results) -> Section | None:
         number("threads", "threads", whole),
         word("solver (form)", "label"),
         Column("within", lambda row: f"{row['within']} of {row['cases']}"),
-        number("s a case", "case_s"),
+        number("s per case", "case_s"),
         number("cases/s", "rate"),
-        number("first, s", "first_s"),
-        number("once, s", "once_s"),
+        number("first case, s", "first_s"),
+        number("per assembly, s", "once_s"),
         number("largest error, mm", "error_mm", power),
-        Column("to the fastest library", spread("to_library")),
+        Column("time relative to the fastest library", spread("to_library")),
     ]
     caption = (
-        "*Series: load cases on one assembly, in one process.* *A case*: update, solve and the dual form's p "
-        "and x, the median of the cases after the first (solved together, after the first so many). "
-        "*First*: with nothing solved before. *Once*: convert and prepare. *To the fastest library*: the "
-        "seconds of these cases as a ratio to the median of the library that is the fastest on the scene, "
-        "with as many threads; their median, and in brackets the least to the most. Only answers within the "
-        "limit count."
+        "*Series: load cases on one assembly, in one process.* *Per case*: update, solve and form, the "
+        "median over the cases after the first (if batched, after the first batch). *First case*: without "
+        "any before it. *Per assembly*: convert and prepare. *Relative to the fastest library*: the time of "
+        "these cases over the median of the fastest library on the scene with as many threads; the median, "
+        "and in brackets the range; 0.1 is ten times as fast. Only answers within the limit count."
     )
     return Section("Series of load cases", [Text(_ways(rows)), Table("series", caption, lines, columns)])
 
 
 def compared(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows of series with `case_s`, the seconds of a case; `later_s` the same where a case was solved before
-    and the answer is within the limit; `to_library`, later_s as a ratio to the fastest library's median.
+    """Rows of series with `case_s`, the seconds per case; `later_s`, the same if a case was solved before and
+    the answer is within the limit; `to_library`, later_s relative to the fastest library's median.
     """
     rows = rows.assign(case_s=rows[CASE].sum(axis=1))
     rows["later_s"] = rows["case_s"].where((rows["verdict"] == "within") & (rows["warm"] == 1))
-    libraries = rows[~rows["solver"].isin(IN_HOUSE)].groupby(CELL, dropna=False)["later_s"].median()
+    libraries = rows[~rows["in_house"]].groupby(CELL, dropna=False)["later_s"].median()
     fastest = libraries.groupby(ROUND).min().rename("library_s")
     rows = rows.join(fastest, on=ROUND)
     return rows.assign(to_library=rows["later_s"] / rows["library_s"])
@@ -80,7 +83,7 @@ def _line(group: pd.DataFrame) -> dict[str, Any]:
         "once_s": float(group[["convert_s", "prepare_s"]].max().sum()),
         "first_iterations": answered.loc[first, "iterations"].median(),
         "later_iterations": answered.loc[later, "iterations"].median(),
-        "together": group["together"].max(),
+        "batched": group["batched"].max(),
         "error_mm": answered["displacement_error_mm"].max(),
     }
     line |= {"to_library": group["to_library"].median(), "to_library_least": group["to_library"].min()}
@@ -88,13 +91,13 @@ def _line(group: pd.DataFrame) -> dict[str, Any]:
 
 
 def _ways(rows: pd.DataFrame) -> str:
-    """How the solvers come from one case to the next."""
+    """How the solvers proceed from one case to the next."""
     seen = [way for solver, way in REPEATED.items() if (rows["solver"] == solver).any()]
-    words = "Each solver takes one load case after another, by its own way from one to the next"
+    words = "Each solver takes one load case after another, each in its own way"
     words += f": {'; '.join(seen)}." if seen else "."
-    if rows["together"].notna().any():
+    if rows["batched"].notna().any():
         words += (
-            " *Together* is given many load cases at once, and their seconds are shared equally among them; "
-            "the others have each one before the next is given."
+            " *Batched*: given many load cases at once, whose time is divided equally among them; all others "
+            "are given one load case at a time."
         )
     return words

@@ -1,4 +1,4 @@
-"""How fast, as ratios within one run: to the fastest library, and to what the machine can do at best."""
+"""Times relative to the fastest library and to what the machine can do, within one run."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.shown import drawn, left_out, styles_of
-from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.analysis.drawn import drawn_cells, omission_note
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, number, word
 from report.document.numbers import significant, span, spread, whole
 from report.figures import style
-from report.results.labels import IN_HOUSE, in_order
+from report.figures.lines import styles_of
+from report.results.labels import in_order
 from report.results.reader import Results
+
+PLACE = Place(130)
 
 PANEL = 3.0  # inches
 ROUND = ["scene", "threads", "repeat"]
@@ -22,28 +25,28 @@ def section(results: Results) -> Section | None:
     if not results.rows["cholesky_s"].notna().any():
         return None
     cases = load_cases(results)
-    blocks: list[Block] = [_yardsticks(results.rows)]
+    blocks: list[Block] = [_machine(results.rows)]
     if len(cases):
         blocks = [_ratios(cases), *blocks, _figure(results, cases)]
-    return Section("Speed, as ratios", blocks)
+    return Section("Relative speed", blocks)
 
 
 def load_cases(results: Results) -> pd.DataFrame:
-    """The rows within the limit, with `series`, and the seconds of a load case and of all the solver does.
+    """The rows within the limit, with `method`, the seconds per load case and their ratios.
 
-    load_case_s : set-up + solve + the dual form's own cost
-    total_s : the same with the solver's own preparation, paid once an assembly
-    to_cholesky : load_case_s to a Cholesky factorisation of Q in the same process
-    to_library, total_to_library : to the fastest library of the same round of the repeats, in either form
+    load_case_s : set-up + solve + form
+    total_s : the same with the solver's own preparation, paid once per assembly
+    to_cholesky : load_case_s over one Cholesky factorisation of Q in the same process
+    to_library, total_to_library : over the fastest library of the same round of repeats, in any form
     """
     rows = results.rows
     keys = ["scene", "solver", "form", "variant", "tolerance", "threads"]
-    names = results.cells_by_threads()[[*keys, "series"]]
+    names = results.cells_by_threads()[[*keys, "method"]]
     cases = rows[rows["verdict"] == "within"].merge(names, on=keys)
     cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
     cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
     cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
-    library = cases[~cases["solver"].isin(IN_HOUSE)].groupby(ROUND)[["load_case_s", "total_s"]].min()
+    library = cases[~cases["in_house"]].groupby(ROUND)[["load_case_s", "total_s"]].min()
     cases = cases.join(library.add_prefix("library_"), on=ROUND)
     cases["to_library"] = cases["load_case_s"] / cases["library_load_case_s"]
     cases["total_to_library"] = cases["total_s"] / cases["library_total_s"]
@@ -53,37 +56,37 @@ def load_cases(results: Results) -> pd.DataFrame:
 def _ratios(cases: pd.DataFrame) -> Table:
     lines = []
     for (n, threads), group in cases.groupby(["n", "threads"]):
-        for series in in_order(group, "series"):
-            mine = group[group["series"] == series]
-            line: dict[str, Any] = {"n": n, "threads": threads, "series": series}
+        for method in in_order(group, "method"):
+            mine = group[group["method"] == method]
+            line: dict[str, Any] = {"n": n, "threads": threads, "method": method}
             line |= {"scenes": mine["scene"].nunique(), "runs": len(mine)}
             for name in ("to_library", "total_to_library", "to_cholesky"):
                 by_scene = mine.groupby("scene")[name].median()
                 line |= {name: by_scene.median(), f"{name}_least": mine[name].min()}
                 line |= {f"{name}_most": mine[name].max()}
             lines.append(line)
-    rivals = ", ".join(in_order(cases[~cases["solver"].isin(IN_HOUSE)], "series")) or "none"
+    rivals = ", ".join(in_order(cases[~cases["in_house"]], "method")) or "none"
     caption = (
-        "*Seconds as ratios*: a load case (set-up + solve + the dual form's own cost) to the fastest "
-        "library's on the same scene in the same round of repeats; the same with what each prepares for "
-        "itself once an assembly; and a load case to one Cholesky factorisation of Q, measured in the same "
-        "process after the solve. The median over the scenes, and in brackets the least to the most of all "
-        f"runs. Only answers within the limit count. Libraries: {rivals}."
+        "*Relative times*: the time per load case (set-up + solve + form) over that of the fastest library "
+        "on the same scene in the same round of repeats; the same with the preparation of each, paid once "
+        "per assembly; and the time per load case over one Cholesky factorisation of Q, measured in the same "
+        "process after the solve. The median over the scenes, and in brackets the range of all runs; 0.1 is "
+        f"ten times as fast. Only answers within the limit count. Libraries: {rivals}."
     )
     columns = [
         number("n", "n", whole),
         number("threads", "threads", whole),
-        word("solver (form)", "series"),
+        word("solver (form)", "method"),
         number("scenes", "scenes", whole),
         number("runs", "runs", whole),
-        Column("load case, to the fastest library", spread("to_library")),
-        Column("with preparation, to the fastest library", spread("total_to_library")),
-        Column("load case, to one Cholesky of Q", spread("to_cholesky")),
+        Column("per load case, relative to the fastest library", spread("to_library")),
+        Column("with preparation, relative to the fastest library", spread("total_to_library")),
+        Column("per load case, in Cholesky factorisations of Q", spread("to_cholesky")),
     ]
     return Table("speed-ratios", caption, pd.DataFrame(lines), columns)
 
 
-def _yardsticks(rows: pd.DataFrame) -> Table:
+def _machine(rows: pd.DataFrame) -> Table:
     lines = []
     for (n, threads), group in rows[rows["cholesky_s"].notna()].groupby(["n", "threads"]):
         m = float(group["m"].iloc[0])
@@ -108,7 +111,8 @@ def _yardsticks(rows: pd.DataFrame) -> Table:
     ]
     caption = (
         "*What the machine can do*: a Cholesky factorisation of Q (m³/3 operations) and a product Qv (one "
-        "pass over 8m² bytes), after each solve in its process, the median of three; medians over all runs."
+        "pass over 8m² bytes), measured after each solve in its process, the median of three; here the "
+        "medians over all runs."
     )
     return Table("speed-yardsticks", caption, pd.DataFrame(lines), columns)
 
@@ -122,12 +126,12 @@ def _figure(results: Results, cases: pd.DataFrame) -> Figure:
     results, cases = results.of_threads(most), cases[cases["threads"] == most]
     sizes = sorted(cases["n"].unique())
     drawing = style.figure(PANEL * len(sizes) + 0.3)
-    shown = drawn(results)
-    styles = styles_of(results, shown[shown["series"].isin(cases["series"])])
+    shown = drawn_cells(results)
+    styles = styles_of(results, shown[shown["method"].isin(cases["method"])])
     for axes, n in zip(drawing.subplots(len(sizes), 1, squeeze=False)[:, 0], sizes, strict=True):
         of_size = cases[cases["n"] == n]
-        for series, look in styles.items():
-            line = of_size[of_size["series"] == series].groupby("active")["to_cholesky"].median()
+        for method, look in styles.items():
+            line = of_size[of_size["method"] == method].groupby("active")["to_cholesky"].median()
             axes.plot(line.index, line.to_numpy(), **look)
         product = (of_size["product_s"] / of_size["cholesky_s"]).median()
         for height, what in ((1.0, "one Cholesky of Q"), (product, "one product Qv")):
@@ -143,8 +147,8 @@ def _figure(results: Results, cases: pd.DataFrame) -> Figure:
     axes.set_xlabel("active contacts")
     drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     caption = (
-        "*Seconds a load case in units of one Cholesky factorisation of Q* of the same process, against the "
-        "active contacts; answers within the limit only, medians of the repeats, at the largest number of "
-        f"threads.{left_out(results)}"
+        "*Time per load case in Cholesky factorisations of Q* of the same process, against the active "
+        "contacts; answers within the limit only, medians of the repeats, at the largest number of threads."
+        f"{omission_note(results)}"
     )
     return Figure("speed", caption, drawing)

@@ -1,4 +1,4 @@
-"""How far the repeats of a time lie apart, and which times are not to be relied on, and why."""
+"""How much repeated times vary, which times are unreliable, and why."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ from typing import Any
 
 import pandas as pd
 
-from report.document.blocks import Block, Section, Table, Text, number, word
+from harness.results.schema import ANSWERED
+from report.document.blocks import Block, Place, Section, Table, Text, number, word
 from report.document.numbers import counted, whole
 from report.results.labels import named
-from report.results.reader import ANSWERED, CELL, Results
+from report.results.reader import Results
+from report.results.rows import CELL
 
-SPREAD = 0.2  # most less least, over the median: a time that spreads by more is called unstable
-SHORT = 0.05  # seconds: below, the clock and the start of threads tell
+PLACE = Place(390)
+
+SPREAD = 0.2  # (largest − least) / median: a time that varies by more is called unstable
+SHORT = 0.05  # seconds: shorter times are dominated by the clock and the start of threads
 
 
 def section(results: Results) -> Section | None:
@@ -23,21 +27,21 @@ def section(results: Results) -> Section | None:
     unstable = repeated[repeated["spread"] > SPREAD].sort_values("spread", ascending=False)
     once = len(table) - len(repeated)
     words = (
-        f"Of {counted(len(repeated), 'time')} measured several times, {len(unstable)} spread by more than "
+        f"Of {counted(len(repeated), 'time')} measured repeatedly, {len(unstable)} vary by more than "
         f"{SPREAD:.0%} of the median; half of them by at most {repeated['spread'].median():.1%}."
     )
     if once:
         were = "was" if once == 1 else "were"
-        words += f" The other {counted(once, 'time')} {were} measured once: take them to be no more stable."
+        words += f" The other {counted(once, 'time')} {were} measured once; assume that they vary as much."
     blocks: list[Block] = [Text(words)]
     if len(unstable):
         blocks.append(_table(unstable))
-    return Section("How stable the times are", blocks)
+    return Section("Repeatability of the times", blocks)
 
 
 def spreads(results: Results) -> pd.DataFrame:
-    """A line a cell with answers: of the seconds a load case of its repeats, median, least, most, `spread`
-    = (most − least) / median, and `why` they may spread.
+    """One line per cell with answers: of its repeats' seconds per load case the median, least and largest,
+    `spread` = (largest − least) / median, and `why` they may vary.
     """
     rows = named(results.rows[results.rows["case"].isna()])  # the cases of a series are no repeats
     rows = rows[rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()]
@@ -55,15 +59,15 @@ def _line(runs: pd.DataFrame) -> dict[str, Any]:
 
 
 def why(runs: pd.DataFrame) -> str:
-    """What differs between the repeats of one measurement, the likeliest cause of their spread first."""
+    """What differs between the repeats of one measurement, the likeliest cause first."""
     for name, words in (("iterations", "iterations"), ("inner_iterations", "inner iterations")):
         least, most = runs[name].min(), runs[name].max()
         if most > least:
-            return f"{whole(least)} to {whole(most)} {words}: the solver does not repeat itself"
+            return f"{whole(least)} to {whole(most)} {words}: the solver is not deterministic"
     if runs["seconds"].median() < SHORT:
-        return f"shorter than {SHORT:g} s: the start of threads and the clock tell"
+        return f"shorter than {SHORT:g} s: dominated by the start of threads and the clock"
     slowest = runs.sort_values("seconds")["recorded_at"].iloc[-1]
-    return f"the same iterations each time: the machine, slowest at {slowest}"
+    return f"the same iterations each time, so the machine; slowest at {slowest}"
 
 
 def _table(unstable: pd.DataFrame) -> Table:
@@ -73,9 +77,9 @@ def _table(unstable: pd.DataFrame) -> Table:
         number("repeats", "repeats", whole),
         number("median, s", "median_s"),
         number("least, s", "least_s"),
-        number("most, s", "most_s"),
+        number("largest, s", "most_s"),
         number("spread, %", "percent", whole),
         word("why", "why"),
     ]
-    caption = "*Times not to be relied on*, the most unstable first: most less least, over the median."
+    caption = "*Unreliable times*, the most variable first. Spread: (largest − least) / median."
     return Table("unstable-times", caption, unstable.assign(percent=100 * unstable["spread"]), columns)

@@ -1,4 +1,4 @@
-"""The summary: who is within the limit, how fast, and which solver to use."""
+"""The summary: which solvers are within the limit, how fast they are, and which one to use."""
 
 from __future__ import annotations
 
@@ -6,23 +6,25 @@ from collections.abc import Mapping
 from typing import Any
 
 from report.analysis.advice import advice
-from report.analysis.precision import ENOUGH
-from report.analysis.shown import left_out, sidelined
+from report.analysis.drawn import omission_note, rare_variants
+from report.analysis.precision import CURVE_POINTS
 from report.analysis.standings import TIE, compare, standings
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, word
 from report.document.numbers import counted, listed, power, whole
 from report.figures.scoreboard import scoreboard
 from report.results.reader import Results
+
+PLACE = Place(110)
 
 
 def section(results: Results) -> Section | None:
     table = standings(results)
     if table.empty:
         return None
-    several = table.groupby("series")["label"].transform("size") >= ENOUGH
-    table = table[~(several & table["series"].duplicated())]
+    several = table.groupby("method")["label"].transform("size") >= CURVE_POINTS
+    table = table[~(several & table["method"].duplicated())]
     limit = results.limit
-    rare = sidelined(results)["label"]
+    rare = rare_variants(results)["label"]
     comparisons = [compare(results, n) for n in results.sizes]
     columns = [
         word("solver (form)", "label"),
@@ -33,32 +35,31 @@ def section(results: Results) -> Section | None:
     if table["cannot_be_judged"].any():
         columns.append(number("cannot be judged", "cannot_be_judged", whole))
     columns.append(number("worst error, mm", "worst_error_mm", power))
-    columns += [number(f"s a load case, n = {n}", f"load_case_s_{n}") for n in results.sizes]
+    columns += [number(f"s per load case, n = {n}", f"load_case_s_{n}") for n in results.sizes]
     columns.append(number("peak memory, MiB", "peak_rss_mib", whole))
 
     compared = [
         f"n = {c.n}: {len(c.common)} of {counted(len(c.scenes), 'scene')}" for c in comparisons if c.seconds
     ]
     means = (
-        "Seconds a load case (set-up + solve + the dual form's own cost) are geometric means over the scenes "
-        "that every compared line answered within the limit "
-        f"({'; '.join(compared) or 'there is none'}); compared are the lines "
-        "within the limit on more than half of a size's scenes, the others show –. What failed is counted, "
-        "never averaged in."
+        "Seconds per load case (set-up + solve + form) are geometric means over the scenes that every "
+        "compared line answered within the limit "
+        f"({'; '.join(compared) or 'there is none'}). Compared are the lines within the limit on more than "
+        "half of the scenes of a size; the others show –. Failures are counted, but enter no mean."
     )
     if several.any():
-        means += f" Of {ENOUGH} tolerances or more of a solver, the best; the tables of the scenes have all."
+        means += f" Of {CURVE_POINTS} or more tolerances of a solver, the best; the tables by scene have all."
     blocks: list[Block] = [
         Text("### Which solver to use"),
         Text("\n".join(words for n in results.sizes if (words := advice(results, n)))),
         Text(_small_print(results)),
         Figure(
             "summary",
-            f"*Every solver on every scene, the best at the top.* Blue: within {limit}, seconds a load case; "
-            "the darker, the nearer to the fastest of the scene (palest: 100 times as long). Hatched: "
-            "outside the limit, with its error in mm. Grey: no answer, and why (not run: out of time "
-            "already at a looser tolerance, or on every scene of the next smaller size). Empty: not asked "
-            "for. At the right, the number of scenes within the limit." + left_out(results),
+            f"*Every solver on every scene, the best first.* Blue: within {limit}, seconds per load case; "
+            "the darker, the closer to the fastest on the scene (palest: 100 times as long). Hatched: "
+            "outside the limit, with the error in mm. Grey: no answer, and why (not run: predicted to exceed "
+            "the time limit, from a looser tolerance or from every scene of the next smaller size). Empty: "
+            "not in the plan. On the right, the number of scenes within the limit." + omission_note(results),
             scoreboard(results.cells, table[~table["label"].isin(rare)]),
         ),
         Text("### Answers within the limit, then time"),
@@ -68,8 +69,8 @@ def section(results: Results) -> Section | None:
 
 
 def _outside(row: Mapping[str, Any]) -> str:
-    said = row["outside_said_solved"]
-    return f"{row['outside']} ({said} said solved)" if said else str(row["outside"])
+    claimed = row["outside_claimed"]
+    return f"{row['outside']} ({claimed} reported solved)" if claimed else str(row["outside"])
 
 
 def _no_answer(row: Mapping[str, Any]) -> str:
@@ -80,5 +81,5 @@ def _small_print(results: Results) -> str:
     repeats = int(results.cells["repeats"].max())
     runs = "Each time is one run" if repeats == 1 else f"Times are medians of up to {repeats} runs"
     unsupported = sorted(results.cells.loc[results.cells["status"] == "unsupported", "label"].unique())
-    left_out = f" Not offered by the solver and not counted: {listed(unsupported)}." if unsupported else ""
-    return f"{runs}; lines less than {TIE - 1:.0%} apart are called equally fast.{left_out}"
+    omitted = f" Form not taken by the solver: {listed(unsupported)}." if unsupported else ""
+    return f"{runs}; lines less than {TIE - 1:.0%} apart count as equally fast.{omitted}"

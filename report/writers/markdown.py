@@ -1,83 +1,23 @@
-"""Writes the report of a results directory: Markdown, a PNG a figure, a CSV a table.
-
-To add a section: write one file in `sections` with a function `section(results)` that returns a
-`Section`, or None when the rows have nothing for it, and name it in `SECTIONS`.
-"""
+"""Writes the report of a results directory: Markdown, a PNG per figure, a CSV per table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-
-import jinja2
 
 from report.analysis.checks import warnings
 from report.document.blocks import Block, Figure, Section, Table
 from report.figures import style
 from report.results.reader import Results, read
-from report.sections import (
-    accuracy,
-    amortised,
-    asked_achieved,
-    breakdown,
-    details,
-    gap_map,
-    ingredients,
-    ladders,
-    machine,
-    price_list,
-    problems,
-    profiles,
-    recommendation,
-    residual_error,
-    rungs,
-    same_method,
-    scaling,
-    series,
-    speed,
-    stability,
-    summary,
-    times,
-)
-from report.sections.paper import claims, figures3_4, figures5_7, table1, table2, table3, table4
 
-SECTIONS: list[Callable[[Results], Section | None]] = [
-    summary.section,
-    recommendation.section,
-    speed.section,
-    same_method.section,
-    ingredients.section,
-    scaling.section,
-    series.section,
-    claims.section,
-    table1.section,
-    table2.section,
-    table3.section,
-    table4.section,
-    figures3_4.section,
-    figures5_7.section,
-    problems.section,
-    times.section,
-    accuracy.section,
-    price_list.section,
-    asked_achieved.section,
-    residual_error.section,
-    profiles.section,
-    amortised.section,
-    stability.section,
-    breakdown.section,
-    gap_map.section,
-    details.section,
-]
-#: The same for the rungs of ladders, which the sections above leave out.
-OF_RUNGS: list[Callable[[Results], Section | None]] = [ladders.section, rungs.section]
+from .discovery import sections
+from .pages import template
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md anew from the results in DIRECTORY and return its path.
+    """Write DIRECTORY/report/report.md from the results in DIRECTORY and return its path.
 
-    Raises FileNotFoundError where DIRECTORY has no measurements.jsonl.
+    Raises FileNotFoundError if DIRECTORY has no measurements.jsonl.
     """
     results = read(directory)
     target = directory / "report"
@@ -87,10 +27,7 @@ def write(directory: Path) -> Path:
     parts = []
     with style.applied():
         for i, part in enumerate(results.by_machine()):
-            made = [section(part.of_rungs(True)) for section in OF_RUNGS]
-            made += [section(part.of_rungs(False)) for section in SECTIONS] + [machine.section(part)]
-            sections = [section for section in made if section]
-            parts.append((part, [_save(section, target, i) for section in sections]))
+            parts.append((part, [_save(section, target, i) for section in _made(part)]))
     path = target / "report.md"
     path.write_text(
         template("report.md.j2").render(results=results, parts=parts, warnings=warnings(results)), "utf-8"
@@ -98,23 +35,21 @@ def write(directory: Path) -> Path:
     return path
 
 
-def template(name: str) -> jinja2.Template:
-    """A template of report/templates."""
-    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
-    environment = jinja2.Environment(
-        loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    return environment.get_template(name)
+def _made(results: Results) -> list[Section]:
+    """The sections that have something to say of the results, in their order."""
+    about = {"all": results, "ladders": results.on_ladders(True), "scenes": results.on_ladders(False)}
+    made = [module.section(about[module.PLACE.about]) for module in sections()]
+    return [section for section in made if section]
 
 
 def _save(section: Section, target: Path, machine: int) -> Section:
-    """Write the section's files; those of a second machine on take its number into their names."""
+    """Write the section's files; from the second machine on, their names begin with its number."""
     prefix = f"machine{machine + 1}-" if machine else ""
     return replace(section, blocks=[save_block(block, target, prefix) for block in section.blocks])
 
 
 def save_block(block: Block, target: Path, prefix: str = "") -> Block:
-    """Write a table's CSV or a figure's PNG; returns the block under the name that it was given."""
+    """Write a table's CSV or a figure's PNG; returns the block with the name of its file."""
     match block:
         case Table():
             block = replace(block, name=prefix + block.name)

@@ -1,4 +1,4 @@
-"""Writes the report of a series: report.md, a PNG a figure, a CSV beside each figure and table."""
+"""Writes the report of a series: report.md, a PNG per figure, a CSV per figure and table."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
+from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number
 from report.document.numbers import counted, listed, significant, tidy_power
 from report.figures import style
 from report.figures.maps import draw
-from report.results.series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
+from report.results.series import Series, read
 
-from .markdown import save_block, template
+from .markdown import save_block
+from .pages import template
 
 MAPPED = (0.5, 0.95, 0.99)
 LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))
@@ -23,7 +25,7 @@ STEPS = {"setup_s": "update or set-up", "solve_s": "solve", "form_s": "x, gaps, 
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md anew from the series in DIRECTORY and return its path."""
+    """Write DIRECTORY/report/report.md from the series in DIRECTORY and return its path."""
     series = read(directory)
     target = directory / "report"
     target.mkdir(exist_ok=True)
@@ -35,7 +37,7 @@ def write(directory: Path) -> Path:
             blocks.append(_statistics(series))
         sections = [Section("Summary", blocks)]
         if len(series.cases):
-            sections.append(Section("The gap that is left", _pictures(series, target)))
+            sections.append(Section("The remaining gap", _pictures(series, target)))
         saved = [Section(s.title, [save_block(block, target) for block in s.blocks]) for s in sections]
     path = target / "report.md"
     title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
@@ -53,7 +55,7 @@ def _summary(series: Series) -> str:
     ]
     if len(cases):
         bound = significant(cases["bound_mm"].max())
-        lines.append(f"Each answer is proven to lie within {bound} mm of the exact one.")
+        lines.append(f"Every answer is proven to be within {bound} mm of the exact one.")
         checked = cases["displacement_error_mm"].dropna()
         if len(checked):
             lines.append(
@@ -61,17 +63,17 @@ def _summary(series: Series) -> str:
                 f"is {significant(checked.max())} mm."
             )
         seconds = sum(float(cases[name].sum()) for name in STEPS)
-        told = {name: text for name, text in STEPS.items() if cases[name].notna().any()}
-        steps = (f"{significant(1e3 * cases[name].mean())} ms {text}" for name, text in told.items())
+        known = {name: text for name, text in STEPS.items() if cases[name].notna().any()}
+        steps = (f"{significant(1e3 * cases[name].mean())} ms {text}" for name, text in known.items())
         lines.append(
-            f"{significant(len(cases) / seconds)} cases a second of work; a case took {listed(list(steps))} "
-            "on average."
+            f"{significant(len(cases) / seconds)} cases per second of work; on average {listed(list(steps))} "
+            "per case."
         )
     return " ".join(lines)
 
 
 def _statistics(series: Series) -> Table:
-    names = {"max_gap_mm": "largest gap of a case", "mean_gap_mm": "mean gap of a case"}
+    names = {"max_gap_mm": "largest gap per case", "mean_gap_mm": "mean gap per case"}
     rows = [
         {"figure": text, **{f"q{q:g}": series.cases[name].quantile(q) for q in QUANTILES}}
         | {"mean": series.cases[name].mean(), "largest": series.cases[name].max()}
@@ -94,11 +96,11 @@ def _pictures(series: Series, target: Path) -> list[Block]:
         table.insert(1, "y_mm", nodes[:, 1])
         shown = [(f"{100 * q:g} % quantile", maps[QUANTILES.index(q)]) for q in MAPPED]
         caption = (
-            "*The gap that is left, contact by contact: quantiles over the cases.* One case in twenty leaves "
-            "more than the 95 % quantile at a place. Circles: the fasteners."
+            "*The remaining gap at each contact: quantiles over the cases.* In one case out of twenty, the "
+            "gap at a contact exceeds its 95 % quantile. Circles: the fasteners."
         )
         blocks.append(_maps("quantile-maps", caption, series, shown))
-        worst_caption = f"*The worst case, number {case}: its largest gap is {significant(gap.max())} mm.*"
+        worst_caption = f"*The worst case, number {case}, with a largest gap of {significant(gap.max())} mm.*"
         blocks.append(_maps("worst-case", worst_caption, series, [(f"case {case}", gap)]))
         pd.DataFrame({"x_mm": nodes[:, 0], "y_mm": nodes[:, 1], "gap_mm": gap}).to_csv(
             target / "worst-case.csv", index=False
@@ -143,8 +145,8 @@ def _exceedance(series: Series, target: Path) -> Figure:
     style.plain_log(axes.yaxis)
     drawing.legend(loc="outside right upper")
     caption = (
-        "*Exceedance: how often more than a gap t is left.* The lowest value that the cases can show is "
-        f"{significant(100 / len(series.cases))} % of them."
+        "*Exceedance: how often a remaining gap exceeds t.* The smallest share of cases that can be resolved "
+        f"is {significant(100 / len(series.cases))} %."
     )
     return Figure("exceedance", caption, drawing)
 
@@ -158,12 +160,12 @@ def _convergence(series: Series, target: Path) -> Figure:
         lines = table[table["quantile"] == q]
         axes.plot(lines["cases"], lines["gap_mm"], line, color=colour, label=f"{100 * q:g} % quantile")
         axes.fill_between(lines["cases"], lines["low_mm"], lines["high_mm"], color=colour, alpha=0.15, lw=0)
-    axes.set(xscale="log", xlabel="number of cases", ylabel="largest gap of a case, mm")
+    axes.set(xscale="log", xlabel="number of cases", ylabel="largest gap per case, mm")
     style.plain_log(axes.xaxis)
     drawing.legend(loc="outside right upper")
     caption = (
-        "*Are there enough cases? Quantiles of a case's largest gap over the first N cases.* Shaded: the "
-        "distribution-free 95 % interval between order statistics, where N is large enough for one."
+        "*Are there enough cases? Quantiles of the largest gap per case over the first N cases.* Shaded: the "
+        "distribution-free 95 % interval between order statistics, if N is large enough for one."
     )
     return Figure("convergence", caption, drawing)
 
@@ -184,7 +186,7 @@ def _swept(series: Series, key: str, target: Path) -> Figure:
         axes.fill_between(
             found.index, found[f"{figure}_min"], found[f"{figure}_max"], color=colour, alpha=0.15, lw=0
         )
-    axes.set(xlabel=key, ylabel="gap that is left, mm")
+    axes.set(xlabel=key, ylabel="remaining gap, mm")
     drawing.legend(loc="outside right upper")
-    caption = f"*The largest and the mean gap of a case over {key}.* Shaded: the range over the other keys."
+    caption = f"*The largest and the mean gap per case against {key}.* Shaded: the range over the other keys."
     return Figure(name, caption, drawing)

@@ -11,10 +11,11 @@ from report.figures.maps import Array, grid_of
 
 
 def write_vtu(path: Path, record: dict[str, Any], arrays: dict[str, Any]) -> str:
-    """Write the parts' junction nodes with their fields; says how it went, as meshio may not be there.
+    """Write the parts' junction nodes with their fields. Returns the file's name, or why it was not written,
+    since meshio is optional.
 
     Point data: displacement (0, 0, x) in mm, to warp by; part; contact force on the node, N; the smallest
-    gap before and after of its contacts, mm, NaN where it has none.
+    gap before and after at its contacts, mm, NaN if it has none.
     """
     try:
         import meshio
@@ -27,7 +28,7 @@ def write_vtu(path: Path, record: dict[str, Any], arrays: dict[str, Any]) -> str
 def grid_with_fields(
     record: dict[str, Any], arrays: dict[str, Any]
 ) -> tuple[Array, list[tuple[str, Any]], dict[str, Array]]:
-    """Points (n, 3), cells and point data, as meshio takes them."""
+    """Points (n, 3), cells and point data for meshio."""
     nodes, n = arrays["nodes"], record["n"]
     force, before, after = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)
     columns = np.repeat(np.arange(record["m"]), np.diff(arrays["A_indptr"]))
@@ -48,7 +49,7 @@ def grid_with_fields(
 
 
 def _cells(nodes: Array, start: int) -> tuple[str, Any]:
-    """Quadrilaterals where the nodes are a grid, else the nodes themselves."""
+    """Quadrilaterals if the nodes are a grid, else the nodes themselves."""
     grid = grid_of(nodes)
     if grid is None:
         return "vertex", start + np.arange(len(nodes))[:, None]

@@ -1,1 +1,1 @@
-"""The paper's tables and figures beside ours, and its claims: shown for the suite `paper` alone."""
+"""The paper's tables and figures beside ours, and its claims: for the suite `paper` only."""

@@ -1,4 +1,4 @@
-"""The paper's claims, each with a verdict worked out from the rows."""
+"""The paper's claims, each with a verdict computed from the rows."""
 
 from __future__ import annotations
 
@@ -6,22 +6,25 @@ from collections import Counter
 
 import pandas as pd
 
-from report.document.blocks import Block, Column, Section, Table, Text, word
+from report.analysis.paper.claims import CLAIMS
+from report.analysis.paper.claims.verdict import (
+    CONFIRMED,
+    DEPENDS,
+    NOT_CONFIRMED,
+    NOT_DECIDED,
+    NOT_MEASURED,
+    Claim,
+    Measured,
+    Verdict,
+)
+from report.analysis.paper.growth import measured
+from report.analysis.paper.selection import cells_of_paper, is_paper, of_problems
+from report.document.blocks import Block, Column, Place, Section, Table, Text, word
 from report.document.numbers import counted
 from report.results.reader import Results
 
-from . import claims_comparison, claims_complexity, claims_contacts, claims_linear, claims_start
-from .scaling import measured
-from .selection import cells_of_paper, is_paper, of_problems
-from .verdict import CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_DECIDED, NOT_MEASURED, Claim, Measured, Verdict
+PLACE = Place(210)
 
-CLAIMS: list[Claim] = [
-    *claims_linear.CLAIMS,
-    *claims_start.CLAIMS,
-    *claims_complexity.CLAIMS,
-    *claims_contacts.CLAIMS,
-    *claims_comparison.CLAIMS,
-]
 SHOWN_KEYS = 2
 WORDS = (CONFIRMED, DEPENDS, NOT_CONFIRMED, NOT_DECIDED, NOT_MEASURED)
 COUNTED_AS = {DEPENDS: "confirmed in part"}
@@ -75,9 +78,9 @@ def _table(found: list[tuple[Claim, Verdict]]) -> Table:
         Column("verdict", lambda row: f"**{row['short']}**", "left"),
     ]
     caption = (
-        "*What the paper's sections 5 to 7 say, in our words, and what the rows say to it.* Every verdict is "
-        "worked out from the rows by a rule; the rules and the evidence follow, and the file has the keys of "
-        "all rows that a verdict stands on."
+        "*What sections 5 to 7 of the paper claim, in our words, and whether the rows confirm it.* Every "
+        "verdict is computed from the rows by a rule; the rules and the evidence follow, and the file has "
+        "the keys of all rows that a verdict is based on."
     )
     return Table("paper-claims", caption, pd.DataFrame(lines), columns)
 

@@ -1,4 +1,4 @@
-"""Figures 3 and 4: the node grids of problems 1 and 3, and the gap that three fasteners leave."""
+"""Figures 3 and 4: the node grids of problems 1 and 3, and the gap remaining with three fasteners."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from report.document.blocks import Block, Figure, Section, Text
+from report.analysis.paper.selection import SCALING, is_paper
+from report.document.blocks import Block, Figure, Place, Section, Text
 from report.figures import style
 from report.figures.maps import Array, draw
+from report.results.printed import TABLE_4
 from report.results.reader import Results
-from report.sections.printed import TABLE_4
 
-from .selection import SCALING, is_paper
+PLACE = Place(260)
 
 PROBLEMS = (1, 3)  # those of Figure 3
-SHARE = 0.15  # of the strip's length: the fragment that is shown
+SHARE = 0.15  # of the strip's length that is shown
 FASTENERS = 3  # of Figure 4
 
 
@@ -48,19 +49,19 @@ def _grids(results: Results) -> Block | None:
         left = nodes[:, 0].min()
         near = nodes[nodes[:, 0] <= left + SHARE * np.ptp(nodes[:, 0])]
         axes.plot(*near.T, "s", markersize=2.2, color="black")
-        axes.set(aspect="equal", xlabel="x, mm", title=f"problem {problem}: {len(nodes)} nodes a part")
+        axes.set(aspect="equal", xlabel="x, mm", title=f"problem {problem}: {len(nodes)} nodes per part")
         axes.grid(visible=False)
     panels[0].set_ylabel("y, mm")
     missing = [f" Problem {p}: no file of its nodes." for p in PROBLEMS if p not in found]
     caption = (
         f"*The nodes of the junction* (Figure 3 of the paper): the first {SHARE:.0%} of the strip's length, "
-        "true proportions. The two differ in the density of nodes alone." + "".join(missing)
+        "true proportions. The two differ only in the density of the nodes." + "".join(missing)
     )
     return Figure("paper-figure3", caption, drawing)
 
 
 def _gap(results: Results) -> Block | None:
-    """Problem 3 with three fasteners: the gap that is left."""
+    """Problem 3 with three fasteners: the remaining gap."""
     for scene in _scenes(results, TABLE_4[-1][1]):
         arrays = results.scene_arrays(scene)
         if arrays and len(arrays.get("fasteners", ())) == FASTENERS:

@@ -7,17 +7,17 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.analysis.paper.crossings import BETTER, below, compared, sizes, worst
+from report.analysis.paper.selection import METHODS, cells_of_paper, is_paper, of_method, of_problems
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, number, records, word
 from report.document.numbers import whole
-from report.figures import style
+from report.figures import style, times_panel
+from report.figures.paper_methods import LOOKS
 from report.results.labels import in_order
 from report.results.reader import Results
-from report.sections import times
 
-from .crossings import BETTER, below, compared, sizes, worst
-from .looks import LOOKS
-from .selection import METHODS, cells_of_paper, is_paper, method, of_problems
+PLACE = Place(270)
 
 FIGURE = {4386: "5", 6112: "6", 11308: "7"}
 PAIRS = (
@@ -46,35 +46,35 @@ def section(results: Results) -> Section | None:
 
 
 def _lines(cells: pd.DataFrame) -> pd.DataFrame:
-    """The cells of the paper's methods, each named in `series`, and those of the other solvers."""
-    named = [method(cells, name).assign(series=name) for name in METHODS]
-    return pd.concat([*named, cells[~cells["solver"].isin(["ipm", "gi"])]])
+    """The cells of the paper's methods, with their name as `method`, and those of the other solvers."""
+    named = [of_method(cells, name).assign(method=name) for name in METHODS]
+    return pd.concat([*named, cells[~cells["solver"].isin({solver for solver, *_ in METHODS.values()})]])
 
 
 def _figure(cells: pd.DataFrame, n: int) -> Figure:
     lines = _lines(cells[cells["n"] == n])
-    others = style.line_styles(lines[~lines["series"].isin(METHODS)])
+    others = style.line_styles(lines[~lines["method"].isin(METHODS)])
     looks = {name: look | THICK for name, look in LOOKS.items()}
-    looks |= {series: look | THIN for series, look in others.items()}
-    styles = {series: looks[series] for series in _order(lines)}
+    looks |= {method: look | THIN for method, look in others.items()}
+    styles = {method: looks[method] for method in _order(lines)}
     drawing = style.figure(4.2)
     axes = drawing.add_subplot()
-    times.panel(axes, lines, styles)
+    times_panel.panel(axes, lines, styles)
     axes.set(xlabel="active contacts", ylabel="working time, s")
-    handles = [*style.legend_entries(styles), *times.entries(lines)]
+    handles = [*style.legend_entries(styles), *times_panel.entries(lines)]
     drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
     caption = (
         f"*Working time against the active contacts, n = {n}*"
         + (f" (Figure {FIGURE[n]} of the paper)" if n in FIGURE else "")
-        + ": seconds a load case, without data preparation; below in number, above in % of m. Thick: "
-        "the paper's methods; thin: the other solvers. " + times.MARKS.format(limit="the limit")
+        + ": seconds per load case, without data preparation; the number below, the percentage of m above. "
+        "Thick: the paper's methods; thin: the other solvers. " + times_panel.MARKS.format(limit="the limit")
     )
     return Figure(f"paper-figure-{n}", caption, drawing)
 
 
 def _order(lines: pd.DataFrame) -> list[str]:
-    """The series that occur: the paper's methods first."""
-    found = in_order(lines, "series")
+    """The methods that occur, the paper's first."""
+    found = in_order(lines, "method")
     return [name for name in METHODS if name in found] + [name for name in found if name not in METHODS]
 
 
@@ -94,9 +94,9 @@ def _crossings(cells: pd.DataFrame, shown: list[int]) -> Table:
         number("scenes compared", "scenes", whole),
     ]
     caption = (
-        "*Where one method overtakes the other* as more contacts close: the logarithm of the seconds a load "
-        "case, linear in the active share between two scenes. Where one of the two runs was stopped by the "
-        "clock only the interval is known."
+        "*Where one method overtakes the other* as more contacts close: linear interpolation of the "
+        "logarithm of the seconds per load case in the active share between two scenes. If one of the two "
+        "runs was stopped by the clock, only the interval is known."
     )
     return Table("paper-crossings", caption, pd.DataFrame(lines), columns)
 
@@ -118,7 +118,7 @@ def _worst(cells: pd.DataFrame, shown: list[int]) -> Table:
     columns += [Column(f"below that of {rival}?", _text(rival), "left") for rival in RIVALS]
     caption = (
         "*Is the interior-point method's worst case below Goldfarb–Idnani's?* The longest working time over "
-        "the scenes of a size; the better of the two forms is chosen for each scene. >: stopped by the clock."
+        "the scenes of a size; the better of the two forms is chosen on each scene. >: stopped by the clock."
     )
     return Table("paper-worst", caption, pd.DataFrame(lines), columns)
 
@@ -128,18 +128,18 @@ def _text(name: str) -> Callable[[Mapping[str, Any]], str]:
 
 
 def _times(cells: pd.DataFrame, n: int) -> Table:
-    """A line a scene, a column a method: the figure in numbers."""
+    """One line per scene, one column per method: the figure in numbers."""
     found = _lines(cells[cells["n"] == n])
     lines: dict[str, dict[str, Any]] = {}
     for row in records(found):
         start = {"scene": row["scene"], "active": row["active"], "m": row["m"]}
-        lines.setdefault(row["scene"], start)[row["series"]] = seconds_text(row)
+        lines.setdefault(row["scene"], start)[row["method"]] = seconds_text(row)
     names = _order(found)
     table = pd.DataFrame(list(lines.values())).sort_values("active")
     table[names] = table[names].fillna("")
     columns = [word("scene", "scene"), Column("active", _active)]
     columns += [Column(name, _text(name)) for name in names]
-    caption = f"*The figure for n = {n} in numbers*: seconds a load case; > : stopped by the time limit."
+    caption = f"*The figure for n = {n} in numbers*: seconds per load case; >: stopped at the time limit."
     return Table(f"paper-times-{n}", caption, table, columns)
 
 

@@ -8,16 +8,17 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.analysis.paper.cg import SYSTEMS, Counts, counts, system_name
+from report.analysis.paper.selection import asked, cells_of_paper, first, ipm, is_paper, of_problems
+from report.analysis.paper.targets import late_target, ratio_target
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, records, word
 from report.document.numbers import MISSING, listed, significant, tidy_power, whole
 from report.figures import style
+from report.results.printed import TABLE_1
 from report.results.reader import Results
-from report.sections.printed import TABLE_1
 
-from .cg import SYSTEMS, Counts, counts, system_name
-from .selection import asked, cells_of_paper, first, ipm, is_paper, of_problems
-from .targets import late_target, ratio_target
+PLACE = Place(220)
 
 PRINTED_N = 4386
 SHOWN = ("V = I", "V = U + √D", "V = U + √D, open gaps last")
@@ -46,7 +47,7 @@ def section(results: Results) -> Section | None:
 
 
 def _scene(cells: pd.DataFrame) -> str | None:
-    """Of the scenes of Table 1's size that have counts of V = I, the one with the middle active count."""
+    """The scene of Table 1's size with the median active count, of those that have counts of V = I."""
     rows = ipm(cells[cells["n"] == PRINTED_N], preconditioner="none")
     have = [row["scene"] for row in records(rows) if counts(row)]
     return have[len(have) // 2] if have else None
@@ -72,7 +73,7 @@ def _by_iteration(cells: pd.DataFrame) -> list[Block]:
     caption = (
         f"*CG iterations of each outer iteration*, {_setting(rows)} Printed: Table 1 of the paper, whose "
         f"load, node ordering, CG tolerance and ε_μ are not stated. Summed over the solve: {totals}. "
-        "≥: stopped there, the CG iterations allowed in all were spent." + "".join(missing)
+        "≥: stopped there, at the largest number of CG iterations in total." + "".join(missing)
     )
     figure = Figure(
         "paper-table1",
@@ -93,7 +94,7 @@ def _shown(key: str) -> Callable[[Mapping[str, Any]], str]:
 
 
 def _setting(rows: dict[str, dict[str, Any] | None]) -> str:
-    """The scene, the tolerances and the orderings of our columns, from the rows."""
+    """The scene, the tolerances and the orderings of our columns."""
     known = [row for row in rows.values() if row]
     row = known[0]
     tolerances = sorted({asked(r["options"])["cg_tolerance"] for r in known})
@@ -102,7 +103,7 @@ def _setting(rows: dict[str, dict[str, Any] | None]) -> str:
         f"scene {row['scene']} ({row['active']:.0f} of {row['m']:.0f} active). Ours: CG to a relative "
         f"preconditioned residual of {listed([tidy_power(t) for t in tolerances])}, outer iterations to "
         f"ε_μ = {listed([tidy_power(t) for t in mu])} N·mm, nodes in lexicographic order unless the column "
-        "says open gaps last."
+        "states open gaps last."
     )
 
 
@@ -128,7 +129,7 @@ def _drawn(printed: dict[str, Counts], ours: dict[str, Counts]) -> Any:
 
 
 def _systems(cells: pd.DataFrame) -> Table | None:
-    """Every way to solve the systems, on the scenes where more than V was tried."""
+    """Every way to solve the systems, on the scenes with more than V."""
     lines = []
     for scene in cells["scene"].unique():
         rows = [r for r in records(cells[cells["scene"] == scene]) if _is_system(r)]
@@ -144,16 +145,17 @@ def _systems(cells: pd.DataFrame) -> Table | None:
         word("status", "status"),
         number("outer iterations", "iterations", whole),
         word("CG iterations", "cg_text"),
-        word("largest late", "late_text"),
-        word("V = I needs, times as many", "ratio_text"),
+        word("largest in second half", "late_text"),
+        word("V = I, times as many", "ratio_text"),
         number("factorisations", "factorisations", whole),
-        word("s a load case", "seconds"),
+        word("s per load case", "seconds"),
     ]
     caption = (
-        "*The ways to solve the Newton systems*, one solve each, all from the start of Algorithm 5. CG "
-        "iterations: predictor and corrector, summed over the solve; ≥ and >: it was stopped, so the true "
-        "number is larger. Largest late: of the second half of the outer iterations. Factorisations: "
-        "Cholesky, within the solve. CG to a relative preconditioned residual of 1e-3 unless said."
+        "*The ways to solve the Newton systems*, one solve each, all starting from Algorithm 5. CG "
+        "iterations: predictor and corrector, summed over the solve; ≥ and >: stopped, so the true number "
+        "is larger. Largest in second half: per system, over the second half of the outer iterations. "
+        "Factorisations: Cholesky, within the solve. CG to a relative preconditioned residual of 1e-3 "
+        "unless stated."
     )
     return Table("paper-systems", caption, pd.DataFrame(lines), columns)
 
@@ -197,4 +199,4 @@ def _ratio_text(ratio: float | None, none: Counts | None, found: Counts | None) 
 
 def _judged(cells: pd.DataFrame) -> str:
     sentences = [*ratio_target(cells), *late_target(cells)]
-    return "**What was asked of V.** " + (" ".join(sentences) or "V = U + √D was not measured.")
+    return "**Requirements on V.** " + (" ".join(sentences) or "V = U + √D was not measured.")

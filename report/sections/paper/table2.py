@@ -7,17 +7,15 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Column, Section, Table, Text, number, word
+from harness.results.schema import ANSWERED
+from report.analysis.paper.selection import cells_of_paper, figures_of, ipm, is_paper
+from report.analysis.paper.starts import RIVALS, STARTS, loads, no_more, scene_of
+from report.document.blocks import Column, Place, Section, Table, Text, number, records, word
 from report.document.numbers import MISSING, as_number, counted, power, significant, span, tidy_power, whole
-from report.results.reader import ANSWERED, Results
-from report.sections.printed import TABLE_2
+from report.results.printed import TABLE_2
+from report.results.reader import Results
 
-from .selection import cells_of_paper, figures_of, first, ipm, is_paper
-
-STARTS = {"stp1": "STP1", "stp2": "STP2", "algorithm_5": "Algorithm 5", "mehrotra": "Mehrotra"}
-RIVALS = ("stp1", "stp2")
-N = 4386
+PLACE = Place(230)
 
 
 def section(results: Results) -> Section | None:
@@ -30,58 +28,26 @@ def section(results: Results) -> Section | None:
     return Section("Table 2: starting points", [_table(lines, cells), Text(_counted(lines)), _starts(cells)])
 
 
-def scene_of(active: int) -> str:
-    return f"{N}/{active:04d}"
-
-
-def loads(cells: pd.DataFrame) -> list[dict[str, Any]]:
-    """One record a load of Table 2: iterations, seconds and key of every start, ours and as printed."""
-    lines = []
-    for active, printed in TABLE_2.items():
-        of_scene = cells[cells["scene"] == scene_of(active)]
-        reached = of_scene["active"].max()
-        line: dict[str, Any] = {"scene": scene_of(active), "active_printed": active, "active": reached}
-        for start in STARTS:
-            row = first(ipm(of_scene, start=start))
-            answered = row is not None and row["verdict"] in ANSWERED
-            line[f"{start}_iterations"] = row["iterations"] if row and answered else None
-            line[f"{start}_s"] = row["load_case_s"] if row and answered else None
-            line[f"{start}_says"] = seconds_text(row) if row else "not measured"
-            line[f"{start}_key"] = row["key"] if row else ""
-            line[f"{start}_mu"] = figures_of(row, "start").get("mu") if row else None
-            line[f"{start}_iterations_printed"], line[f"{start}_s_printed"] = printed.get(start, (None, None))
-        lines.append(line)
-    return lines
-
-
-def no_more(line: Mapping[str, Any], suffix: str = "") -> bool | None:
-    """Whether Algorithm 5 needed no more iterations than STP1 and STP2; None where a number is missing."""
-    mine, *others = [as_number(line[f"{start}_iterations{suffix}"]) for start in ("algorithm_5", *RIVALS)]
-    if mine is None or not all(other is not None for other in others):
-        return None
-    return all(mine <= other for other in others if other is not None)
-
-
 def _table(lines: list[dict[str, Any]], cells: pd.DataFrame) -> Table:
     columns = [number("active, printed", "active_printed", whole), number("ours", "active", whole)]
     for start, name in STARTS.items():
         columns += [
             Column(f"{name}: iterations", _pair(f"{start}_iterations", whole)),
-            Column(f"{name}: s", _pair(f"{start}_s", lambda s: significant(s), f"{start}_says")),
+            Column(f"{name}: s", _pair(f"{start}_s", lambda s: significant(s), f"{start}_text")),
         ]
     mu = sorted(ipm(cells)["tolerance"].dropna().unique())
     caption = (
         "*The starting points on the ten loads, ours | printed.* Ours: interior-point iterations to ε_μ = "
-        f"{' / '.join(map(tidy_power, mu))} N·mm (the paper does not state its own) and seconds a load case; "
-        "printed: Table 2 of the paper, seconds of its machine. STP1 and STP2 are as read from a secondary "
+        f"{' / '.join(map(tidy_power, mu))} N·mm (the paper does not state its own) and seconds per load "
+        "case; printed: Table 2 of the paper, on its machine. STP1 and STP2 are as read from a secondary "
         "source. Mehrotra's start is not in the paper."
     )
     return Table("paper-table2", caption, pd.DataFrame(lines), columns)
 
 
-def _pair(name: str, style: Callable[[object], str], says: str = "") -> Callable[[Mapping[str, Any]], str]:
+def _pair(name: str, style: Callable[[object], str], words: str = "") -> Callable[[Mapping[str, Any]], str]:
     def text(row: Mapping[str, Any]) -> str:
-        ours = row[says] if says else style(row[name])
+        ours = row[words] if words else style(row[name])
         printed = style(row[f"{name}_printed"])
         return ours if printed == MISSING else f"{ours} \\| {printed}"
 
@@ -119,7 +85,7 @@ def _against(rival: str, lines: list[dict[str, Any]]) -> str:
 
 
 def _starts(cells: pd.DataFrame) -> Table:
-    """Where each start lies, over the ten loads: why one needs more iterations than another."""
+    """Where each start lies over the ten loads, which explains the numbers of iterations."""
     scenes = [scene_of(active) for active in TABLE_2]
     of_loads = cells[cells["scene"].isin(scenes)]
     lines = []
@@ -144,8 +110,8 @@ def _starts(cells: pd.DataFrame) -> Table:
         Column("iterations", _range("iterations", whole)),
     ]
     caption = (
-        "*Where the starts lie*, least to most over the ten loads: the gap μ₀ from which the iteration has "
-        "to come down, and by how much y = Qλ − p is violated."
+        "*Where the starts lie*, the range over the ten loads: the gap μ₀ that the iteration has to reduce, "
+        "and the violation of y = Qλ − p."
     )
     return Table("paper-starts", caption, pd.DataFrame(lines), columns)
 

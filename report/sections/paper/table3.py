@@ -1,4 +1,4 @@
-"""Table 3: complexities and memory, measured over several sizes of one joint."""
+"""Table 3: complexity and memory, measured at several sizes of one joint."""
 
 from __future__ import annotations
 
@@ -8,20 +8,21 @@ from typing import Any
 import pandas as pd
 from matplotlib.axes import Axes
 
-from report.analysis.timed import records, seconds_text
-from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.analysis.paper.growth import QUANTITIES, fitted, measured
+from report.analysis.paper.selection import METHODS, is_paper
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Block, Column, Figure, Place, Section, Table, number, records, word
 from report.document.numbers import MISSING, whole
 from report.figures import style
+from report.figures.paper_methods import LOOKS
 from report.results.reader import Results
 
-from .looks import LOOKS
-from .scaling import QUANTITIES, fitted, measured
-from .selection import METHODS, is_paper
+PLACE = Place(240)
 
 PANELS = (
     ("preparation_s", "data preparation, s"),
     ("working_s", "working time, s"),
-    ("s_per_step", "s a CG iteration or pivot"),
+    ("s_per_step", "s per CG iteration or pivot"),
     ("working_mib", "working memory, MiB"),
 )
 
@@ -52,13 +53,13 @@ def _exponents(lines: pd.DataFrame) -> Table:
     columns += [Column(name, _shown(name)) for name in METHODS]
     sizes = ", ".join(f"{n:.0f}" for n in sorted(lines["n"].unique()))
     caption = (
-        "*Exponents in n, measured*, with the standard error of the fit: least squares in log–log over the "
-        f"scenes of one joint at n = {sizes}. Data preparation: the Cholesky factor of K, Q, and what the "
-        "solver itself prepares once (the inverse or factor of Q). Working time: seconds a load case. The "
-        "paper's order of the interior-point method's working time is n^2.5 times the CG iterations of "
-        "a system, that is √m outer iterations of n² a CG iteration; Goldfarb–Idnani's is n_act·n², n³ where "
-        "the share of active contacts stays the same. Runs that were not answered within the limit, "
-        "which the table below names, take no part in the times, nor do times below a millisecond."
+        "*Measured exponents in n*, with the standard error of the fit: least squares in log–log over the "
+        f"scenes of one joint at n = {sizes}. Data preparation: the Cholesky factor of K, Q, and the "
+        "solver's own preparation (the inverse or factor of Q). Working time: seconds per load case. The "
+        "paper's order for the interior-point method is n^2.5 times the CG iterations per system: √m outer "
+        "iterations of n² per CG iteration; for Goldfarb–Idnani it is n_act·n², that is n³ at a constant "
+        "share of active contacts. Runs without an answer within the limit, named in the table below, and "
+        "times below a millisecond do not enter the fits."
     )
     return Table("paper-table3", caption, pd.DataFrame(records), columns)
 
@@ -94,8 +95,8 @@ def _absolute(lines: pd.DataFrame) -> Table:
         number("an n × n matrix, MiB", "full_mib", whole),
     ]
     caption = (
-        "*The figures behind the exponents.* Working memory: the largest resident memory less what was "
-        "resident when the solver's work began, the interpreter and the data. > : stopped by the time limit."
+        "*The data of the fits.* Working memory: the largest resident memory minus that resident when the "
+        "solver's work began (interpreter and data). >: stopped at the time limit."
     )
     return Table("paper-scaling", caption, table, columns)
 
@@ -125,7 +126,7 @@ def _figure(lines: pd.DataFrame) -> Figure:
         axes.set_xlabel("n")
     drawing.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", handlelength=3.2)
     caption = (
-        "*The same on logarithmic axes*, on which a power of n is a straight line: a fit's slope is the "
-        "exponent of the table. Runs without an answer within the limit have no point."
+        "*The same on logarithmic axes*, where a power of n is a straight line whose slope is the exponent "
+        "of the table. Runs without an answer within the limit have no point."
     )
     return Figure("paper-table3", caption, drawing)

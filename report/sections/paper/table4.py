@@ -6,13 +6,13 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.timed import records
-from report.document.blocks import Section, Table, number
+from report.analysis.paper.selection import SCALING, is_paper
+from report.document.blocks import Place, Section, Table, number, records
 from report.document.numbers import as_number, signed, whole
+from report.results.printed import TABLE_4
 from report.results.reader import Results
-from report.sections.printed import TABLE_4
 
-from .selection import SCALING, is_paper
+PLACE = Place(250)
 
 
 def section(results: Results) -> Section | None:

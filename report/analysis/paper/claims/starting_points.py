@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from report.analysis.paper.selection import figures_of, ipm
+from report.analysis.paper.starts import RIVALS, STARTS, loads, no_more
 from report.analysis.standings import TIE
-from report.analysis.timed import records
+from report.document.blocks import records
 from report.document.numbers import as_number, power, significant, span, tidy_power, whole
 
-from .claims_linear import pairs
-from .selection import figures_of, ipm
-from .table2 import RIVALS, STARTS, loads, no_more
+from .linear_systems import pairs
 from .verdict import (
     CONFIRMED,
     DEPENDS,
@@ -24,14 +24,14 @@ from .verdict import (
     decided,
 )
 
-LOADS = 8  # of Table 2's ten, on which Algorithm 5 is to need no more iterations
+LOADS = 8  # of Table 2's ten, on which Algorithm 5 must need no more iterations
 FEW = 0.01  # of m: corrections that count as few
-SAME = 1e-6  # relative difference of μ₀ at which two starts are one point
+SAME = 1e-6  # relative difference of μ₀ at which two starts are the same point
 FEASIBLE_MM = 1e-7
 
 
 def _about_start(measured: Measured, start: str) -> list[tuple[str, dict[str, float], str, float]]:
-    """Scene, facts of the start, key and m of every row from that start that has them."""
+    """Scene, facts of the start, key and m of every row with that start."""
     return [
         (row["scene"], facts, row["key"], row["m"])
         for row in records(ipm(measured.cells, start=start))
@@ -127,7 +127,7 @@ CLAIMS = [
     Claim(
         "row sums",
         "5.4",
-        "Where Q has positive row sums, equal forces start Algorithm 5; so it is with contact problems here.",
+        "If Q has positive row sums, Algorithm 5 starts from equal forces; every contact problem here does.",
         "Equal forces needed no correction: every row sum of Q is positive.",
         _row_sums_positive,
     ),
@@ -163,7 +163,7 @@ CLAIMS = [
         "start saves time",
         "7",
         "The choice of the initial guess reduces the working time.",
-        f"Seconds a load case, summed over the scenes of both; less than {TIE - 1:.0%} apart decides "
+        f"Seconds per load case, summed over the scenes of both; a difference below {TIE - 1:.0%} decides "
         "nothing.",
         _saves_time,
     ),

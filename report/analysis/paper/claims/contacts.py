@@ -7,26 +7,26 @@ from dataclasses import replace
 
 import pandas as pd
 
-from report.analysis.timed import timed
+from report.analysis.paper.crossings import at_share, sizes
+from report.analysis.paper.selection import of_method
+from report.analysis.seconds import timed
 from report.document.numbers import significant
 
-from .crossings import at_share, sizes
-from .selection import method
 from .verdict import Case, Claim, Measured, by_case
 
 RIVALS = ("GI primal", "GI dual")
 CLEAR = 0.8  # rank correlation that counts as a trend
-FEWEST = 4  # scenes that a trend or a spread is read from
+FEWEST = 4  # scenes for a trend or a spread
 SLIGHT = 3.0  # longest over shortest time that counts as a slight influence
 
 
 def _of_size(measured: Measured, name: str, n: int) -> pd.DataFrame:
-    rows = timed(method(measured.cells, name))
+    rows = timed(of_method(measured.cells, name))
     return rows[(rows["n"] == n) & rows["at_least"].notna()]
 
 
 def _trend(measured: Measured, name: str, sign: int) -> Iterator[Case]:
-    """Rank correlation of the seconds with the active contacts, a size; cut runs count at their limit."""
+    """Rank correlation of the seconds with the active contacts per size, stopped runs at their limit."""
     for n in sizes(measured.cells):
         rows = _of_size(measured, name, n)
         if len(rows) < FEWEST:
@@ -95,14 +95,14 @@ CLAIMS = [
     Claim(
         "GI primal trend",
         "6, Figures 5–7",
-        "Goldfarb–Idnani on the primal problem takes longer, the more contacts are active.",
+        "Goldfarb–Idnani on the primal problem takes longer the more contacts are active.",
         f"Rank correlation of time and active contacts at least +{CLEAR}, at each size.",
         _primal_grows,
     ),
     Claim(
         "GI dual trend",
         "6, Figures 5–7",
-        "Goldfarb–Idnani on the dual problem takes longer, the fewer contacts are active.",
+        "Goldfarb–Idnani on the dual problem takes longer the fewer contacts are active.",
         f"Rank correlation of time and active contacts at most −{CLEAR}, at each size.",
         _dual_falls,
     ),
@@ -125,8 +125,9 @@ CLAIMS = [
     Claim(
         "half contact, dual",
         "6",
-        "With half of the contacts active it is for some problems also faster than that on the dual problem.",
-        "As before; one size where it is so confirms it.",
+        "With half of the contacts active it is, for some problems, also faster than Goldfarb–Idnani on the "
+        "dual problem.",
+        "As before; one size on which it holds confirms it.",
         _half_dual,
     ),
 ]

@@ -1,4 +1,4 @@
-"""Which rows are which of the paper's methods: found by what was run (solver, form, options)."""
+"""The rows of the paper's methods, found by what was run (solver, form, options)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from report.analysis.timed import records
+from report.document.blocks import records
 from report.results.reader import Results
 
 SUITE = "paper"
 SCALING = "scaling/"  # scenes of one joint at several sizes; all others belong to the paper's problems
 
-#: What `ipm` does when an option is not named.
+#: The options of `ipm` that are not given.
 DEFAULTS: dict[str, Any] = {
     "start": "algorithm_5",
     "scheme": "algorithm_3",
@@ -39,14 +39,14 @@ def is_paper(results: Results) -> bool:
 
 
 def asked(options: object) -> dict[str, Any]:
-    """All options that decide what the interior-point method does, those not named by their default."""
+    """All options of the interior-point method, those not given by their default."""
     given = options if isinstance(options, Mapping) else {}
     return {key: given.get(key, default) for key, default in DEFAULTS.items()}
 
 
 def cells_of_paper(results: Results) -> pd.DataFrame:
-    """The cells that were in the plan, of several tolerances or thread counts of a line the tightest and
-    the highest: one cell a scene, solver, form and variant, always with `options` and `details`.
+    """The cells of the plan: one per scene, solver, form and variant, with the tightest of several tolerances
+    and the largest of several thread counts; always with `options` and `details`.
     """
     cells = results.cells[results.cells["status"] != "unsupported"]
     cells = cells.assign(options=_dicts(cells, "options"), details=_dicts(cells, "details"))
@@ -56,14 +56,14 @@ def cells_of_paper(results: Results) -> pd.DataFrame:
 
 
 def _dicts(cells: pd.DataFrame, name: str) -> pd.Series[Any]:
-    """A column of dictionaries, empty ones where there is none."""
+    """A column of dictionaries, empty if there is none."""
     column = cells[name] if name in cells else [None] * len(cells)
     found = [value if isinstance(value, dict) else {} for value in column]
     return pd.Series(found, index=cells.index, dtype=object)
 
 
 def ipm(cells: pd.DataFrame, **changed: Any) -> pd.DataFrame:
-    """The interior-point cells whose options are the defaults but for `changed`, one a scene."""
+    """The interior-point cells whose options are the defaults except for `changed`, one per scene."""
     wanted = DEFAULTS | changed
     chosen = [
         s == "ipm" and asked(o) == wanted for s, o in zip(cells["solver"], cells["options"], strict=True)
@@ -71,8 +71,8 @@ def ipm(cells: pd.DataFrame, **changed: Any) -> pd.DataFrame:
     return cells[np.array(chosen, dtype=bool)].drop_duplicates("scene")
 
 
-def method(cells: pd.DataFrame, name: str) -> pd.DataFrame:
-    """The cells of one of METHODS, one a scene."""
+def of_method(cells: pd.DataFrame, name: str) -> pd.DataFrame:
+    """The cells of one of METHODS, one per scene."""
     solver, form, options = METHODS[name]
     if solver == "ipm":
         return ipm(cells, **options)
@@ -89,7 +89,7 @@ def of_problems(cells: pd.DataFrame) -> pd.DataFrame:
 
 
 def figures_of(cell: Mapping[str, Any] | None, name: str) -> dict[str, Any]:
-    """A dictionary within the details of a cell; empty where there is none."""
+    """A dictionary within the details of a cell; empty if there is none."""
     found = cell["details"].get(name) if cell is not None else None
     return found if isinstance(found, dict) else {}
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.paper.crossings import BETTER, below, sizes, worst
+from report.analysis.paper.selection import of_method
+from report.analysis.seconds import timed
 from report.analysis.standings import geometric_mean
-from report.analysis.timed import records, timed
+from report.document.blocks import records
 from report.document.numbers import counted, power, significant
 
-from .claims_linear import is_faster, pairs
-from .crossings import BETTER, below, sizes, worst
-from .selection import method
+from .linear_systems import is_faster, pairs
 from .verdict import Case, Claim, Measured, Verdict, by_case, decided
 
 RIVALS = ("GI primal", "GI dual")
@@ -23,9 +24,9 @@ AGREE_MM = 1e-7
 def _agree(measured: Measured) -> Verdict:
     cases: list[Case] = []
     largest = 0.0
-    mine = method(measured.cells, "IPM").set_index("scene")
+    mine = of_method(measured.cells, "IPM").set_index("scene")
     for name in RIVALS:
-        for row in records(method(measured.cells, name)):
+        for row in records(of_method(measured.cells, name)):
             scene = row["scene"]
             case = f"{name}, scene {scene}"
             errors = [row["displacement_error_mm"]]
@@ -58,7 +59,7 @@ def _worst_below(measured: Measured) -> Iterator[Case]:
 
 @by_case("the size")
 def _good_when_known(measured: Measured) -> Iterator[Case]:
-    """The better form of Goldfarb–Idnani, chosen for each scene, against the interior-point method."""
+    """The better form of Goldfarb–Idnani on each scene against the interior-point method."""
     for n in sizes(measured.cells):
         found = _against(measured, n, BETTER)
         if not found:
@@ -78,13 +79,13 @@ def _keys(found: list[dict[str, Any]]) -> list[str]:
 
 def _against(measured: Measured, n: int, name: str) -> list[dict[str, Any]]:
     of_size = measured.cells[measured.cells["n"] == n]
-    rows = pd.concat([method(of_size, of) for of in (RIVALS if name == BETTER else (name,))])
+    rows = pd.concat([of_method(of_size, of) for of in (RIVALS if name == BETTER else (name,))])
     rows = timed(rows).sort_values(["at_least", "cut"], na_position="last").drop_duplicates("scene")
-    return pairs(method(of_size, "IPM"), rows)
+    return pairs(of_method(of_size, "IPM"), rows)
 
 
 def _means(found: list[dict[str, Any]]) -> tuple[float, float, bool | None]:
-    """The two geometric means over the same scenes, and whether the first is the clearly smaller."""
+    """The two geometric means over the same scenes, and whether the first is clearly smaller."""
     mine, other = (geometric_mean(pd.Series([p[k] for p in found])) for k in ("at_least_a", "at_least_b"))
     cut = {f"cut_{k}": any(p[f"cut_{k}"] for p in found) for k in "ab"}
     return mine, other, is_faster({"at_least_a": mine, "at_least_b": other} | cut)
@@ -113,30 +114,30 @@ CLAIMS = [
         "agreement",
         "6",
         "The displacements of the two methods agree to 1e-7 mm.",
-        "The errors of both answers against the reference add up to at most that; it fails where they differ "
-        "by more.",
+        "The errors of both answers against the reference add up to at most that; it fails if they differ by "
+        "more.",
         _agree,
     ),
     Claim(
         "worst case",
         "6, Figures 5–7",
         "At large size the interior-point method's worst case is always below Goldfarb–Idnani's.",
-        "The longest time over the scenes of a size is below that of each form; the better form chosen on "
-        "each scene is given beside them and decides nothing.",
+        "The longest time over the scenes of a size is below that of each form; that of the better form on "
+        "each scene is given for information only.",
         _worst_below,
     ),
     Claim(
         "GI chosen well",
         "6",
-        "Goldfarb–Idnani is efficient where the size of the contact area is known beforehand.",
+        "Goldfarb–Idnani is efficient if the size of the contact area is known beforehand.",
         "Its better form on each scene is faster than the interior-point method in the geometric mean.",
         _good_when_known,
     ),
     Claim(
         "conclusion",
         "7",
-        "For large problems the interior-point method suits better than Goldfarb–Idnani.",
-        "At the largest size its mean and its worst case are below Goldfarb–Idnani's.",
+        "For large problems the interior-point method is better suited than Goldfarb–Idnani.",
+        "At the largest size its mean and worst case are below Goldfarb–Idnani's.",
         _conclusion,
     ),
 ]

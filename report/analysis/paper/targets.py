@@ -1,4 +1,4 @@
-"""The figures that the preconditioner is to meet: against V = I, and late in the iteration."""
+"""The requirements on the preconditioner: relative to V = I, and late in the iteration."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from report.analysis.timed import records
+from report.document.blocks import records
 
 from .cg import SYSTEMS, Counts, counts
 from .selection import first, ipm
 
-RATIO = 20  # V needs at most one CG iteration for so many of V = I, summed over a solve
-LATE = 40  # CG iterations of a system in the second half of a solve, at most
+RATIO = 20  # V = I over V, CG iterations summed over a solve, at least
+LATE = 40  # CG iterations per system in the second half of a solve, at most
 ORDERINGS = ("V = U + √D", "V = U + √D, open gaps last")
 
 
@@ -32,7 +32,7 @@ class Ratio:
 
     @property
     def met(self) -> bool | None:
-        """None: not decided, because a solve was cut short."""
+        """None: undecided, because a solve was stopped."""
         reached = self.value >= RATIO
         undecided = (self.V.cut and reached) or (self.none.cut and not reached)
         return None if undecided else reached
@@ -44,7 +44,7 @@ class Ratio:
 
 
 def ratios(cells: pd.DataFrame, ordering: str = "V = U + √D") -> list[Ratio]:
-    """One a scene on which both V = I and V have counts."""
+    """One per scene with counts of both V = I and V."""
     found = []
     for scene in cells["scene"].unique():
         of_scene = cells[cells["scene"] == scene]
@@ -57,7 +57,7 @@ def ratios(cells: pd.DataFrame, ordering: str = "V = U + √D") -> list[Ratio]:
 
 
 def ratio_target(cells: pd.DataFrame) -> list[str]:
-    """A sentence a size."""
+    """One sentence per size."""
     by_size: dict[int, list[Ratio]] = {}
     for ratio in ratios(cells):
         by_size.setdefault(ratio.n, []).append(ratio)
@@ -72,7 +72,7 @@ def ratio_target(cells: pd.DataFrame) -> list[str]:
 
 
 def largest_late(cells: pd.DataFrame) -> dict[str, dict[int, tuple[int, str, str]]]:
-    """By ordering and size: the largest late count, with its scene and row."""
+    """By ordering and size: the largest count in the second half of a solve, with its scene and row."""
     found: dict[str, dict[int, tuple[int, str, str]]] = {}
     for name in ORDERINGS:
         for row in records(ipm(cells, **SYSTEMS[name])):
@@ -86,7 +86,7 @@ def largest_late(cells: pd.DataFrame) -> dict[str, dict[int, tuple[int, str, str
 
 
 def late_target(cells: pd.DataFrame) -> list[str]:
-    """A sentence a size, for the better of the two orderings, with both figures."""
+    """One sentence per size, for the better of the two orderings, with both figures."""
     late = largest_late(cells)
     sentences = []
     for n in sorted({n for of_sizes in late.values() for n in of_sizes}):
@@ -94,7 +94,7 @@ def late_target(cells: pd.DataFrame) -> list[str]:
         verdict = "met" if min(here.values())[0] <= LATE else "not met"
         evidence = "; ".join(f"{name}: {count} (scene {scene})" for name, (count, scene, _) in here.items())
         sentences.append(
-            f"With the best ordering no late iteration of more than {LATE}, n = {n}: **{verdict}** "
-            f"(largest: {evidence})."
+            f"With the better ordering at most {LATE} CG iterations late in the solve, n = {n}: "
+            f"**{verdict}** (largest: {evidence})."
         )
     return sentences

@@ -1,4 +1,4 @@
-"""Cells as lines of a table: their seconds, or what is known of them where there is no answer."""
+"""Seconds per load case, or what is known of them if there is no answer."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 
 import pandas as pd
 
+from harness.results.schema import ANSWERED
 from report.document.numbers import MISSING, significant
-from report.results.reader import ANSWERED
 
 
 def timed(cells: pd.DataFrame) -> pd.DataFrame:
-    """With `at_least`: seconds a load case where the answer is within the limit; for a run that the time
-    limit or an iteration limit ended, what it had taken by then; else missing. `cut`: it is only that
-    lower bound.
+    """With `at_least`: seconds per load case if the answer is within the limit; for a run ended by the time
+    limit or an iteration limit, the time it had taken by then; else missing. `cut`: it is only that lower
+    bound.
     """
     within = cells["verdict"] == "within"
     late = (cells["status"] == "time_limit") & ~within
@@ -24,7 +24,7 @@ def timed(cells: pd.DataFrame) -> pd.DataFrame:
 
 
 def seconds_text(cell: Mapping[str, Any]) -> str:
-    """The seconds a load case, or for a run without an answer within the limit, why there is none."""
+    """The seconds per load case, or why there is no answer within the limit."""
     if cell["verdict"] == "within":
         return significant(cell["load_case_s"])
     if cell["verdict"] in ANSWERED:
@@ -32,8 +32,3 @@ def seconds_text(cell: Mapping[str, Any]) -> str:
     if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
         return f"> {cell['time_limit_s']:.4g}"
     return str(cell["status"]).replace("_", " ") or MISSING
-
-
-def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """The lines of a frame as dictionaries."""
-    return frame.to_dict("records")  # type: ignore[return-value]

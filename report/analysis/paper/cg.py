@@ -1,4 +1,4 @@
-"""The conjugate-gradient iterations of a solve, read from the details of a row."""
+"""The conjugate-gradient iterations of a solve, from the details of its row."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SCHEMES = {"mehrotra": "textbook scheme", "algorithm_2": "Algorithm 2"}
 
 @dataclass(frozen=True)
 class Counts:
-    """CG iterations by outer iteration; `cut`: the last of them was stopped before it converged."""
+    """CG iterations by outer iteration; `cut`: the last CG solve was stopped before it converged."""
 
     predictor: list[int]
     corrector: list[int]
@@ -43,7 +43,7 @@ class Counts:
         return max([*self.predictor[half:], *self.corrector[half:]], default=0)
 
     def text(self, kind: str, k: int) -> str:
-        """The count of one outer iteration, with ≥ where it was stopped."""
+        """The count of one outer iteration, with ≥ if it was stopped."""
         counts = getattr(self, kind)
         if k >= len(counts):
             return ""
@@ -53,7 +53,7 @@ class Counts:
 
 
 def counts(cell: Mapping[str, Any] | None) -> Counts | None:
-    """None where the row has no counts: the run ended before it could say them."""
+    """None if the row has no counts because the run ended before it could report them."""
     found = figures_of(cell, "cg")
     if cell is None or not found.get("predictor"):
         return None
@@ -61,7 +61,7 @@ def counts(cell: Mapping[str, Any] | None) -> Counts | None:
 
 
 def system_name(options: object) -> str:
-    """What solves the Newton systems: 'V = U + √D, open gaps last, CG to 1e-10, textbook scheme'."""
+    """How the Newton systems are solved: 'V = U + √D, open gaps last, CG to 1e-10, textbook scheme'."""
     given = asked(options)
     linear = {key: given[key] for key in ("preconditioner", "ordering")}
     names = {

@@ -1,4 +1,4 @@
-"""What the scenes of one joint at several sizes say of each method: the measured side of Table 3."""
+"""How the cost of each method grows over the scenes of one joint: the measured side of Table 3."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.fit import Exponent, exponent
-from report.analysis.timed import records, timed
+from report.analysis.seconds import timed
+from report.document.blocks import records
 from report.document.numbers import as_number
 from report.results.reader import Results
 
-from .selection import METHODS, cells_of_paper, method, of_scaling
+from .selection import METHODS, cells_of_paper, of_method, of_scaling
 
 
 @dataclass(frozen=True)
@@ -32,32 +33,32 @@ QUANTITIES = (
     Quantity("preparation_s", "data preparation, s", 3, 3),
     Quantity("prepare_s", "of it the solver's own, s", 3, 3),
     Quantity("working_s", "working time, s", None, 3),
-    Quantity("working_per_cg", "working time over CG iterations a system, s", 2.5, None),
+    Quantity("working_per_cg", "working time over CG iterations per system, s", 2.5, None),
     Quantity("iterations", "outer iterations", 0.5, None),
     Quantity("cg", "CG iterations"),
-    Quantity("s_per_cg", "s a CG iteration", 2, None),
+    Quantity("s_per_cg", "s per CG iteration", 2, None),
     Quantity("pivots", "pivots", None, 1),
-    Quantity("s_per_pivot", "s a pivot", None, 2),
+    Quantity("s_per_pivot", "s per pivot", None, 2),
     Quantity("working_mib", "working memory, MiB", 2, 2),
 )
 TIMES = ("preparation_s", "prepare_s", "working_s")
-SHORTEST = 1e-3  # seconds: a time below says nothing of how the work grows
+SHORTEST = 1e-3  # seconds: a shorter time does not show how the work grows
 #: Steps of building an assembly that the paper counts as data preparation.
 PREPARATION = ("cholesky", "Q")
 
 
 def measured(results: Results) -> pd.DataFrame:
-    """A line a scaling scene and method: n, m, active, status, the QUANTITIES and the row's key.
+    """One line per scaling scene and method: n, m, active, status, the QUANTITIES and the row's key.
 
-    Data preparation: the Cholesky factor of K and Q (build steps) with the solver's prepare. Working
-    time: seconds a load case, where the answer is within the limit.
+    Data preparation: the Cholesky factor of K and Q (steps of the build) and the solver's own preparation.
+    Working time: seconds per load case, if the answer is within the limit.
     """
     cells = timed(of_scaling(cells_of_paper(results)))
     build = _build_seconds(results.problems)
     lines = [
         _line(name, row, build.get(str(row["scene"]), {}))
         for name in METHODS
-        for row in records(method(cells, name))
+        for row in records(of_method(cells, name))
     ]
     return pd.DataFrame(lines)
 
@@ -102,11 +103,11 @@ def fitted(lines: pd.DataFrame, name: str, key: str) -> Exponent | None:
     """The exponent in n of one quantity of one method."""
     if lines.empty:
         return None
-    of_method = lines[lines["method"] == name]
-    values = [as_number(v) or 0.0 for v in of_method[key]]
+    mine = lines[lines["method"] == name]
+    values = [as_number(v) or 0.0 for v in mine[key]]
     if key in TIMES:
         values = [v if v >= SHORTEST else 0.0 for v in values]
-    return exponent(of_method["n"].tolist(), values)
+    return exponent(mine["n"].tolist(), values)
 
 
 def keys(lines: pd.DataFrame, *names: str) -> list[str]:

@@ -13,7 +13,7 @@ DEPENDS, NOT_DECIDED, NOT_MEASURED = "depends on", "not decided", "not measured"
 
 @dataclass(frozen=True)
 class Measured:
-    """What claims are judged from: the cells of the paper's problems, and the lines of the scaling scenes."""
+    """What the claims are judged from: the cells of the paper's problems, and the scaling scenes' lines."""
 
     cells: pd.DataFrame
     lines: pd.DataFrame
@@ -21,7 +21,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Verdict:
-    """`verdict` begins with one of the five words above; `keys`: the rows it stands on."""
+    """`verdict` begins with one of the five words above; `keys`: the rows it is based on."""
 
     verdict: str
     evidence: str = ""
@@ -41,8 +41,8 @@ class Claim:
 
 @dataclass(frozen=True)
 class Case:
-    """Whether a claim holds in one case (None: the rows do not decide it), the evidence and its rows.
-    A case without a name is evidence alone.
+    """Whether a claim holds in one case (None: undecided), the evidence and its rows. A case without a name
+    is only evidence.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Case:
 
 
 def by_case(on: str) -> Callable[[Callable[[Measured], Iterable[Case]]], Callable[[Measured], Verdict]]:
-    """Makes a claim's `judge` of a function that yields its cases. `on`: what tells them apart."""
+    """Turns a function that yields the cases of a claim into its `judge`. `on`: what distinguishes them."""
 
     def judging(cases_of: Callable[[Measured], Iterable[Case]]) -> Callable[[Measured], Verdict]:
         return lambda measured: decided(cases_of(measured), on)
@@ -61,7 +61,7 @@ def by_case(on: str) -> Callable[[Callable[[Measured], Iterable[Case]]], Callabl
 
 
 def decided(cases: Iterable[Case], on: str, evidence: str | None = None) -> Verdict:
-    """One verdict from all cases; `evidence` in the place of theirs."""
+    """One verdict from all cases; `evidence` replaces theirs."""
     found = list(cases)
     words = "; ".join(case.evidence for case in found if case.evidence) if evidence is None else evidence
     keys = sorted({key for case in found for key in case.keys})

@@ -1,4 +1,4 @@
-"""How the paper's methods look in every figure: hollow what is the second of a kind."""
+"""The styles of the paper's methods in every figure: the second of each kind is hollow."""
 
 from __future__ import annotations
 

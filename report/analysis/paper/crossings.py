@@ -1,4 +1,4 @@
-"""Where one method overtakes another as more contacts close, and whose worst case is the worse."""
+"""Where one method overtakes another as more contacts close, and which worst case is longer."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from itertools import pairwise
 
 import pandas as pd
 
-from report.analysis.timed import records, timed
+from report.analysis.seconds import timed
+from report.document.blocks import records
 from report.document.numbers import counted, significant
 
-from .selection import METHODS, method
+from .selection import METHODS, of_method
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """At `at` (active share of m) `faster` takes over from the other; None where one of the two runs
-    around it was stopped by the clock, so that it is only known to lie in (low, high).
+    """From `at` (active share of m) on, `faster` is the faster method; None if one of the two runs around it
+    was stopped by the clock, so that it is only known to lie in (low, high).
     """
 
     low: float
@@ -27,14 +28,14 @@ class Crossing:
 
     def __str__(self) -> str:
         if self.at is not None:
-            return f"at {100 * self.at:.0f} % {self.faster} takes over"
-        return f"between {100 * self.low:.0f} and {100 * self.high:.0f} % {self.faster} takes over"
+            return f"at {100 * self.at:.0f} % {self.faster} becomes faster"
+        return f"between {100 * self.low:.0f} and {100 * self.high:.0f} % {self.faster} becomes faster"
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two methods at one size: `shares` of the scenes compared, the crossings, who is the faster at the
-    low end, and how many scenes could not be compared.
+    """Two methods at one size: `shares` of the scenes compared, the crossings, which one is faster at the low
+    end, and how many scenes could not be compared.
     """
 
     n: int
@@ -58,13 +59,13 @@ class Pair:
 
 
 def compared(cells: pd.DataFrame, n: int, first: str, second: str) -> Pair:
-    """Piecewise linear in the active share, on the logarithm of the seconds a load case."""
+    """Piecewise linear in the active share, for the logarithm of the seconds per load case."""
     a, b = (_lines(cells, n, name) for name in (first, second))
     both = a.merge(b, left_index=True, right_index=True, suffixes=("_a", "_b")).sort_values("share_a")
     points: list[tuple[float, float, bool]] = []  # share, log(time of second / time of first), exact
     for row in records(both):
         ratio = math.log(row["at_least_b"] / row["at_least_a"])
-        # a lower bound decides only when it is the larger of the two
+        # a lower bound decides only if it is the larger of the two
         unknown = (row["cut_a"] and ratio >= 0) or (row["cut_b"] and ratio <= 0)
         if not unknown:
             points.append((row["share_a"], ratio, not (row["cut_a"] or row["cut_b"])))
@@ -82,12 +83,12 @@ def compared(cells: pd.DataFrame, n: int, first: str, second: str) -> Pair:
 
 
 def _scenes(cells: pd.DataFrame, n: int, name: str) -> list[str]:
-    rows = method(cells, name)
+    rows = of_method(cells, name)
     return rows.loc[rows["n"] == n, "scene"].tolist()
 
 
 def _lines(cells: pd.DataFrame, n: int, name: str) -> pd.DataFrame:
-    rows = timed(method(cells, name))
+    rows = timed(of_method(cells, name))
     rows = rows[(rows["n"] == n) & (rows["at_least"] > 0) & (rows["m"] > 0)]
     rows = rows.assign(share=rows["active"] / rows["m"]).set_index("scene")
     return rows[["share", "at_least", "cut", "key"]]
@@ -95,8 +96,9 @@ def _lines(cells: pd.DataFrame, n: int, name: str) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class Worst:
-    """The longest time over the scenes of a size; `cut`: only a lower bound; `missing`: scenes with
-    neither an answer within the limit nor a time limit reached."""
+    """The longest time over the scenes of a size; `cut`: only a lower bound; `missing`: scenes with neither
+    an answer within the limit nor a time limit reached.
+    """
 
     seconds: float
     cut: bool
@@ -113,13 +115,13 @@ BETTER = "the better of GI dual and primal"
 
 
 def worst(cells: pd.DataFrame, n: int, name: str) -> Worst | None:
-    """Of METHODS, or of BETTER: GI's better form chosen for each scene."""
+    """For one of METHODS, or for BETTER: the better form of GI on each scene."""
     if name == BETTER:
-        both = pd.concat([method(cells, "GI dual"), method(cells, "GI primal")])
+        both = pd.concat([of_method(cells, "GI dual"), of_method(cells, "GI primal")])
         rows = timed(both[both["n"] == n]).sort_values(["at_least", "cut"], na_position="last")
         rows = rows.drop_duplicates("scene")
     else:
-        rows = timed(method(cells, name))
+        rows = timed(of_method(cells, name))
         rows = rows[rows["n"] == n]
     known = rows.dropna(subset=["at_least"])
     if known.empty:
@@ -130,7 +132,7 @@ def worst(cells: pd.DataFrame, n: int, name: str) -> Worst | None:
 
 
 def below(mine: Worst | None, other: Worst | None) -> bool | None:
-    """Whether the one's worst case is below the other's; None where that is not decided."""
+    """Whether one worst case is below the other; None if undecided."""
     if mine is None or other is None:
         return None
     if mine.seconds < other.seconds:
@@ -139,8 +141,8 @@ def below(mine: Worst | None, other: Worst | None) -> bool | None:
 
 
 def at_share(cells: pd.DataFrame, n: int, name: str, share: float) -> tuple[float, bool, list[str]] | None:
-    """Seconds at an active share, interpolated like the crossings, whether only a lower bound, and the
-    rows it stands on; None outside the range of the scenes.
+    """Seconds at an active share, interpolated like the crossings, whether it is only a lower bound, and the
+    rows it is based on; None outside the range of the scenes.
     """
     lines = _lines(cells, n, name).sort_values("share")
     below_it, above = lines[lines["share"] <= share], lines[lines["share"] >= share]
@@ -155,6 +157,6 @@ def at_share(cells: pd.DataFrame, n: int, name: str, share: float) -> tuple[floa
 
 def sizes(cells: pd.DataFrame) -> list[int]:
     """Sizes with at least two scenes of the interior-point or the Goldfarb–Idnani method."""
-    rows = pd.concat([method(cells, name) for name in METHODS])
+    rows = pd.concat([of_method(cells, name) for name in METHODS])
     counted = rows.groupby("n")["scene"].nunique()
     return sorted(int(n) for n in counted[counted > 1].index.to_list())

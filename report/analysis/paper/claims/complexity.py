@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from report.analysis.fit import Exponent
+from report.analysis.paper.growth import fitted, keys
+from report.analysis.paper.selection import of_method
 from report.document.numbers import significant, whole
 
-from .scaling import fitted, keys
-from .selection import method
 from .verdict import Case, Claim, Measured, by_case
 
-CLOSE = 0.3  # exponents this near to each other are one order
+CLOSE = 0.3  # exponents this close to each other are one order
 FACTORS = {
     "working_s": "working time",
     "iterations": "outer iterations",
-    "s_per_cg": "seconds a CG iteration",
+    "s_per_cg": "seconds per CG iteration",
 }
 ORDERINGS = ("IPM", "IPM, open gaps last")
 RIVALS = ("GI dual", "GI primal")
@@ -45,7 +45,7 @@ def _ipm_order(measured: Measured) -> Iterator[Case]:
             continue
         parts = [(key, fitted(measured.lines, name, key)) for key in ("working_s", "iterations", "s_per_cg")]
         factors = ", ".join(f"{FACTORS[key]} n^{part}" for key, part in parts)
-        words = f"{name}: working time over CG iterations a system n^{fit}; {factors}"
+        words = f"{name}: working time over CG iterations per system n^{fit}; {factors}"
         yield Case(name, within(fit, 2.5), words, keys(measured.lines, name))
 
 
@@ -54,7 +54,7 @@ def _gi_order(measured: Measured) -> Iterator[Case]:
     for name in RIVALS:
         fit, working = (fitted(measured.lines, name, key) for key in ("s_per_pivot", "working_s"))
         if fit is not None:
-            words = f"{name}: a pivot n^{fit}, working time n^{working or '–'}"
+            words = f"{name}: time per pivot n^{fit}, working time n^{working or '–'}"
             yield Case(name, within(fit, 2.0), words, keys(measured.lines, name))
 
 
@@ -71,7 +71,7 @@ def _same_preparation(measured: Measured) -> Iterator[Case]:
 
 
 @by_case("the form")
-def _inversion_besides(measured: Measured) -> Iterator[Case]:
+def _additional_inversion(measured: Measured) -> Iterator[Case]:
     lines = measured.lines
     for name in RIVALS if len(lines) else ():
         both = lines[lines["method"] == "IPM"].merge(lines[lines["method"] == name], on="scene")
@@ -87,13 +87,13 @@ def _inversion_besides(measured: Measured) -> Iterator[Case]:
 
 @by_case("the form and the size")
 def _less_memory(measured: Measured) -> Iterator[Case]:
-    mine = method(measured.cells, "IPM").dropna(subset=["working_mib"])
+    mine = of_method(measured.cells, "IPM").dropna(subset=["working_mib"])
     for n in sorted(mine["n"].unique()):
         of_size = mine[mine["n"] == n]
         largest = of_size["working_mib"].max()
         yield Case("", None, f"n = {n:.0f}: IPM {whole(largest)} MiB", of_size["key"].tolist())
         for name in RIVALS:
-            rows = method(measured.cells, name).dropna(subset=["working_mib"])
+            rows = of_method(measured.cells, name).dropna(subset=["working_mib"])
             rows = rows[rows["n"] == n]
             if rows.empty:
                 continue
@@ -110,28 +110,28 @@ def _square_memory(measured: Measured) -> Iterator[Case]:
             yield Case(name, within(fit, 2.0), f"{name}: n^{fit}", keys(measured.lines, name))
 
 
-AT_MOST = "The fitted exponent, less two standard errors, is at most the claimed one"
+AT_MOST = "The fitted exponent minus two standard errors is at most the claimed one"
 
 CLAIMS = [
     Claim(
         "iterations below √m",
         "5.1",
         "In practice the iterations grow more slowly than the worst case √m.",
-        "The fitted exponent of the outer iterations, with two standard errors on it, stays below 0.5.",
+        "The fitted exponent of the outer iterations plus two standard errors is below 0.5.",
         _below_root,
     ),
     Claim(
         "IPM working time",
         "6, Table 3",
-        "The interior-point method's working time is O(n^2.5) times the CG iterations of a system.",
-        AT_MOST + ": working time over the mean CG iterations of a system 2.5.",
+        "The interior-point method's working time is O(n^2.5) times the CG iterations per system.",
+        AT_MOST + ": 2.5 for working time over the mean CG iterations per system.",
         _ipm_order,
     ),
     Claim(
         "GI working time",
         "6, Table 3",
         "Goldfarb–Idnani's working time is O(n_act n²).",
-        AT_MOST + ": seconds a pivot 2.",
+        AT_MOST + ": 2 for seconds per pivot.",
         _gi_order,
     ),
     Claim(
@@ -144,9 +144,9 @@ CLAIMS = [
     Claim(
         "inversion",
         "6, Table 3",
-        "Goldfarb–Idnani needs an inversion besides the factorisation.",
-        "What the solver prepares once takes longer than with the interior-point method, at every size.",
-        _inversion_besides,
+        "Goldfarb–Idnani needs an inversion in addition to the factorisation.",
+        "The solver's own preparation takes longer than the interior-point method's at every size.",
+        _additional_inversion,
     ),
     Claim(
         "less memory",
@@ -159,7 +159,7 @@ CLAIMS = [
         "memory grows",
         "6, Table 3",
         "Memory grows like the square of the problem.",
-        AT_MOST + ": working memory 2.",
+        AT_MOST + ": 2 for working memory.",
         _square_memory,
     ),
 ]

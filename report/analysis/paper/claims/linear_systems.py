@@ -7,13 +7,14 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.paper.cg import SYSTEMS, counts
+from report.analysis.paper.selection import ipm
+from report.analysis.paper.targets import LATE, ORDERINGS, RATIO, largest_late, ratios
+from report.analysis.seconds import timed
 from report.analysis.standings import TIE
-from report.analysis.timed import records, timed
+from report.document.blocks import records
 from report.document.numbers import significant
 
-from .cg import SYSTEMS, counts
-from .selection import ipm
-from .targets import LATE, ORDERINGS, RATIO, largest_late, ratios
 from .verdict import Case, Claim, Measured, by_case
 
 HUNDREDS = 100
@@ -24,7 +25,7 @@ def _few_instead_of_thousands(measured: Measured) -> Iterator[Case]:
     for ordering in ORDERINGS:
         for ratio in ratios(measured.cells, ordering):
             holds = None if ratio.met is None else ratio.met and ratio.none.largest >= HUNDREDS
-            words = f"{ordering}, {ratio}, {ratio.none.largest} and {ratio.V.largest} at most a system"
+            words = f"{ordering}, {ratio}, {ratio.none.largest} and {ratio.V.largest} at most per system"
             yield Case(f"{ordering}, scene {ratio.scene}", holds, words, ratio.keys)
 
 
@@ -43,7 +44,7 @@ def _needs_a_preconditioner(measured: Measured) -> Iterable[Case]:
 
 @by_case("the scene")
 def _diagonal_matters(measured: Measured) -> Iterator[Case]:
-    """U alone against V: CG iterations of a solve."""
+    """U alone against V: CG iterations per solve."""
     V, U = (ipm(measured.cells, **SYSTEMS[name]) for name in ("V = U + √D", "U alone"))
     for scene in [s for s in U["scene"] if s in set(V["scene"])]:
         rows = [r[r["scene"] == scene].iloc[0].to_dict() for r in (V, U)]
@@ -67,7 +68,7 @@ def _iterative_beats_direct(measured: Measured) -> Iterable[Case]:
 
 
 def _faster(measured: Measured, mine: Iterable[str], rival: str) -> Iterator[Case]:
-    """Seconds a load case, by scene; less than TIE apart decides nothing."""
+    """Seconds per load case by scene; a difference below TIE decides nothing."""
     for name in mine:
         for pair in pairs(ipm(measured.cells, **SYSTEMS[name]), ipm(measured.cells, **SYSTEMS[rival])):
             case = f"{name}, scene {pair['scene']}"
@@ -76,14 +77,14 @@ def _faster(measured: Measured, mine: Iterable[str], rival: str) -> Iterator[Cas
 
 
 def pairs(a: pd.DataFrame, b: pd.DataFrame) -> list[dict[str, Any]]:
-    """Two lines scene by scene, where both have a time or a lower bound of it."""
+    """Two lines scene by scene, if both have a time or a lower bound of it."""
     names = ["scene", "n", "at_least", "cut", "key"]
     both = timed(a)[names].merge(timed(b)[names], on=["scene", "n"], suffixes=("_a", "_b"))
     return records(both.dropna(subset=["at_least_a", "at_least_b"]))
 
 
 def is_faster(pair: dict[str, Any]) -> bool | None:
-    """Whether a is clearly faster than b; None where they are nearly equal or a bound leaves it open."""
+    """Whether a is clearly faster than b; None if they are nearly equal or a lower bound leaves it open."""
     a, b = pair["at_least_a"], pair["at_least_b"]
     if TIE * a < b:
         return None if pair["cut_a"] else True
@@ -97,21 +98,21 @@ def times_text(pair: dict[str, Any]) -> str:
     return f"{a} against {b}"
 
 
-FASTER = f"Seconds a load case on each scene with both; less than {TIE - 1:.0%} apart decides nothing."
+FASTER = f"Seconds per load case on each scene with both; a difference below {TIE - 1:.0%} decides nothing."
 
 CLAIMS = [
     Claim(
         "few CG iterations",
         "5.3, Table 1",
-        "V = U + √D brings the CG iterations of a system from hundreds or thousands down to a few.",
-        f"V = I takes {HUNDREDS} or more for some system, and V at most 1/{RATIO} of its sum over a solve.",
+        "V = U + √D brings the CG iterations per system from hundreds or thousands down to a few.",
+        f"V = I takes at least {HUNDREDS} for some system, and V at most 1/{RATIO} of its sum over a solve.",
         _few_instead_of_thousands,
     ),
     Claim(
         "few to the end",
         "5.3, Table 1",
-        "With V a few CG iterations are enough up to the last outer iterations.",
-        f"No system of the second half of any solve takes more than {LATE} (printed: 23).",
+        "With V, a few CG iterations are enough up to the last outer iterations.",
+        f"No system in the second half of any solve takes more than {LATE} (printed: 23).",
         _few_to_the_end,
     ),
     Claim(
@@ -124,7 +125,7 @@ CLAIMS = [
     Claim(
         "U alone",
         "5.3",
-        "U alone is not enough, because it knows nothing of the diagonal D.",
+        "U alone is not enough, because it ignores the diagonal D.",
         "U alone takes more CG iterations, summed over a solve, than V.",
         _diagonal_matters,
     ),
@@ -139,7 +140,7 @@ CLAIMS = [
         "iterative or direct",
         "5.3",
         "Only an iterative method solves the system in less than O(n³).",
-        "At these sizes that would show as V faster than a Cholesky factor of every H. " + FASTER,
+        "At these sizes V would then be faster than a Cholesky factorisation of every H. " + FASTER,
         _iterative_beats_direct,
     ),
 ]

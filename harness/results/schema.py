@@ -1,0 +1,85 @@
+"""The rows of measurements.jsonl: names, kinds and vocabulary. The standard library alone.
+
+One row per measurement. The harness writes these fields and the report reads them; both take the names
+from here. A field that does not apply to a measurement is null.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+#: An object is a JSON object whose names depend on the solver or the series.
+Kind = Literal["number", "text", "flag", "object"]
+
+#: What ended a measurement. The first four are what a solver says of its answer.
+Status = Literal[
+    "solved",  # to its tolerance
+    "inaccurate",  # an answer that misses it
+    "iteration_limit",
+    "failed",
+    "time_limit",
+    "memory_limit",
+    "crashed",
+    "unsupported",  # the solver does not take this form
+    "not_run",  # predicted to exceed the time limit, so not started
+]
+STATUSES: tuple[Status, ...] = get_args(Status)
+
+#: What the judge says of an answer, from best to worst.
+Verdict = Literal["within", "outside", "cannot_be_judged", "no_answer"]
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+ANSWERED = VERDICTS[:-1]
+
+#: The forms of the quadratic program, in the order of every table.
+FORMS = ("sparse", "dual", "primal")
+
+#: The scenes that are rungs of ladders: hard/<ladder>/<rung>.
+LADDERS = "hard/"
+
+#: The steps of a measurement, s; `form_s` is what the form costs per load case beside the solver.
+STEPS = ("convert_s", "prepare_s", "setup_s", "solve_s", "form_s")
+
+
+def _fields(kind: Kind, names: str) -> dict[str, Kind]:
+    return dict.fromkeys(names.split(), kind)
+
+
+#: What was asked for.
+ASKED: dict[str, Kind] = {
+    **_fields("text", "key suite scene source solver form variant"),
+    **_fields("number", "tolerance threads_asked repeat case time_limit_s memory_limit_mib"),
+    **_fields("number", "limit_mm limit_asked_mm"),
+    **_fields("object", "options series"),
+    **_fields("flag", "gated in_house"),
+}
+#: The problem.
+PROBLEM: dict[str, Kind] = {**_fields("number", "n m active"), **_fields("text", "scene_key")}
+#: What the measuring process reports.
+MEASURED: dict[str, Kind] = {
+    **_fields("text", "status message kernels stderr answer"),
+    **_fields("number", "iterations inner_iterations"),
+    **_fields("number", " ".join(STEPS)),
+    **_fields("number", "load_s solver_reported_s data_mib peak_rss_mib threads cholesky_s product_s"),
+    **_fields("object", "details"),
+}
+#: The same of a case of a series: how many were solved at once, and whether others were before.
+MEASURED_OF_CASES: dict[str, Kind] = {**_fields("number", "batched"), **_fields("flag", "warm")}
+#: What the judge finds.
+JUDGED: dict[str, Kind] = {
+    **_fields("text", "verdict"),
+    **_fields("number", "reference_bound_mm displacement_error_mm contact_mismatch min_gap_mm"),
+    **_fields("number", "primal_residual dual_residual duality_gap backward_error"),
+}
+#: Where, when and by which code: `commit` is the project's, or the installed version's text.
+ORIGIN: dict[str, Kind] = {
+    **_fields("text", "machine solver_version solver_code rivetbench_version commit recorded_at"),
+    **_fields("number", "overhead_s"),
+    **_fields("flag", "clean"),
+}
+
+FIELDS: dict[str, Kind] = {**ASKED, **PROBLEM, **MEASURED, **MEASURED_OF_CASES, **JUDGED, **ORIGIN}
+
+
+def of_kind(kind: Kind) -> list[str]:
+    """The names of the fields of a kind."""
+    return [name for name, of in FIELDS.items() if of == kind]

@@ -1,0 +1,114 @@
+"""Maps of the answer of one scene: gaps, contact forces and displacements."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize, PowerNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from . import style
+from .maps import Array, draw, grid_of, outline
+from .sheet import Sheet, sheet
+
+#: Marks on the junction, by the kind of effect.
+MARKS = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
+THINNEST = 0.02  # a map's shorter side over its longer one
+NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
+
+
+def pair_name(pair: dict[str, Any]) -> str:
+    return " – ".join(pair["pair"])
+
+
+def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
+    with style.applied():
+        figures = {"gap": _gap(record, arrays)} if record["m"] else {}
+        if (arrays["lam"] > 0).any():
+            figures["forces"] = _forces(record, arrays)
+        return figures | {"displacement": _displacement(record, arrays)}
+
+
+def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
+    """Both gaps of each pair on one square-root scale; closed contacts are outlined."""
+    before, after = arrays["gap_before"], arrays["gap_after"]
+    titles = [f"gap {when}: {pair_name(pair)}" for pair in record["pairs"] for when in ("before", "after")]
+    maps = _sheet(arrays["contact_nodes"], titles, 2, len(record["marks"]))
+    norm = PowerNorm(0.5, 0.0, max(float(before.max()), float(after.max()), 0.0) or 1.0)
+    for k, pair in enumerate(record["pairs"]):
+        own = slice(pair["start"], pair["stop"])
+        nodes = arrays["contact_nodes"][own]
+        for axes, values in zip(maps.axes[2 * k : 2 * k + 2], (before, after), strict=True):
+            drawn = draw(axes, nodes, values[own], norm, "viridis")
+            _mark(axes, record["marks"])
+        _outline(axes, nodes, arrays["lam"][own] > 0, "white")
+    return maps.finished(drawn, "gap, mm")
+
+
+def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
+    """The forces on a square-root scale, so that small ones are visible."""
+    pairs, lam = record["pairs"], np.nan_to_num(arrays["lam"])
+    titles = [f"contact forces: {pair_name(pair)}" for pair in pairs]
+    maps = _sheet(arrays["contact_nodes"], titles, len(pairs), len(record["marks"]))
+    norm = PowerNorm(0.5, 0.0, float(lam.max(initial=0.0)) or 1.0)
+    for axes, pair in zip(maps.axes, pairs, strict=True):
+        own = slice(pair["start"], pair["stop"])
+        nodes, closed = arrays["contact_nodes"][own], lam[own] > 0
+        drawn = draw(axes, nodes, np.where(closed, lam[own], np.nan), norm, "magma_r")
+        _outline(axes, nodes, closed, "#444444")
+        _mark(axes, record["marks"])
+    return maps.finished(drawn, "force, N")
+
+
+def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
+    """All parts on one scale, each inside its outline; a thick edge is clamped."""
+    parts = record["parts"]
+    corners = np.array([(x, y) for part in parts for x in part["outline"][:2] for y in part["outline"][2:]])
+    supports = any(part["supports"] for part in parts)
+    titles = [f"displacement of {part['name']}" for part in parts]
+    maps = _sheet(corners, titles, len(parts), len(record["marks"]) + supports)
+    norm = Normalize(float(arrays["x"].min()), float(arrays["x"].max()))
+    for axes, part in zip(maps.axes, parts, strict=True):
+        west, east, south, north = part["outline"]
+        axes.spines[:].set_visible(False)
+        edge: dict[str, Any] = {"clip_on": False, "edgecolor": "#666666", "facecolor": "#F0F0F0"}
+        axes.add_patch(Rectangle((west, south), east - west, north - south, **edge))
+        own = slice(part["start"], part["stop"])
+        drawn = draw(axes, arrays["nodes"][own], arrays["x"][own], norm, "cividis")
+        for side, y in (("south", south), ("north", north)):
+            if side in part["clamped"]:
+                axes.plot([west, east], [y, y], color="#222222", lw=3.0, clip_on=False)
+        _mark(axes, record["marks"] | ({"supports": part["supports"]} if part["supports"] else {}))
+    return maps.finished(drawn, "displacement, mm")
+
+
+def _sheet(nodes: Array, titles: list[str], beside: int, marks: int) -> Sheet:
+    """Maps of the bounding box of the nodes: stacked if it is a wide strip, all side by side if it is
+    upright, else `beside` and at most three per row.
+    """
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    thin = THINNEST * (high - low).max() or 1.0
+    size, middle = np.maximum(high - low, thin), (low + high) / 2
+    ratio = size[1] / size[0]
+    columns = 1 if ratio < NARROW else len(titles) if ratio > UPRIGHT else min(beside, 3)
+    return sheet(middle - size / 2, middle + size / 2, titles, columns, marks)
+
+
+def _outline(axes: Axes, nodes: Array, closed: Any, colour: str) -> None:
+    if grid := grid_of(nodes):
+        axes.add_collection(LineCollection(outline(grid, closed), colors=colour, linewidths=0.9))
+
+
+def _mark(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
+    """Rings with a white rim, visible on any colour without hiding what is inside them."""
+    for kind, points in marks.items():
+        x, y = np.array(points).T
+        ring: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "none", "clip_on": False}
+        shape = MARKS.get(kind, "x")
+        axes.plot(x, y, shape, markeredgecolor="#FFFFFF90", markeredgewidth=1.6, **ring)
+        label = kind.replace("_", " ")
+        axes.plot(x, y, shape, markeredgecolor=style.VERMILLION, markeredgewidth=1.0, label=label, **ring)

@@ -1,0 +1,179 @@
+"""How the report reads rows: those of older versions, of several forms and of different code."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from synthetic_results import no_answer, row, write_rows
+
+from report.analysis import code
+from report.analysis.checks import warnings
+from report.figures import style
+from report.results.labels import in_order
+from report.results.reader import read
+from report.writers.discovery import sections
+from report.writers.markdown import write
+
+LOW, HIGH = "4386/0100", "4386/1000"
+REPORT = Path(style.__file__).parents[1]
+HERE, OTHER = "0123456789" * 4, "abcdef0123" * 4
+
+
+@pytest.fixture(autouse=True)
+def _drawn_by_one_commit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(code, "commit", lambda: (HERE, True))
+
+
+def said(directory: Path, *rows: dict[str, Any]) -> list[str]:
+    return warnings(read(write_rows(directory, list(rows))))
+
+
+# Sections.
+
+
+def test_the_sections_stand_in_their_order() -> None:
+    names = [module.__name__.removeprefix("report.sections.") for module in sections()]  # type: ignore[attr-defined]
+    assert names == [
+        *("ladders", "rungs"),
+        *("summary", "recommendation", "speed", "same_method", "ingredients", "scaling", "series"),
+        *("paper.claims", "paper.table1", "paper.table2", "paper.table3", "paper.table4"),
+        *("paper.figures3_4", "paper.figures5_7"),
+        *("problems", "times", "accuracy", "price_list", "asked_achieved", "residual_error", "profiles"),
+        *("amortised", "stability", "breakdown", "gap_map", "details"),
+        "machine",
+    ]
+    assert len({module.PLACE.number for module in sections()}) == len(names)
+    assert [m.PLACE.about for m in sections()] == ["ladders"] * 2 + ["scenes"] * (len(names) - 3) + ["all"]
+
+
+def test_a_section_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "greeting.py").write_text(
+        "from report.document.blocks import Place, Section\n"
+        "PLACE = Place(1)\n"
+        "def section(results):\n"
+        "    return Section(f'Hello to {len(results.rows)} row', [])\n"
+    )
+    package = sys.modules["report.sections"]
+    monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
+    text = write(write_rows(tmp_path / "out", [row(LOW, "a")])).read_text("utf-8")
+    sys.modules.pop("report.sections.greeting")
+    assert re.findall("^## (.*)", text, re.M)[:2] == ["Hello to 1 row", "Summary"]
+
+
+# Layers.
+
+LAYERS = ("document", "results", "analysis", "figures", "sections", "writers")
+FROM_OUTSIDE = {"harness.results.schema", "harness.results.provenance"}
+OWN = ("harness", "solvers", "problems", "report")
+
+
+@pytest.mark.parametrize("path", sorted(REPORT.rglob("*.py")), ids=lambda path: str(path.relative_to(REPORT)))
+def test_a_folder_imports_only_from_those_before_it(path: Path) -> None:
+    layer = LAYERS.index(path.relative_to(REPORT).parts[0]) if path.parent != REPORT else len(LAYERS)
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        names = [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+        names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        for name in (name for name in names if name.split(".")[0] in OWN):
+            if name.startswith("report."):
+                assert LAYERS.index(name.split(".")[1]) <= layer, name
+            elif name != "report":
+                assert name in FROM_OUTSIDE
+
+
+# Rows of older versions.
+
+
+def test_older_rows_are_read_as_todays(tmp_path: Path) -> None:
+    late = no_answer("time_limit")
+    rows = [row(LOW, "newton"), row(LOW, "piqp"), row(HIGH, "newton", together=16)]
+    rows += [row(HIGH, "piqp", **late, message="not run: too slow already on 4386/0100")]
+    found = read(write_rows(tmp_path, rows)).rows
+    assert found["in_house"].tolist() == [True, False, True, False]
+    assert found["status"].tolist() == ["solved", "solved", "solved", "not_run"]
+    assert found["batched"].tolist()[2] == 16
+    assert "together" not in found
+
+
+def test_todays_rows_are_taken_at_their_word(tmp_path: Path) -> None:
+    rows = [row(LOW, "mine", in_house=True, batched=8), row(LOW, "newton", in_house=False)]
+    rows += [row(HIGH, "mine", in_house=True, **no_answer("not_run"))]
+    rows += [row(HIGH, "newton", in_house=False, **no_answer("crashed"), message="not run: no reason")]
+    found = read(write_rows(tmp_path, rows)).rows
+    assert found["in_house"].tolist() == [True, False, True, False]
+    assert found["status"].tolist() == ["solved", "solved", "not_run", "crashed"]
+    assert found["batched"].tolist()[0] == 8
+
+
+# Order and forms.
+
+
+def test_in_house_first_then_by_name_and_the_sparse_form_before_dual_and_primal(tmp_path: Path) -> None:
+    lines = [("piqp", "primal"), ("newton", "dual"), ("clarabel", "sparse"), ("clarabel", "primal")]
+    lines += [("clarabel", "dual"), ("gi", "primal"), ("mine", "other"), ("mine", "dual"), ("gi", "sparse")]
+    cells = read(write_rows(tmp_path, [row(LOW, solver, form) for solver, form in lines])).cells
+    assert in_order(cells) == [
+        *("gi (sparse)", "gi (primal)", "newton (dual)"),
+        *("clarabel (sparse)", "clarabel (dual)", "clarabel (primal)"),
+        *("mine (dual)", "mine (other)", "piqp (primal)"),
+    ]
+    assert in_order(cells, "solver") == ["gi", "newton", "clarabel", "mine", "piqp"]
+
+
+def test_three_forms_look_different_and_are_explained(tmp_path: Path) -> None:
+    rows = [row(scene, "newton", form) for form in style.FORMS for scene in (LOW, HIGH)]
+    results = read(write_rows(tmp_path, rows))
+    looks = style.line_styles(results.cells)
+    assert len({look["markerfacecolor"] for look in looks.values()}) == 3
+    assert len({str(look["linestyle"]) for look in looks.values()}) == 3
+    text = write(tmp_path).read_text("utf-8")
+    assert "Solid and filled: dual form; dashed and hollow: primal form; dash-dotted and pale: sparse" in text
+    for form in ("Primal", "Dual", "Sparse"):
+        assert f"*{form}*: min" in text
+
+
+# Different code.
+
+
+def test_rows_of_the_code_that_draws_call_for_no_warning(tmp_path: Path) -> None:
+    assert said(tmp_path, row(LOW, "a", commit=HERE, clean=True), row(LOW, "b", commit=HERE)) == []
+
+
+def test_rows_of_different_code_in_one_table_are_said_first(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", commit=HERE, clean=True), row(HIGH, "a", commit=OTHER, clean=False), row(LOW, "b")]
+    mixed, unclean, older = said(tmp_path, *rows)
+    assert mixed == (
+        "The tables mix rows measured with different code: commit 0123456789 (1 row), commit abcdef0123 "
+        "(1 row) and a commit that is not recorded (1 row)."
+    )
+    assert unclean == "1 row was measured with uncommitted changes to that commit."
+    assert older == "1 of 3 rows was measured with older code than the code that drew this report."
+    text = write(tmp_path).read_text("utf-8")
+    assert text.index(mixed) < text.index("|")
+    assert re.search(rf"\| commit +\| {HERE} \(clean\), {OTHER} \(with uncommitted changes\) and not", text)
+
+
+def test_rows_of_older_code_and_of_an_unknown_commit_are_said(tmp_path: Path) -> None:
+    (older,) = said(tmp_path / "old", row(LOW, "a", commit=OTHER, clean=True))
+    assert older == "All rows were measured with older code than the code that drew this report."
+    assert said(tmp_path / "unknown", row(LOW, "a")) == ["No row records the commit it was measured with."]
+    (installed,) = said(tmp_path / "installed", row(LOW, "a", commit="0.2.0"))
+    assert installed == older
+
+
+def test_different_code_of_one_solver_is_said(tmp_path: Path) -> None:
+    rows = [row(LOW, "a", commit=HERE, solver_code="one"), row(HIGH, "a", commit=HERE, solver_code="two")]
+    rows += [row(LOW, "b", commit=HERE, solver_code="three")]
+    assert said(tmp_path, *rows) == ["The tables mix rows of different code of a."]
+    text = write(tmp_path).read_text("utf-8")
+    assert re.search(r"\| a +\| 1.0 +\| one and two +\|", text)
+
+
+def test_a_report_of_the_same_code_is_the_same_bytes(tmp_path: Path) -> None:
+    directory = write_rows(tmp_path, [row(LOW, "a", commit=OTHER), row(HIGH, "a", commit=OTHER)])
+    first = write(directory).read_bytes()
+    assert write(directory).read_bytes() == first
