@@ -86,17 +86,17 @@ def test_directions_after_some_have_entered_and_left() -> None:
     for step in ["enter 3", "leave 7", "enter 11", "leave 0", "enter 0", "drop 3", "leave 29", "enter 3"]:
         act, which = step.split()
         if act == "enter":
-            border.entered.append(int(which))
+            border.added.append(int(which))
         else:
-            border.drop(int(which) if act == "leave" else len(C) + border.entered.index(int(which)))
-        active = [k for place, k in enumerate(border.active) if place not in border.left]
+            border.drop(int(which) if act == "leave" else len(C) + border.added.index(int(which)))
+        active = [k for place, k in enumerate(border.active) if place not in border.removed]
         r, ds = border.direction(5)
         du = np.zeros(60)
         du[border.active] = -r
         du[35] = 1.0
         wanted = np.linalg.solve(G[np.ix_(active, active)], G[active, 35])
         np.testing.assert_allclose(du[active], -wanted, atol=1e-9)
-        assert not du[border.left].any()
+        assert not du[border.removed].any()
         np.testing.assert_allclose(ds, (G @ du)[candidates], atol=1e-9 * abs(G).max())
 
 
@@ -164,7 +164,7 @@ def test_refinement_leaves_no_negative_multiplier_and_no_active_slack(seed: int)
 def test_the_rounding_of_a_large_matrix_does_not_weigh_on_refined_slacks() -> None:
     """Here the terms of Gu are 1e13 times the slacks, as those of a part that hardly anything holds."""
     state = full_state(np.eye(4) + 1e13)
-    state.refer_to(lambda u: (np.full(4, 0.25), np.ones(4)))
+    state.reset_base(lambda u: (np.full(4, 0.25), np.ones(4)))
     np.testing.assert_array_equal(state.slacks(), 0.25)
     state.u[0] += 2.0**-50
     np.testing.assert_allclose(state.slacks(), 0.25 + 1e13 * 2.0**-50, rtol=1e-12)
