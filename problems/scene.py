@@ -22,7 +22,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from problems.input.validation import UNITS, unknown, validation_faults
-from problems.manufactured.ladder import PREFIX, Made, Rung, make_rung, rung_names
+from problems.manufactured.ladder import PREFIX, ManufacturedProblem, Rung, make_rung, rung_names
 from problems.model.effect import Effect, Pair, StiffnessEffect
 from problems.model.effect_tables import EffectTable
 from problems.model.joint import Joint, Table
@@ -49,7 +49,7 @@ class Scene:
     rung: Rung | None = None
 
     @property
-    def made(self) -> Made | None:
+    def made(self) -> ManufacturedProblem | None:
         """The matrices of a rung that no plates make."""
         return self.rung.made if self.rung else None
 

@@ -223,7 +223,7 @@ def test_a_name_picks_its_matrix_from_a_file_of_several(tmp_path: Path) -> None:
         ({"K": -sp.eye_array(12)}, "positive definite"),
         ({"f": np.ones(11)}, "f.shape"),
         ({"g": np.full(7, np.nan)}, "NaN"),
-        ({"A": sp.csc_array(np.zeros((12, 7)))}, "each contact must touch an unknown"),
+        ({"A": sp.csc_array(np.zeros((12, 7)))}, "each contact must involve an unknown"),
     ],
 )
 def test_bad_matrices_are_refused_and_nothing_is_left(change: Any, said: str, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from harness.verification.reference import refined_active_set
 from problems.build import prepared
 from problems.errors import InputError
 from problems.manufactured.exact import spectrum
-from problems.manufactured.ladder import Made, make_rung, rung_names
+from problems.manufactured.ladder import ManufacturedProblem, make_rung, rung_names
 from problems.scene import read_scene, scene_names
 from solvers.base import Form, Load, Problem
 from solvers.registry import make_solver
@@ -47,7 +47,7 @@ def whole(values: Any) -> Any:
     return np.array([v.numerator for v in exact], dtype=object).reshape(np.shape(values))
 
 
-def made_of(name: str) -> Made:
+def made_of(name: str) -> ManufacturedProblem:
     made = make_rung(name).made
     assert made is not None
     return made
@@ -73,7 +73,7 @@ def test_the_answer_satisfies_the_optimality_conditions_without_rounding(name: s
     assert all((K == K.T).all() for K in made.assembly.blocks)
 
 
-def load_of(made: Made) -> tuple[Any, Any]:
+def load_of(made: ManufacturedProblem) -> tuple[Any, Any]:
     return made.load.f, made.load.g
 
 

@@ -21,7 +21,7 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from problems.forms.assembly import LoadCase, Prepared, Vector
-from problems.manufactured.ladder import Made
+from problems.manufactured.ladder import ManufacturedProblem
 from problems.storage import cache
 
 from .certificate import certify
@@ -50,7 +50,7 @@ class Reference:
     gap_unit_mm: Vector | float = 1.0
 
 
-def made_reference(made: Made, prepared: Prepared) -> Reference:
+def made_reference(made: ManufacturedProblem, prepared: Prepared) -> Reference:
     """The reference of a rung: the answer that it was made from, else the refined one."""
     if made.x is None or made.lam is None:
         return refined_active_set(prepared, made.load)
