@@ -49,7 +49,7 @@ def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, A
 
 
 @pytest.mark.parametrize("form", [form for form in formats.WRITERS if form != "dmig"])
-def test_there_and_back_bit_for_bit(form: str, tmp_path: Path) -> None:
+def test_a_round_trip_is_bit_for_bit(form: str, tmp_path: Path) -> None:
     wanted, found = there_and_back(form, tmp_path)
     for name in "KA":
         np.testing.assert_array_equal(found[name], wanted[name].toarray())

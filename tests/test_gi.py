@@ -129,7 +129,7 @@ def test_nothing_violated_needs_no_pivot() -> None:
     assert (result.status, result.pivots, result.u.tolist()) == ("solved", 0, [0.0] * 10)
 
 
-def test_the_limit_on_pivots_is_kept_and_said() -> None:
+def test_the_limit_on_pivots_is_kept_and_reported() -> None:
     G = definite(50, seed=4)
     result = goldfarb_idnani(G, lambda u: (-np.ones(50) + G @ u, np.ones(50)), 1e-12, 5)
     assert result.status == "iteration_limit"
@@ -180,7 +180,7 @@ def two_contacts_of_one_node(Q: np.ndarray, form: Form) -> Answer:
     return solver.solve(solver.prepare(Problem(prepared, form)), load, 1e-10)
 
 
-def test_contacts_that_say_the_same_are_no_hindrance_in_the_primal_form() -> None:
+def test_duplicate_contacts_do_not_hinder_the_primal_form() -> None:
     answer = two_contacts_of_one_node(np.ones((2, 2)), "primal")
     assert answer.status == "solved"
     assert (answer.x, answer.lam) == (pytest.approx([0.25]), pytest.approx([0.0, 0.75]))
@@ -197,7 +197,7 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(Q: np.
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.2])
-def test_pivots_that_a_rough_inverse_misleads_are_finished_by_others(noise: float) -> None:
+def test_block_pivoting_finishes_what_an_inaccurate_inverse_misleads(noise: float) -> None:
     prepared = make_prepared(3, 40)
     case, load = make_load(3, prepared)
     solver = GoldfarbIdnani()

@@ -71,6 +71,6 @@ def test_the_finish_saves_newton_matrices() -> None:
     assert counts[True] < counts[False]
 
 
-def test_options_that_are_none_are_all_named() -> None:
+def test_all_invalid_options_are_named() -> None:
     with pytest.raises(InputError, match=r"finish(.|\n)*single"):
         FastIpm(finish="no", single=2)  # type: ignore[arg-type]

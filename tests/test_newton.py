@@ -97,9 +97,7 @@ def test_a_product_with_few_columns() -> None:
 
 
 @pytest.mark.parametrize("forces_first", [0, MAX_STALE_PASSES])
-def test_pivoting_ends_where_full_exchanges_go_round_in_circles(
-    forces_first: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pivoting_ends_where_full_exchanges_cycle(forces_first: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A beam pressed on a rigid floor, Q its stiffness by second differences: many starts circle there."""
     monkeypatch.setattr("solvers.active_set.block_pivoting.MAX_STALE_PASSES", forces_first)
     size, circled = 20, 0
@@ -169,7 +167,7 @@ def test_weakly_active_contacts_do_no_harm(share: float) -> None:
     np.testing.assert_allclose(np.maximum(found.trial.lam, 0), lam, atol=1e-8)
 
 
-def test_the_limit_on_sets_is_kept_and_said() -> None:
+def test_the_limit_on_sets_is_kept_and_reported() -> None:
     prepared = make_prepared(1, 30)
     _, load = make_load(1, prepared)
     answer = solved(prepared, load, nested=False, max_sets=1)

@@ -47,7 +47,7 @@ def made(name: str, Q: np.ndarray) -> Preconditioner:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", ["none", "U", "V", "ordered", "splitting"])
-def test_the_preconditioned_operator_is_what_it_says(name: str, seed: int) -> None:
+def test_the_preconditioned_operator_matches_its_definition(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     Q = definite(SIZE, seed)
     D = 10 ** rng.uniform(-8, 8, SIZE)
