@@ -1,4 +1,4 @@
-"""What an answer to the dual problem is worth by its own optimality conditions."""
+"""KKT residual of an approximate dual solution."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .base import Status
 EPS = float(np.finfo(float).eps)
 
 
-def checked(Q: Matrix, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
-    """The status that λ ≥ 0 with y = Qλ − p bears out, and its residual max(max(−y), max_{λ>0} |y|), mm.
+def kkt_status(Q: Matrix, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
+    """Status and KKT residual max(max(−y), max_{λ>0} |y|), mm, of λ ≥ 0 with y = Qλ − p.
 
-    "solved" where the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate".
+    "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate".
     """
     residual = max(float((-y).max(initial=0.0)), float(abs(y[lam > 0]).max(initial=0.0)))
     if residual <= tolerance:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from harness.verification import definite
 from harness.verification.certificate import certify
 from harness.verification.definite import smallest_eigenvalue
-from harness.verification.exact_residual import Double
+from harness.verification.exact_residual import DoubleDouble
 from harness.verification.reference import refined_active_set
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
@@ -79,8 +79,8 @@ def test_the_bound_of_any_point_holds(group: int) -> None:
         kappa = 0.999 * min(np.linalg.eigvalsh(block)[0] for block in prepared.assembly.blocks)
         zero_x, zero_lam = np.zeros(len(x)), np.zeros(len(lam))
         for size in (1.0, 1e-3, 1e-9):
-            near = Double(x + size * rng.standard_normal(len(x)), zero_x)
-            forces = Double(lam + size * rng.standard_normal(len(lam)), zero_lam)
+            near = DoubleDouble(x + size * rng.standard_normal(len(x)), zero_x)
+            forces = DoubleDouble(lam + size * rng.standard_normal(len(lam)), zero_lam)
             active = rng.random(len(lam)) < 0.5
             proof = certify(prepared.assembly, load, near, forces, active, kappa)
             assert abs(proof.x.hi - x).max() <= proof.bound_mm
@@ -94,7 +94,9 @@ def test_what_is_proven_closed_or_open_is(group: int) -> None:
         prepared, load, x, lam = manufactured(rng)
         kappa = 0.999 * min(np.linalg.eigvalsh(block)[0] for block in prepared.assembly.blocks)
         y = load.g - prepared.assembly.A.T @ x
-        proof = certify(prepared.assembly, load, Double(x, 0 * x), Double(lam, 0 * lam), lam > 0, kappa)
+        proof = certify(
+            prepared.assembly, load, DoubleDouble(x, 0 * x), DoubleDouble(lam, 0 * lam), lam > 0, kappa
+        )
         assert (lam[proof.closed] > 0).all()
         assert (y[proof.open] > 0).all()
         assert not (proof.closed & proof.open).any()
@@ -105,7 +107,7 @@ def test_what_is_proven_closed_or_open_is(group: int) -> None:
 
 def test_without_a_proof_of_definiteness_there_is_no_bound() -> None:
     prepared, load, x, lam = manufactured(np.random.default_rng(0))
-    proof = certify(prepared.assembly, load, Double(x, 0 * x), Double(lam, 0 * lam), lam > 0, 0.0)
+    proof = certify(prepared.assembly, load, DoubleDouble(x, 0 * x), DoubleDouble(lam, 0 * lam), lam > 0, 0.0)
     assert proof.bound_mm == np.inf
     assert not (proof.closed | proof.open).any()
 
@@ -160,5 +162,7 @@ def test_the_bound_grows_with_the_residual() -> None:
     prepared, load, x, lam = manufactured(np.random.default_rng(5))
     kappa = 0.999 * min(np.linalg.eigvalsh(block)[0] for block in prepared.assembly.blocks)
     wrong = replace(load, f=load.f + 1.0)
-    proof = certify(prepared.assembly, wrong, Double(x, 0 * x), Double(lam, 0 * lam), lam > 0, kappa)
+    proof = certify(
+        prepared.assembly, wrong, DoubleDouble(x, 0 * x), DoubleDouble(lam, 0 * lam), lam > 0, kappa
+    )
     assert proof.bound_mm >= np.sqrt(len(x)) / np.sqrt(kappa * abs(prepared.assembly.blocks[0]).sum())

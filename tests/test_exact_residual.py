@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from harness.verification.exact_residual import Double, Enclosed, forces, gaps, two_product, two_sum
+from harness.verification.exact_residual import DoubleDouble, Enclosure, forces, gaps, two_product, two_sum
 from problems.forms.assembly import Assembly
 
 
@@ -24,7 +24,7 @@ def times(M: np.ndarray, v: list[Fraction]) -> list[Fraction]:
     return [sum((Fraction(float(a)) * b for a, b in zip(row, v, strict=True)), Fraction(0)) for row in M]
 
 
-def assert_encloses(found: Enclosed, wanted: list[Fraction], size: float) -> None:
+def assert_encloses(found: Enclosure, wanted: list[Fraction], size: float) -> None:
     for value, error, exact in zip(found.value, found.error, wanted, strict=True):
         assert abs(Fraction(float(value)) - exact) <= Fraction(float(error))
     assert found.error.max() <= 1e-24 * size + 3e-16 * abs(found.value).max()
@@ -35,9 +35,9 @@ def wild(rng: np.random.Generator, *shape: int) -> np.ndarray:
     return rng.standard_normal(shape) * 10.0 ** rng.uniform(-8, 4, shape)
 
 
-def doubled(rng: np.random.Generator, size: int) -> Double:
+def doubled(rng: np.random.Generator, size: int) -> DoubleDouble:
     hi = wild(rng, size)
-    return Double(hi, hi * rng.uniform(-1e-16, 1e-16, size))
+    return DoubleDouble(hi, hi * rng.uniform(-1e-16, 1e-16, size))
 
 
 def small_assembly(rng: np.random.Generator) -> Assembly:
@@ -82,7 +82,7 @@ def test_a_residual_that_cancels_is_still_known(seed: int) -> None:
     x = rng.standard_normal(size)
     nothing = np.zeros(1)
     f = K @ x
-    found = forces(made, f, Double(x, np.zeros(size)), Double(nothing, nothing))
+    found = forces(made, f, DoubleDouble(x, np.zeros(size)), DoubleDouble(nothing, nothing))
     exact = [a - b for a, b in zip(exactly(f), times(K, exactly(x)), strict=True)]
     assert_encloses(found, exact, 1e6)
     assert 0 < abs(found.value).max() < 1e-7
@@ -98,7 +98,7 @@ def test_sums_and_products_come_with_their_roundings() -> None:
 
 
 def test_a_correction_is_added_without_loss() -> None:
-    x = Double(np.array([1.0]), np.array([1e-20]))
+    x = DoubleDouble(np.array([1.0]), np.array([1e-20]))
     x = x.plus(np.array([1e-17]))
     assert x.hi[0] == 1.0
     assert x.lo[0] == pytest.approx(1.001e-17, rel=1e-12)

@@ -188,7 +188,7 @@ def test_a_disk_that_fills_up_keeps_its_rows_and_goes_on_when_there_is_room(
     done = subprocess.run(command(suite, out), cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 2
     assert "No space left" in done.stderr
-    assert "the rows that were written are safe, run again to go on" in done.stderr
+    assert "rows already written are safe, run again to continue" in done.stderr
     kept = (out / records.MEASUREMENTS).read_bytes()
     assert kept.startswith(first)
     assert 1 < len(rows_of(out)) < 6
@@ -210,7 +210,7 @@ def test_files_that_may_not_grow_are_said_and_resumed(folder: Path) -> None:
 
     done = subprocess.run(command(suite, out), cwd=ROOT, capture_output=True, text=True, preexec_fn=limited)
     assert done.returncode == 2
-    assert "the rows that were written are safe" in done.stderr
+    assert "rows already written are safe" in done.stderr
     kept = (out / records.MEASUREMENTS).read_bytes()
     assert 1 < len(rows_of(out)) < 4
     quietly(suite, out)

@@ -88,17 +88,17 @@ def test_directions_after_some_have_entered_and_left() -> None:
     for step in ["enter 3", "leave 7", "enter 11", "leave 0", "enter 0", "drop 3", "leave 29", "enter 3"]:
         act, which = step.split()
         if act == "enter":
-            border.entered.append(int(which))
+            border.added.append(int(which))
         else:
-            border.drop(int(which) if act == "leave" else len(C) + border.entered.index(int(which)))
-        active = [k for place, k in enumerate(border.active) if place not in border.left]
+            border.drop(int(which) if act == "leave" else len(C) + border.added.index(int(which)))
+        active = [k for place, k in enumerate(border.active) if place not in border.removed]
         r, ds = border.direction(5)
         du = np.zeros(60)
         du[border.active] = -r
         du[35] = 1.0
         wanted = np.linalg.solve(G[np.ix_(active, active)], G[active, 35])
         np.testing.assert_allclose(du[active], -wanted, atol=1e-9)
-        assert not du[border.left].any()
+        assert not du[border.removed].any()
         np.testing.assert_allclose(ds, (G @ du)[candidates], atol=1e-9 * abs(G).max())
 
 
@@ -131,7 +131,7 @@ def test_nothing_violated_needs_no_pivot() -> None:
     assert (result.status, result.pivots, result.u.tolist()) == ("solved", 0, [0.0] * 10)
 
 
-def test_the_limit_on_pivots_is_kept_and_said() -> None:
+def test_the_limit_on_pivots_is_kept_and_reported() -> None:
     G = definite(50, seed=4)
     result = goldfarb_idnani(G, lambda u: (-np.ones(50) + G @ u, np.ones(50)), 1e-12, 5)
     assert result.status == "iteration_limit"
@@ -166,7 +166,7 @@ def test_refinement_leaves_no_negative_multiplier_and_no_active_slack(seed: int)
 def test_the_rounding_of_a_large_matrix_does_not_weigh_on_refined_slacks() -> None:
     """Here the terms of Gu are 1e13 times the slacks, as those of a part that hardly anything holds."""
     state = full_state(np.eye(4) + 1e13)
-    state.refer_to(lambda u: (np.full(4, 0.25), np.ones(4)))
+    state.reset_base(lambda u: (np.full(4, 0.25), np.ones(4)))
     np.testing.assert_array_equal(state.slacks(), 0.25)
     state.u[0] += 2.0**-50
     np.testing.assert_allclose(state.slacks(), 0.25 + 1e13 * 2.0**-50, rtol=1e-12)
@@ -182,7 +182,7 @@ def two_contacts_of_one_node(Q: np.ndarray, form: Form) -> Answer:
     return solver.solve(solver.prepare(in_form(prepared, form)), load, 1e-10)
 
 
-def test_contacts_that_say_the_same_are_no_hindrance_in_the_primal_form() -> None:
+def test_duplicate_contacts_do_not_hinder_the_primal_form() -> None:
     answer = two_contacts_of_one_node(np.ones((2, 2)), "primal")
     assert answer.status == "solved"
     assert (answer.x, answer.lam) == (pytest.approx([0.25]), pytest.approx([0.0, 0.75]))
@@ -199,7 +199,7 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(Q: np.
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.2])
-def test_pivots_that_a_rough_inverse_misleads_are_finished_by_others(noise: float) -> None:
+def test_block_pivoting_finishes_what_an_inaccurate_inverse_misleads(noise: float) -> None:
     prepared = make_prepared(3, 40)
     case, load = make_load(3, prepared)
     solver = GoldfarbIdnani()

@@ -10,8 +10,8 @@ from harness.measurement.describe import Description
 from harness.measurement.resume import outdated
 from harness.measurement.row import Order, measured
 from harness.planning.plan import expand
-from harness.planning.suite import checked
-from harness.planning.timeouts import out_of_time_before
+from harness.planning.suite import suite_from
+from harness.planning.timeouts import predicted_timeout
 
 
 def plan(**changes):
@@ -21,7 +21,7 @@ def plan(**changes):
         "time_limit_by_size_s": {"6112": 40},
         "solver": [{"name": "piqp"}],
     }
-    return expand(checked(data | changes, Path("suite.toml")))
+    return expand(suite_from(data | changes, Path("suite.toml")))
 
 
 def row(scene, n, status="time_limit", limit=30.0, **changes):
@@ -43,7 +43,7 @@ def test_limits_go_by_size(large):
 
 def test_too_slow_on_every_smaller_scene_is_not_run(large):
     rows = [row("4386/0107", 4386), row("4386/1471", 4386)]
-    assert out_of_time_before(large, 6112, rows) == "4386/0107, 4386/1471"
+    assert predicted_timeout(large, 6112, rows) == "4386/0107, 4386/1471"
 
 
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
@@ -51,9 +51,9 @@ def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
     assert told == {"status": "not_run", "message": "too slow already on 4386/0107"}
     assert not list(tmp_path.iterdir())
     rows = [row("4386/0107", 4386), row("4386/1471", 4386, told["status"])]
-    assert out_of_time_before(large, 6112, rows) == "4386/0107, 4386/1471"
-    assert out_of_time_before(large, 6112, [row("6112/0600", 6112, told["status"], 40.0, tolerance=1e-3)])
-    assert not out_of_time_before(large, 6112, [row("6112/0600", 6112, told["status"], 39.0)])
+    assert predicted_timeout(large, 6112, rows) == "4386/0107, 4386/1471"
+    assert predicted_timeout(large, 6112, [row("6112/0600", 6112, told["status"], 40.0, tolerance=1e-3)])
+    assert not predicted_timeout(large, 6112, [row("6112/0600", 6112, told["status"], 39.0)])
 
 
 @pytest.mark.parametrize("status", ["time_limit", "not_run"])
@@ -66,7 +66,7 @@ def test_a_row_out_of_time_stands_until_there_is_more_of_it(large, status):
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-3])
 def test_out_of_time_at_a_looser_tolerance_is_not_run(large, tolerance):
     rows = [row("6112/0600", 6112, limit=40.0, tolerance=tolerance)]
-    assert out_of_time_before(large, 6112, rows) == f"6112/0600 at {tolerance:g}"
+    assert predicted_timeout(large, 6112, rows) == f"6112/0600 at {tolerance:g}"
 
 
 @pytest.mark.parametrize(
@@ -86,4 +86,4 @@ def test_out_of_time_at_a_looser_tolerance_is_not_run(large, tolerance):
     ],
 )
 def test_anything_else_is_run(large, rows):
-    assert out_of_time_before(large, 6112, rows) == ""
+    assert predicted_timeout(large, 6112, rows) == ""

@@ -11,7 +11,7 @@ import tiny
 from harness.planning.estimate import refuse_limits_too_low
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand
-from harness.planning.suite import Suite, checked, read_suite, suite_names, to_toml, validated
+from harness.planning.suite import Suite, read_suite, suite_from, suite_names, to_toml, validated
 from problems.errors import InputError
 
 TWO = """
@@ -62,7 +62,7 @@ def test_a_shuffled_round_keeps_the_order_of_the_tolerances(tmp_path: Path) -> N
     tolerances = [1e-2, 1e-5, 1e-3, 1e-8]
     solvers = [{"name": name, "forms": ["dual"], "tolerances": tolerances} for name in ("ipm", "gi", "piqp")]
     data = {"scenes": ["4386/0107"], "repeats": 3, "solver": solvers}
-    plan = expand(checked(data, tmp_path / "suite.toml"))
+    plan = expand(suite_from(data, tmp_path / "suite.toml"))
     for repeat in range(3):
         names = [m.solver for m in plan if m.repeat == repeat]
         assert names != sorted(names, key=["ipm", "gi", "piqp"].index)  # it is shuffled
@@ -74,16 +74,16 @@ def test_an_entry_may_have_repeats_of_its_own(tmp_path: Path) -> None:
     own = {"name": "ipm", "forms": ["dual"], "tolerances": [1e-6], "repeats": 3}
     rest = {"name": "ipm", "forms": ["dual"], "tolerances": [1e-2, 1e-6]}
     data = {"scenes": ["4386/0107"], "solver": [rest, own]}
-    plan = expand(checked(data, tmp_path / "suite.toml"))
+    plan = expand(suite_from(data, tmp_path / "suite.toml"))
     assert sorted((m.tolerance, m.repeat) for m in plan) == [(1e-6, 0), (1e-6, 1), (1e-6, 2), (1e-2, 0)]
-    once = overridden(checked(data, tmp_path / "suite.toml"), Overrides(repeats=1))
+    once = overridden(suite_from(data, tmp_path / "suite.toml"), Overrides(repeats=1))
     assert {m.repeat for m in expand(once)} == {0}
 
 
 def test_an_entry_may_have_numbers_of_threads_of_its_own(tmp_path: Path) -> None:
     own = {"name": "ipm", "forms": ["dual"], "threads": [2]}
     data = {"scenes": ["4386/0107"], "threads": [1, 4], "solver": [{"name": "gi", "forms": ["dual"]}, own]}
-    suite = checked(data, tmp_path / "suite.toml")
+    suite = suite_from(data, tmp_path / "suite.toml")
     assert [(m.solver, m.threads) for m in expand(suite)] == [("gi", 1), ("gi", 4), ("ipm", 2)]
     told = overridden(suite, Overrides(threads=(3,)))
     assert [(m.solver, m.threads) for m in expand(told)] == [("gi", 3), ("ipm", 3)]

@@ -23,7 +23,7 @@ def test_a_single_factor_is_refined_to_any_tolerance(condition: float, tolerance
         D, b = np.diag(Q) * 10 ** rng.uniform(-6, 2, 40), rng.standard_normal(40)
         solved = system.solve(D, b, tolerance, 100)
         assert solved.converged
-        assert system.single
+        assert system.use_single
         assert np.linalg.norm(b - Q @ solved.v - D * solved.v) <= 1.01 * tolerance * np.linalg.norm(b)
     assert system.factorisations == 3
 
@@ -41,10 +41,10 @@ def test_what_single_precision_cannot_factor_is_factored_in_double() -> None:
     system, b = SinglePrecision(Q), np.ones(40)
     D = np.full(40, 1e-13 * abs(Q).max())
     solved = system.solve(D, b, 1e-6, 100)
-    assert not system.single
+    assert not system.use_single
     assert np.linalg.norm(b - Q @ solved.v - D * solved.v) <= 1e-4 * np.linalg.norm(b)
     system.begin()
-    assert system.single
+    assert system.use_single
     assert system.factorisations == 0
 
 
@@ -71,6 +71,6 @@ def test_the_finish_saves_newton_matrices() -> None:
     assert counts[True] < counts[False]
 
 
-def test_options_that_are_none_are_all_named() -> None:
+def test_all_invalid_options_are_named() -> None:
     with pytest.raises(InputError, match=r"finish(.|\n)*single"):
         FastIpm(finish="no", single=2)  # type: ignore[arg-type]

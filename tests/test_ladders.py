@@ -19,7 +19,7 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.problem import in_form
 from problems.manufactured.exact import spectrum
-from problems.manufactured.ladder import Made, make_rung, rung_names
+from problems.manufactured.ladder import ManufacturedProblem, make_rung, rung_names
 from problems.scene import read_scene, scene_names
 from solvers.base import Form
 from solvers.registry import make_solver
@@ -49,7 +49,7 @@ def whole(values: Any) -> Any:
     return np.array([v.numerator for v in exact], dtype=object).reshape(np.shape(values))
 
 
-def made_of(name: str) -> Made:
+def made_of(name: str) -> ManufacturedProblem:
     made = make_rung(name).made
     assert made is not None
     return made
@@ -75,7 +75,7 @@ def test_the_answer_satisfies_the_optimality_conditions_without_rounding(name: s
     assert all((K == K.T).all() for K in made.assembly.blocks)
 
 
-def load_of(made: Made) -> tuple[Any, Any]:
+def load_of(made: ManufacturedProblem) -> tuple[Any, Any]:
     return made.load.f, made.load.g
 
 

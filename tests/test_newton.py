@@ -11,9 +11,9 @@ from small import make_load, make_prepared, solve_by_nnls
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from solvers.active_set.block_pivoting import FORCES_FIRST, block_pivoting
+from solvers.active_set.block_pivoting import MAX_STALE_PASSES, block_pivoting
 from solvers.active_set.bordered_factor import BorderedFactor
-from solvers.active_set.contact_sets import ContactSets, gaps
+from solvers.active_set.contact_sets import ContactSets, trial_of
 from solvers.active_set.nested import cells_of, representatives
 from solvers.linear_algebra.inverse import BLOCK, inverse_with_factor
 from solvers.linear_algebra.product import product
@@ -69,7 +69,7 @@ def test_the_forces_and_gaps_of_a_set(share: float, with_inverse: bool) -> None:
     C = subset(rng, size, share)
     for _ in range(5):
         found = sets.at(C)
-        worse = gaps(Q, p, C, found.lam * (1 + 1e-6))
+        worse = trial_of(Q, p, C, found.lam * (1 + 1e-6))
         for trial in (found, sets.refined(C, worse, 1e-11)):
             assert not trial.lam[~C].any()
             assert abs(trial.y[C]).max(initial=0) <= 1e-10
@@ -84,9 +84,9 @@ def test_more_than_half_closed_needs_the_factor_of_the_rest_alone() -> None:
     Q = definite(40, seed=5)
     sets = ContactSets(Q, np.ones(40), np.linalg.inv(Q))
     sets.at(np.arange(40) < 30)
-    assert sets.by.factor.rows.tolist() == list(range(30, 40))
+    assert sets.system.factor.rows.tolist() == list(range(30, 40))
     sets.at(np.arange(40) < 20)
-    assert sets.by.factor.rows.tolist() == list(range(20))
+    assert sets.system.factor.rows.tolist() == list(range(20))
     assert sets.factorisations == 2
 
 
@@ -97,12 +97,10 @@ def test_a_product_with_few_columns() -> None:
         np.testing.assert_allclose(product(G, v), G @ v, atol=1e-12 * abs(G).max())
 
 
-@pytest.mark.parametrize("forces_first", [0, FORCES_FIRST])
-def test_pivoting_ends_where_full_exchanges_go_round_in_circles(
-    forces_first: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("forces_first", [0, MAX_STALE_PASSES])
+def test_pivoting_ends_where_full_exchanges_cycle(forces_first: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A beam pressed on a rigid floor, Q its stiffness by second differences: many starts circle there."""
-    monkeypatch.setattr("solvers.active_set.block_pivoting.FORCES_FIRST", forces_first)
+    monkeypatch.setattr("solvers.active_set.block_pivoting.MAX_STALE_PASSES", forces_first)
     size, circled = 20, 0
     bending = np.diff(np.eye(size + 4), 2, axis=0)[:, 2:-2]
     Q = np.asfortranarray(bending.T @ bending)
@@ -111,10 +109,10 @@ def test_pivoting_ends_where_full_exchanges_go_round_in_circles(
         p = np.random.default_rng(seed).standard_normal(size)
         sets = ContactSets(Q, p)
         found = block_pivoting(sets.at, p > 0, sets.compliance, 1e-12, 10_000)
-        assert found.done
+        assert found.converged
         wanted = nnls(U, sla.solve_triangular(U, p, trans=1))[0]
         np.testing.assert_allclose(found.trial.lam, wanted, atol=1e-8 * max(1.0, wanted.max()))
-        circled += found.single > 0
+        circled += found.single_exchanges > 0
     assert circled > 3 if forces_first == 0 else circled == 0
 
 
@@ -166,11 +164,11 @@ def test_weakly_active_contacts_do_no_harm(share: float) -> None:
     p = Q @ lam - y
     sets = ContactSets(Q, p, np.linalg.inv(Q))
     found = block_pivoting(sets.at, p > 0, sets.compliance, 1e-11, 200)
-    assert found.done
+    assert found.converged
     np.testing.assert_allclose(np.maximum(found.trial.lam, 0), lam, atol=1e-8)
 
 
-def test_the_limit_on_sets_is_kept_and_said() -> None:
+def test_the_limit_on_sets_is_kept_and_reported() -> None:
     prepared = make_prepared(1, 30)
     _, load = make_load(1, prepared)
     answer = solved(prepared, load, nested=False, max_sets=1)

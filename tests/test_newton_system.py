@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as sla
 from test_gi import definite
 
-from solvers.interior_point.newton_system import REORDER, SYSTEMS, OpenLast, Pcg
+from solvers.interior_point.newton_system import REORDER_AFTER, SYSTEMS, OpenLast, Pcg
 from solvers.interior_point.preconditioner import (
     CholeskyFactor,
     CholeskyPlusRoot,
@@ -47,7 +47,7 @@ def made(name: str, Q: np.ndarray) -> Preconditioner:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", ["none", "U", "V", "ordered", "splitting"])
-def test_the_preconditioned_operator_is_what_it_says(name: str, seed: int) -> None:
+def test_the_preconditioned_operator_matches_its_definition(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     Q = definite(SIZE, seed)
     D = 10 ** rng.uniform(-8, 8, SIZE)
@@ -131,7 +131,7 @@ def test_open_gaps_go_last_after_a_slow_system() -> None:
     for system in (plain, ordered):
         system.begin()
     first = ordered.solve(D, b, 1e-8, 10_000)
-    assert first.iterations == plain.solve(D, b, 1e-8, 10_000).iterations > REORDER
+    assert first.iterations == plain.solve(D, b, 1e-8, 10_000).iterations > REORDER_AFTER
     second = ordered.solve(D, b, 1e-8, 10_000)
     assert ordered.factorisations == 1
     assert second.iterations < first.iterations / 5

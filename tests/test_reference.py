@@ -216,7 +216,7 @@ def test_active_set_equals_enumeration(
     Q, p = problem
     first = np.array([start >> i & 1 == 1 for i in range(len(p))])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("harness.verification.principal_pivoting.FEW", 1)
+        patch.setattr("harness.verification.principal_pivoting.SMALL_PROBLEM", 1)
         from_halves = contact_set(Q, p)
     for active in (contact_set(Q, p), contact_set(Q, p, first), from_halves):
         C = np.flatnonzero(active)

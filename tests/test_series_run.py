@@ -122,7 +122,7 @@ def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
         patch.setattr(SeriesSession, "_try", interrupted)
         patch.setattr(session_module, "BLOCK", 32)
         some = ("--cases", "60", "--solver", "gi", "--out", "stopped")
-        assert "the same command goes on" in series(*some, code=130).output
+        assert "run the same command again to continue" in series(*some, code=130).output
     assert [row["case"] for row in rows_of("stopped")] == list(range(32))  # whole blocks
     series(*some)
     assert [row["case"] for row in rows_of("stopped")] == list(range(60))

@@ -150,7 +150,7 @@ def no_factor(Q: Any, p: Any, closed: Any) -> tuple[Any, Any, float, float]:
 
 def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
-    monkeypatch.setattr("harness.verification.principal_pivoting._solve_on", no_factor)
+    monkeypatch.setattr("harness.verification.principal_pivoting._solve_for", no_factor)
     record = run(tmp_path, APART, solver="piqp")
     assert not record["qp"]
     assert record["code"] == 0

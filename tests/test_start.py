@@ -43,7 +43,7 @@ def test_the_start_is_a_power_of_two_times_the_first_forces() -> None:
     assert start.multiplications == 4
 
 
-def test_a_start_that_cannot_be_is_said() -> None:
+def test_a_missing_starting_point_is_reported() -> None:
     with pytest.raises(NoStart, match="no λ > 0"):
         algorithm_5(-np.eye(3), np.ones(3))
 

@@ -19,9 +19,9 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 from solvers.active_set.batched import BatchedSweeps
 from solvers.active_set.bordered_factor import Set
-from solvers.active_set.contact_sets import Trial
+from solvers.active_set.contact_sets import TrialSolution
 from solvers.base import Answer
-from solvers.linear_algebra.banded_inverse import BandedInverse, along, banded_inverse
+from solvers.linear_algebra.banded_inverse import BandedInverse, banded_inverse, order_along_joint
 from solvers.methods.newton import ActiveSetNewton
 
 TOLERANCE = 1e-10
@@ -67,11 +67,11 @@ def test_a_window_of_all_contacts_gives_the_inverse() -> None:
 @pytest.mark.parametrize(("nx", "ny"), [(9, 4), (4, 9), (12, 1), (6, 6)])
 def test_contacts_stand_in_lines_across_the_joint(nx: int, ny: int) -> None:
     nodes = grid(nx, ny, np.random.default_rng(0))
-    order, across = along(nodes, len(nodes))
+    order, across = order_along_joint(nodes, len(nodes))
     longer = 0 if nx >= ny else 1
     assert across == min(nx, ny)
     assert (np.diff(nodes[order, longer]) >= 0).all()
-    both, twice = along(np.vstack([nodes, nodes]), 2 * len(nodes))  # a stack of two contacts at each place
+    both, twice = order_along_joint(np.vstack([nodes, nodes]), 2 * len(nodes))  # two contacts at each place
     assert twice == 2 * across
     assert sorted(both) == list(range(2 * len(nodes)))
 
@@ -167,7 +167,7 @@ def test_what_sweeps_do_not_settle_is_solved_alone_and_soon_at_once() -> None:
             assert answer.lam is not None
             assert answer.details["closed"] == (lam > 0).sum()
             np.testing.assert_allclose(data.recover(answer.lam, case), x, atol=1e-8)
-        assert not batch.of_use
+        assert not batch.use_sweeps
 
 
 def test_a_near_case_is_where_the_next_one_begins() -> None:
@@ -196,11 +196,11 @@ def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
         starts.append(C)
         return Answer("solved", np.zeros(45))
 
-    monkeypatch.setattr("solvers.active_set.batched.SWEEPS", 4)  # not enough to be done, but for the set
+    monkeypatch.setattr("solvers.active_set.batched.MAX_SWEEPS", 4)  # not enough to be done, but for the set
     batch = BatchedSweeps(data.Q, M, told)
     batch(loads[:1], TOLERANCE)
     starts.clear()
-    batch.of_use = True
+    batch.use_sweeps = True
     batch(loads[1:], TOLERANCE)
     assert len(starts) == 5
     for C, case in zip(starts, cases[1:], strict=True):
@@ -217,7 +217,7 @@ def test_an_answer_is_worth_what_its_own_forces_say(tmp_path: Path) -> None:
     (case,) = batch.last
     lam = case.trial.lam.copy()
     lam[case.C.argmax()] = -1e-3
-    case.trial = Trial(lam, case.trial.y, 0.0)
+    case.trial = TrialSolution(lam, case.trial.y, 0.0)
     answer = batch._answer(case, loads[0], TOLERANCE)
     assert answer.status == "inaccurate"
     assert answer.lam is not None
@@ -234,13 +234,13 @@ def test_few_closed_contacts_are_solved_one_case_after_another(tmp_path: Path) -
     solver = ActiveSetNewton()
     batch = solver.batched(solver.prepare(in_form(data, "dual")))
     assert batch is not None
-    own = batch.alone
+    own = batch.solve_one
 
     def counted(C: Set | None, p: Vector, tolerance: float) -> Answer:
         asked.append(C)
         return own(C, p, tolerance)
 
-    batch.alone = counted
+    batch.solve_one = counted
     answers = batch([LoadCase(c.f, c.g, data.dual_load(c)) for c in wide], TOLERANCE)
     assert asked == [None] * 4
     for case, answer in zip(wide, answers, strict=True):

@@ -1,7 +1,7 @@
-"""The command line: run, report, gate, list, check; `series` is in series_command.py, those of one scene in
-scene_commands.py.
+"""The command line: run, report, gate, list, check; `series` is in series.py, the commands for one scene in
+scene.py.
 
-What takes time to import is imported in the commands.
+Modules that are slow to import are imported inside the commands.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import Plugin, Scheduler, option, reported
+from harness.terminal.console import Plugin, Scheduler, error_reporting, option
 from harness.terminal.exit_codes import DONE, FELL_SHORT
 
 from . import scene as scene_commands
@@ -50,7 +50,7 @@ def harness() -> None:
       python -m harness run --plugin mine.py      with a solver of your own
       python -m harness solve scene.toml --out d  one scene: gaps, displacements, forces, with pictures
       python -m harness series SCENE --out DIR    thousands of load cases on one assembly
-      python -m harness COMMAND --help            more on each command
+      python -m harness COMMAND --help            help on each command
 
     \b
     Exit codes: 0 ok, 1 accuracy lost, 2 wrong usage or bad input,
@@ -63,31 +63,39 @@ def run(
     suite: Annotated[
         str, typer.Argument(metavar="SUITE", help="Name of a suite, or path of its TOML file.")
     ] = "default",
-    size: Annotated[list[int] | None, option("N", "Only scenes with so many unknowns. Repeatable.")] = None,
+    size: Annotated[list[int] | None, option("N", "Only scenes with N unknowns. Repeatable.")] = None,
     scene: Annotated[
-        list[str] | None, option("NAME", "These scenes: name, glob, .toml or own matrices .npz. Repeatable.")
+        list[str] | None,
+        option("NAME", "These scenes: name, glob, .toml or .npz file. Repeatable."),
     ] = None,
     solver: Annotated[
-        list[str] | None, option("NAME", "Only these solvers, of the suite or not. Repeatable.")
+        list[str] | None, option("NAME", "Only these solvers, in the suite or not. Repeatable.")
     ] = None,
-    form: Annotated[list[FormName] | None, option("FORM", "primal or dual, only that. Repeatable.")] = None,
+    form: Annotated[
+        list[FormName] | None, option("FORM", "Only this form, primal or dual. Repeatable.")
+    ] = None,
     tolerance: Annotated[
-        list[float] | None, option("TOL", "Tolerance handed to the solvers. Repeatable.")
+        list[float] | None, option("TOL", "Tolerance passed to the solvers. Repeatable.")
     ] = None,
-    repeat: Annotated[int | None, option("N", "How often to measure each.", min=1)] = None,
+    repeat: Annotated[int | None, option("N", "Number of repeats.", min=1)] = None,
     threads: Annotated[
-        list[int] | None, option("N", "Threads of the linear algebra. Repeatable.", min=1)
+        list[int] | None, option("N", "Threads for linear algebra. Repeatable.", min=1)
     ] = None,
-    time_limit: Annotated[float | None, option("SECONDS", "From the start of the solver.", min=0.001)] = None,
-    memory_limit: Annotated[int | None, option("MIB", "For the solver's processes together.", min=1)] = None,
-    out: Annotated[Path | None, option("DIR", "Where results go.  [default: results/SUITE]")] = None,
+    time_limit: Annotated[
+        float | None,
+        option("SECONDS", "Time limit per measurement, from the start of the solver.", min=0.001),
+    ] = None,
+    memory_limit: Annotated[
+        int | None, option("MIB", "Memory limit, over all processes of the solver.", min=1)
+    ] = None,
+    out: Annotated[Path | None, option("DIR", "Output directory.  [default: results/SUITE]")] = None,
     plugin: Plugin = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Measure a suite and write rows, answers and report.
 
-    Each measurement is a process of its own, ended at its time or memory limit. Rows are kept as they
-    come in: stop it with Ctrl-C, run the same command again, and it goes on where it stopped.
+    Each measurement is a process of its own, stopped at its time or memory limit. Rows are saved as they are
+    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped.
 
     \b
     Examples:
@@ -99,10 +107,10 @@ def run(
       python -m harness run --scheduler tcp://10.0.0.5:8786
 
     \b
-    Exit codes: 0 measured, 1 not all, for workers were lost, 2 wrong usage or bad input,
+    Exit codes: 0 measured, 1 incomplete: workers were lost, 2 wrong usage or bad input,
                 3 nothing could be judged, 130 interrupted.
     """
-    with reported() as console:
+    with error_reporting() as console:
         from harness.measurement.run import run as run_suite
         from harness.planning.overrides import Overrides, overridden
         from harness.planning.suite import read_suite
@@ -135,13 +143,13 @@ def run(
 def report(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")],
 ) -> None:
-    """Write DIR/report/report.md anew from the rows.
+    """Rewrite DIR/report/report.md from the rows.
 
     \b
     Example:
       python -m harness report results/default
     """
-    with reported() as console:
+    with error_reporting() as console:
         from harness.results import records
         from harness.series.store import SERIES
         from problems.errors import InputError
@@ -153,7 +161,7 @@ def report(
             return
         path = directory / records.MEASUREMENTS
         if not path.is_file():
-            raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` makes one")
+            raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
         if not records.read(path):
             raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
         from report.writers.markdown import write
@@ -165,9 +173,9 @@ def report(
 def gate(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")],
 ) -> None:
-    """Judge the saved answers anew, and fail where accuracy was lost.
+    """Judge the saved answers again, and fail if accuracy was lost.
 
-    The figures in the rows are not trusted: each answer is compared with the reference of its scene.
+    The numbers in the rows are not trusted: each answer is compared with the reference of its scene.
 
     \b
     Examples:
@@ -175,12 +183,12 @@ def gate(
 
     \b
     Exit codes:
-      0  every gated row is within 1e-7 mm (on a rung of a ladder, what conditioning allows)
+      0  every gated row is within 1e-7 mm (on a rung of a ladder, within what conditioning allows)
       1  accuracy lost: a gated row is outside, cannot be judged, has no answer, or was never measured
       2  wrong usage or bad input
       3  nothing could be judged
     """
-    with reported() as console:
+    with error_reporting() as console:
         from harness.verification.gate import gate as judge_directory
 
         raise typer.Exit(judge_directory(directory, console))
@@ -188,14 +196,14 @@ def gate(
 
 @app.command("list")
 def list_(what: Listed) -> None:
-    """List the solvers, scenes or suites that can be named.
+    """List the available solvers, scenes or suites.
 
     \b
     Examples:
       python -m harness list solvers
       python -m harness list scenes
     """
-    with reported() as console:
+    with error_reporting() as console:
         from .listing import listing
 
         console.print(listing(what.value))
@@ -216,7 +224,7 @@ def check(
     \b
     Exit codes: 0 nothing found, 1 faults found, 2 wrong usage or bad input.
     """
-    with reported() as console:
+    with error_reporting() as console:
         from harness.conformance.check import run as check_solver
         from solvers.registry import make_solver, modules
 

@@ -36,7 +36,7 @@ def _scenes() -> Table:
 
 
 def _suites() -> Table:
-    table = Table("suite", "scenes", "solvers", "what for")
+    table = Table("suite", "scenes", "solvers", "purpose")
     for name in suite_names():
         suite = read_suite(name)
         solvers = dict.fromkeys(entry.name for entry in suite.solver)

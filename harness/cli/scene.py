@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import SceneName, option, reported
+from harness.terminal.console import SceneName, error_reporting, option
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -17,17 +17,17 @@ SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
 @app.command()
 def solve(
     scene: SceneName,
-    out: Annotated[Path, option("DIR", "Where the answer goes.")],
+    out: Annotated[Path, option("DIR", "Output directory.")],
     solver: Annotated[
         str | None, option("NAME", "A solver by name.  [default: the active-set method of the references]")
     ] = None,
-    tolerance: Annotated[float, option("TOL", "Tolerance handed to a named solver.", min=0.0)] = 1e-9,
+    tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.", min=0.0)] = 1e-9,
 ) -> None:
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
 
-    Without --solver the answer comes with a proven bound on its error; with one it is judged against that
-    answer. A scene whose parts do not meet is a linear solve. What was computed, by which effect, and what
-    was skipped stands in a ledger.
+    Without --solver the answer comes with a proven bound on its error; with --solver it is judged against
+    that answer. If the parts do not meet, this is a linear solve. A ledger lists what was computed, for which
+    effect, and what was skipped.
 
     \b
     Examples:
@@ -37,7 +37,7 @@ def solve(
     \b
     Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input.
     """
-    with reported(SAFE, INTERRUPTED) as console:
+    with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.solve import solve as solve_scene
 
         raise typer.Exit(solve_scene(scene, solver, tolerance, out, console))
@@ -45,16 +45,16 @@ def solve(
 
 @app.command()
 def validate(scene: SceneName) -> None:
-    """Check a scene without solving it, and say what will be built, how large, and in about what time.
+    """Check a scene without solving it; show what would be built, its size, and the approximate time.
 
     \b
     Examples:
       python -m harness validate my-scene.toml
 
     \b
-    Exit codes: 0 fine, 2 bad input.
+    Exit codes: 0 valid, 2 bad input.
     """
-    with reported(SAFE, INTERRUPTED) as console:
+    with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.validate import validate as validate_scene
 
         validate_scene(scene, console)
@@ -78,7 +78,7 @@ def export(
     \b
     Exit codes: 0 written, 2 wrong usage or bad input.
     """
-    with reported(SAFE, INTERRUPTED) as console:
+    with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.exchange import export as export_scene
 
         export_scene(scene, form, out, console)
@@ -89,13 +89,13 @@ def import_(
     files: Annotated[
         list[str], typer.Argument(metavar="[NAME=]FILE...", help="Files with K, A, f, g; see below.")
     ],
-    out: Annotated[Path, option("FILE.npz", "Where the problem goes.")],
+    out: Annotated[Path, option("FILE.npz", "Output file.")],
 ) -> None:
-    """Read K, A, f, g from other programs' files, check them, and write one .npz to run and solve.
+    """Read K, A, f, g from other programs' files, check them, and write one .npz for `run` and `solve`.
 
     Matrix Market and Abaqus matrix text (.mtx) hold one matrix, named by the file or by NAME=; .npz (also
     of qpsolvers), Nastran .op4 and DMIG (.pch, .bdf) name theirs. K is checked for symmetry, definiteness and
-    the digits that it seems to have.
+    apparent precision.
 
     \b
     Examples:
@@ -106,7 +106,7 @@ def import_(
     \b
     Exit codes: 0 read and written, 2 wrong usage or bad input.
     """
-    with reported(SAFE, INTERRUPTED) as console:
+    with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.exchange import import_ as import_files
 
         import_files(files, out, console)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.terminal.console import Plugin, SceneName, Scheduler, option, reported
+from harness.terminal.console import Plugin, SceneName, Scheduler, error_reporting, option
 
 if TYPE_CHECKING:
     from problems.load_cases.base import LoadCases
@@ -21,43 +21,42 @@ SEED = 0
 @app.command()
 def series(
     scene: SceneName,
-    out: Annotated[Path, option("DIR", "Where rows, gaps and report go.")],
+    out: Annotated[Path, option("DIR", "Output directory.")],
     cases: Annotated[
-        int | None, option("N", "How many cases.  [default: 100 random ones; all of a table]", min=1)
+        int | None, option("N", "Number of cases.  [default: 100 random ones; all of a table]", min=1)
     ] = None,
-    seed: Annotated[
-        int | None, option("SEED", f"Of the random gaps, with the case's number.  [default: {SEED}]", min=0)
-    ] = None,
+    seed: Annotated[int | None, option("SEED", f"Seed of the random gaps.  [default: {SEED}]", min=0)] = None,
     mean: Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")] = None,
     sd: Annotated[float | None, option("MM", "Their standard deviation.  [default: the scene's]")] = None,
     correlation_length: Annotated[
         float | None, option("MM", "Their correlation length.  [default: the scene's]")
     ] = None,
     gaps: Annotated[
-        Path | None, option("FILE", "Measured gaps, .csv .npz .npy: a row a case, a column a contact, mm.")
+        Path | None,
+        option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
     ] = None,
     sweep: Annotated[
         list[str] | None,
-        option("KEY=VALUES", "A scene's key and its values. Repeatable, for all combinations."),
+        option("KEY=VALUES", "A key of the scene and its values. Repeatable, for all combinations."),
     ] = None,
     solver: Annotated[str, option("NAME", "The solver.")] = "newton",
     form: Annotated[
         str | None, option("FORM", "primal or dual.  [default: dual where the solver takes it]")
     ] = None,
-    tolerance: Annotated[float, option("TOL", "Tolerance handed to the solver.")] = 1e-11,
-    limit: Annotated[float, option("MM", "The error that is allowed.")] = 1e-7,
+    tolerance: Annotated[float, option("TOL", "Tolerance passed to the solver.")] = 1e-11,
+    limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
     check: Annotated[
         int, option("N", "Compare every N-th case with the certified reference; 0: none.", min=0)
     ] = 100,
-    threads: Annotated[int, option("N", "Threads of the linear algebra.", min=1)] = 2,
+    threads: Annotated[int, option("N", "Threads for linear algebra.", min=1)] = 2,
     plugin: Plugin = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
 
-    The assembly is opened and the solver prepared once. Each case is a row, vouched for by a proven bound
-    on its error, and its gaps are kept: stop it with Ctrl-C, run the same command again, and it goes on
-    where it stopped; with more --cases it is extended.
+    The assembly is opened and the solver prepared once. Each case is a row with a proven bound on its error,
+    and its gaps are saved: stop with Ctrl-C, run the same command again, and it continues where it stopped;
+    more --cases extend it.
 
     \b
     Examples:
@@ -73,7 +72,7 @@ def series(
     Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
                 3 nothing could be judged, 130 interrupted.
     """
-    with reported() as console:
+    with error_reporting() as console:
         from harness.measurement.solver_code import code_of
         from harness.series.run import run
         from harness.series.session import Job
@@ -92,7 +91,7 @@ def series(
         if (gaps and sweep) or (drawn and (gaps or sweep)):
             faults.append(Fault("series", "cases", " ".join(sources), "random gaps, --gaps or --sweep"))
         if sweep and cases is not None:
-            faults.append(Fault("--cases", "cases", cases, "a sweep has as many as it has values"))
+            faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         made = make_solver(solver, {}, plugin)
         taken = form or usual(made.forms)
         if taken not in made.forms:

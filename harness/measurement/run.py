@@ -17,7 +17,7 @@ from rich.console import Console
 from harness.planning.estimate import refuse_limits_too_low
 from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, to_toml
-from harness.planning.timeouts import out_of_time_before
+from harness.planning.timeouts import predicted_timeout
 from harness.results import records
 from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
@@ -139,7 +139,7 @@ def due_next(
             display.ready(m.scene, time.monotonic() - start)
         display.doing(f"{m.scene}: {m.solver} {m.form}")
         solver = solvers[m.solver, m.variant]
-        hopeless = out_of_time_before(m, base.prepared.assembly.n, rows)
+        hopeless = predicted_timeout(m, base.prepared.assembly.n, rows)
         yield Due(batch, base, solver), Order(batch, solver.forms, hopeless)
 
 

@@ -10,7 +10,7 @@ from problems.errors import Fault, InputError
 from problems.scene import read_scene
 from solvers.base import Form
 
-from .suite import Suite, checked, found_scenes
+from .suite import Suite, resolved_scenes, suite_from
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class Overrides:
 def overridden(suite: Suite, change: Overrides) -> Suite:
     """The suite with the command line's changes. Raises InputError, all faults at once.
 
-    --scene takes the place of the suite's scenes; --size keeps those of that size; --solver keeps
-    those entries and adds a plain one for a solver that the suite does not name; --plugin adds its own.
+    --scene replaces the suite's scenes; --size keeps those of that size; --solver keeps those entries and
+    adds a default one for a solver that is not in the suite; --plugin adds its solver.
     """
     faults: list[Fault] = []
     data = suite.model_dump(exclude_none=True)
     if change.scenes:
-        data["scenes"] = found_scenes(list(change.scenes), "--scene", "scene", Path.cwd(), faults)
+        data["scenes"] = resolved_scenes(list(change.scenes), "--scene", "scene", Path.cwd(), faults)
     if change.sizes:
         sizes = dict(_sizes(data["scenes"])) if not faults else {}
         for size in set(change.sizes) - set(sizes.values()):
@@ -75,7 +75,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
         data.pop("time_limit_by_size_s", None)
     if faults:
         raise InputError(faults)
-    return checked(data, Path("command line"))
+    return suite_from(data, Path("command line"))
 
 
 def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:

@@ -1,4 +1,4 @@
-"""From a suite to the list of measurements, in the order in which they are made."""
+"""From a suite to the list of measurements, in the order of execution."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Measurement:
 
     @property
     def process(self) -> tuple[object, ...]:
-        """What the load cases of a series that one process solves have in common."""
+        """What the load cases of a series share that are solved in one process."""
         return self.scene, self.solver, self.form, self.variant, self.tolerance, self.threads, self.repeat
 
     @cached_property
@@ -62,21 +62,21 @@ class Measurement:
 
     @property
     def stem(self) -> str:
-        """A file name for it."""
+        """The stem of its file names."""
         words = [self.scene, self.solver, self.form, self.variant, f"{self.tolerance:g}"]
         words += [f"t{self.threads}", f"r{self.repeat}", "" if self.case is None else f"c{self.case}"]
         return re.sub(r"[^\w.+-]+", "-", "_".join(filter(None, words)))
 
 
 def expand(suite: Suite) -> list[Measurement]:
-    """All measurements of a suite, by scene, the load cases of a series one after another; none on a rung
-    that the model is to refuse.
+    """All measurements of a suite, scene by scene, the load cases of a series in order; none on a rung that
+    the model should refuse.
 
-    Repeats are interleaved, each round shuffled with a seed of its own, so that a drift of the machine
-    does not fall on one solver. What differs in the tolerance alone keeps the suite's order, so that a
-    loose one can tell that a tight one has no time.
+    Repeats are interleaved, each round shuffled with its own seed, so that a drift of the machine does not
+    affect one solver alone. Measurements that differ only in tolerance keep the suite's order, so that a
+    loose tolerance can show that a tight one would exceed the time limit.
 
-    Raises InputError where nothing is left to measure or two files have the same scene name.
+    Raises InputError if nothing is left to measure or if two files have the same scene name.
     """
     names: dict[str, str] = {}
     faults: list[Fault] = []
@@ -95,28 +95,30 @@ def expand(suite: Suite) -> list[Measurement]:
         raise InputError(faults)
     plan: dict[str, Measurement] = {}
     for source, name in names.items():
-        entries = [(e, e.repeats or suite.repeats) for e in suite.solver if _takes(e, name, source)]
+        entries = [(e, e.repeats or suite.repeats) for e in suite.solver if _applies(e, name, source)]
         rounds = max((repeats for _, repeats in entries), default=0)
         for repeat in range(rounds):
             due = [entry for entry, repeats in entries if repeat < repeats]
-            once = [made for entry in due for made in _of_entry(suite, entry, name, source, repeat)]
-            for measurement in _shuffled(once, f"{name} {repeat}") if rounds > 1 else once:
+            one_round = [made for entry in due for made in _of_entry(suite, entry, name, source, repeat)]
+            for measurement in _shuffled(one_round, f"{name} {repeat}") if rounds > 1 else one_round:
                 plan.setdefault(measurement.key, measurement)
     if not plan:
         restricted = {entry.name: entry.scenes for entry in suite.solver}
-        raise InputError.one(suite.name, "scenes", suite.scenes, f"no solver is for these: {restricted}")
+        raise InputError.one(
+            suite.name, "scenes", suite.scenes, f"no solver is meant for these: {restricted}"
+        )
     return list(plan.values())
 
 
-def _shuffled(once: list[Measurement], seed: str) -> list[Measurement]:
-    """In random order, but those that differ in their tolerance alone among each other as they were."""
+def _shuffled(one_round: list[Measurement], seed: str) -> list[Measurement]:
+    """In random order, but keeping the relative order of those that differ only in tolerance."""
 
     def kind(m: Measurement) -> tuple[str, str, str, int]:
         return m.solver, m.form, m.variant, m.threads
 
-    kinds = [kind(m) for m in once]
+    kinds = [kind(m) for m in one_round]
     random.Random(seed).shuffle(kinds)
-    queues = {each: iter([m for m in once if kind(m) == each]) for each in set(kinds)}
+    queues = {each: iter([m for m in one_round if kind(m) == each]) for each in set(kinds)}
     return [next(queues[each]) for each in kinds]
 
 
@@ -154,5 +156,5 @@ def _of_entry(
         )
 
 
-def _takes(entry: SolverEntry, name: str, source: str) -> bool:
+def _applies(entry: SolverEntry, name: str, source: str) -> bool:
     return entry.scenes is None or any(fnmatchcase(name, glob) or glob == source for glob in entry.scenes)

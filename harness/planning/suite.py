@@ -1,4 +1,4 @@
-"""A suite: which scenes, solvers, forms, tolerances and repeats to measure. A TOML file, checked whole.
+"""A suite: which scenes, solvers, forms, tolerances and repeats to measure. A TOML file, validated whole.
 
 title = "…"
 scenes = ["4386/0107", "6112/*", "my-scene.toml"]     # names, globs over names, or paths
@@ -26,26 +26,26 @@ from solvers.base import Form
 from solvers.registry import modules, solver_names
 
 SUITES = Path(__file__).parent.parent / "suites"
-Some = Field(min_length=1)
+NonEmpty = Field(min_length=1)
 
 
 class SolverEntry(BaseModel):
-    """One [[solver]]: how it is called, and what it is measured on.
+    """One [[solver]]: its name and options, and what it is measured on.
 
-    Without `forms` it is the dual, or the primal of a solver that takes that only. `threads` and `cases` go
-    before the suite's. batched : of a series so many load cases at once, by the solver's `batched`.
+    The default of `forms` is the dual, or the primal if the solver takes no other. `threads` and `cases`
+    override the suite's. batched : load cases of a series solved at once, by the solver's `batched`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
-    forms: Annotated[list[Form], Some] | None = None
+    forms: Annotated[list[Form], NonEmpty] | None = None
     variant: str = ""
     options: dict[str, Any] = {}
-    tolerances: Annotated[list[PositiveFloat], Some] | None = None
-    scenes: Annotated[list[str], Some] | None = None
+    tolerances: Annotated[list[PositiveFloat], NonEmpty] | None = None
+    scenes: Annotated[list[str], NonEmpty] | None = None
     repeats: PositiveInt | None = None
-    threads: Annotated[list[PositiveInt], Some] | None = None
+    threads: Annotated[list[PositiveInt], NonEmpty] | None = None
     cases: PositiveInt | None = None
     batched: PositiveInt | None = None
     gated: bool = True
@@ -53,9 +53,9 @@ class SolverEntry(BaseModel):
 
 
 class RandomCases(BaseModel):
-    """[series]: each scene with so many random initial gaps, solved in one process one after another.
+    """[series]: each scene with `cases` random initial gaps, solved one after another in one process.
 
-    mean, sd and correlation_length, mm, are those of the scene's `initial_gap` where they are not given.
+    mean, sd and correlation_length, mm, are by default those of the scene's `initial_gap`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -68,10 +68,10 @@ class RandomCases(BaseModel):
 
 
 class Suite(BaseModel):
-    """What a suite file says; scenes are names, or absolute paths of files. `name` is the file's.
+    """The content of a suite file; scenes are names, or absolute paths of files. `name` is the file's.
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
-    time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of so many unknowns; time_limit_s for the rest.
+    time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -79,10 +79,10 @@ class Suite(BaseModel):
     name: str
     title: str = ""
     description: str = ""
-    scenes: Annotated[list[str], Some]
-    tolerances: Annotated[list[PositiveFloat], Some] = [1e-9]
+    scenes: Annotated[list[str], NonEmpty]
+    tolerances: Annotated[list[PositiveFloat], NonEmpty] = [1e-9]
     repeats: PositiveInt = 1
-    threads: Annotated[list[PositiveInt], Some] = [2]
+    threads: Annotated[list[PositiveInt], NonEmpty] = [2]
     time_limit_s: PositiveFloat = 60.0
     time_limit_by_size_s: dict[PositiveInt, PositiveFloat] = {}
     memory_limit_mib: PositiveInt = 8192
@@ -90,7 +90,7 @@ class Suite(BaseModel):
     yardstick: bool = False
     plugin: str | None = None
     series: RandomCases | None = None
-    solver: Annotated[list[SolverEntry], Some]
+    solver: Annotated[list[SolverEntry], NonEmpty]
 
     def time_limit(self, n: int) -> float:
         """The limit in seconds on a scene of n unknowns."""
@@ -112,15 +112,15 @@ def read_suite(name_or_path: str) -> Suite:
         path = SUITES / f"{name_or_path}.toml"
         if not path.is_file():
             raise InputError.one("SUITE", "name", name_or_path, unknown("suite", name_or_path, suite_names()))
-    return checked(read_toml(path), path)
+    return suite_from(read_toml(path), path)
 
 
-def checked(data: dict[str, Any], path: Path) -> Suite:
-    """A suite from a TOML file's content; its globs and relative paths are made out here."""
+def suite_from(data: dict[str, Any], path: Path) -> Suite:
+    """A suite from a TOML file's content; its globs and relative paths are resolved."""
     faults: list[Fault] = []
     data = {"name": path.stem, **data}
     if isinstance(data.get("scenes"), list):
-        data["scenes"] = found_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
+        data["scenes"] = resolved_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
     if isinstance(data.get("plugin"), str):
         data["plugin"] = str((path.parent / data["plugin"]).resolve())
     faults += _unknown_solvers(data, path)
@@ -128,23 +128,23 @@ def checked(data: dict[str, Any], path: Path) -> Suite:
 
 
 def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) -> Suite:
-    """A suite from what `to_toml` wrote, or with what is wrong with it besides `faults`."""
+    """A suite from resolved data, as `to_toml` writes them. Raises InputError with `faults` and its own."""
     faults = list(faults)
     try:
         suite = Suite.model_validate(data)
     except ValidationError as error:
         faults += validation_faults(path, Suite, error)
     else:
-        faults += [*_twice(suite, path), *_of_no_series(suite, path)]
+        faults += [*_indistinguishable(suite, path), *_without_series(suite, path)]
     if faults:
         raise InputError(faults)
     return suite
 
 
-def found_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:
-    """The scenes that names, globs and paths (relative to `base`) stand for, each once, in their order.
+def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:
+    """The scenes that match names, globs and paths (relative to `base`), in order, without duplicates.
 
-    The rungs of the ladders are meant by patterns that begin with "hard/" alone.
+    Only patterns that begin with "hard/" match rungs of ladders.
     """
     found: dict[str, None] = {}
     for pattern in map(str, patterns):
@@ -167,7 +167,7 @@ def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
     names = {k: str(e["name"]) for k, e in enumerate(entries) if isinstance(e, dict) and "name" in e}
     known = [*modules(), *([Path(data["plugin"]).stem] if isinstance(data.get("plugin"), str) else [])]
     if not set(names.values()) <= set(known):
-        known += [name for name in solver_names() if name not in known]  # slow, it imports every library
+        known += [name for name in solver_names() if name not in known]  # slow: imports every library
     return [
         Fault(str(path), f"solver.{k}.name", name, unknown("solver", name, known))
         for k, name in names.items()
@@ -175,22 +175,22 @@ def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
     ]
 
 
-def _twice(suite: Suite, path: Path) -> Iterator[Fault]:
-    """Entries that a table could not tell apart."""
+def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
+    """Entries that could not be distinguished in a table."""
     above: dict[tuple[str, str], tuple[object, bool]] = {}
     for k, entry in enumerate(suite.solver):
-        way = entry.options, entry.batched is not None
-        if above.setdefault((entry.name, entry.variant), way) != way:
+        setting = entry.options, entry.batched is not None
+        if above.setdefault((entry.name, entry.variant), setting) != setting:
             what = "options" if above[entry.name, entry.variant][0] != entry.options else "`batched`"
-            allowed = f"{entry.name} stands above with other {what} under this variant; name another"
+            allowed = f"{entry.name} has other {what} under this variant above; choose another variant"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
 
 
-def _of_no_series(suite: Suite, path: Path) -> Iterator[Fault]:
+def _without_series(suite: Suite, path: Path) -> Iterator[Fault]:
     for k, entry in enumerate(suite.solver):
         for key in ("cases", "batched"):
             if suite.series is None and (value := getattr(entry, key)) is not None:
-                yield Fault(str(path), f"solver.{k}.{key}", value, "is for a suite with [series]")
+                yield Fault(str(path), f"solver.{k}.{key}", value, "needs a suite with [series]")
 
 
 def to_toml(suite: Suite) -> str:

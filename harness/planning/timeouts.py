@@ -1,4 +1,4 @@
-"""Which measurements would run out of time for certain, by the rows there are, and are not worth making."""
+"""Measurements predicted, from the rows so far, to exceed their time limit: these are skipped."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from .plan import Measurement
 OUT_OF_TIME = ("time_limit", "not_run")
 
 
-def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
-    """The scenes that show that m would run out of time, or "".
+def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
+    """The scenes that show that m would exceed its time limit, or "".
 
-    One is m's own, where the solver ran out of as much time at this tolerance or a looser one. Else they
-    are all those of the next smaller size n' that the same solver, form and settings were measured
-    on, if it ran out of its time T' on each, and the time T that m has is at most (n/n')² T': every
-    solver here works with dense matrices, so its time grows with n² at least. (Not so on the rungs of
-    ladders, where it is not size that makes them hard.)
+    The scene of m itself, if the solver exceeded at least the same limit there at this tolerance or a looser
+    one. Else all scenes of the next smaller size n' on which the same solver, form and settings were
+    measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T': every solver here
+    works with dense matrices, so its time grows at least like n². (Not on rungs of ladders, where size is not
+    what makes them hard.)
     """
     same = ("solver", "form", "variant", "options", "threads_asked")
     mine = (m.solver, m.form, m.variant, m.options, m.threads)
@@ -31,11 +31,11 @@ def out_of_time_before(m: Measurement, n: int, rows: list[Row]) -> str:
         return ""
     smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
     largest = max((row["n"] for row in smaller), default=0)
-    there = [row for row in smaller if row["n"] == largest]
+    comparable = [row for row in smaller if row["n"] == largest]
     growth = (n / largest) ** 2 if largest else 0.0
-    late = [
+    timed_out = [
         row
-        for row in there
+        for row in comparable
         if row["status"] in OUT_OF_TIME and m.time_limit_s <= growth * row["time_limit_s"]
     ]
-    return ", ".join(sorted({row["scene"] for row in late})) if len(late) == len(there) else ""
+    return ", ".join(sorted({row["scene"] for row in timed_out})) if len(timed_out) == len(comparable) else ""

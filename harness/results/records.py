@@ -1,7 +1,7 @@
-"""The files of a results directory: rows that survive whatever ends the run.
+"""The files of a results directory: rows that survive any end of the run.
 
 A row is one JSON line in measurements.jsonl, appended, flushed and synced before the next
-measurement starts. The one damage that a sudden end can do is a torn last line; it is set aside.
+measurement starts. The only damage that an abrupt end can do is a torn last line; it is set aside.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ OUTDATED = "measurements.outdated.jsonl"
 
 
 def to_line(row: Row) -> str:
-    """One line of strict JSON: figures that are not finite become null."""
+    """One line of strict JSON: non-finite numbers become null."""
     return json.dumps(_plain(row), ensure_ascii=False, allow_nan=False)
 
 
@@ -49,9 +49,9 @@ def _plain(value: Any) -> Any:
 
 
 def append(path: Path, *rows: Row) -> None:
-    """Append a line each and force them to the disk; on a failure (a full disk) leave the file as it was."""
+    """Append one line per row and force them to disk; on failure (a full disk) restore the file."""
     rest = memoryview("".join(to_line(row) + "\n" for row in rows).encode())
-    with path.open("ab", buffering=0) as file:  # a buffer would write what is left of it on closing
+    with path.open("ab", buffering=0) as file:  # a buffer would write its remainder on closing
         size = file.seek(0, os.SEEK_END)
         try:
             while rest:
@@ -63,25 +63,25 @@ def append(path: Path, *rows: Row) -> None:
 
 
 def read(path: Path) -> list[Row]:
-    """All rows. Raises InputError naming the line that is torn or no JSON; no file is no rows."""
+    """All rows; none if there is no file. Raises InputError naming a line that is torn or not JSON."""
     rows, torn = _split(path)
     if torn:
         raise InputError.one(
             path,
             f"line {len(rows) + 1}",
             torn.decode(errors="replace"),
-            "torn by an interrupted run; `run` into the same directory sets it aside and goes on",
+            "torn by an interrupted run; `run` into the same directory sets it aside and continues",
         )
     return rows
 
 
 def read_whole(path: Path) -> list[Row]:
-    """The rows that can be read, for a file that is made anew with each of them."""
+    """The complete rows, for a file that is rewritten as rows are added."""
     return _split(path)[0]
 
 
 def set_torn_aside(path: Path) -> bool:
-    """Move a torn last line into measurements.torn; says whether there was one."""
+    """Move a torn last line into measurements.torn; returns whether there was one."""
     _, torn = _split(path)
     if torn:
         with path.with_name(TORN).open("ab") as file:
@@ -91,7 +91,7 @@ def set_torn_aside(path: Path) -> bool:
 
 
 def _split(path: Path) -> tuple[list[Row], bytes]:
-    """The whole rows, and the bytes of a torn last line."""
+    """The complete rows, and the bytes of a torn last line."""
     content = path.read_bytes() if path.exists() else b""
     *lines, last = content.split(b"\n")
     rows: list[Row] = []
@@ -114,12 +114,12 @@ def _parse(line: bytes) -> Row | None:
 
 
 def rewrite(path: Path, rows: list[Row]) -> None:
-    """Put `rows` in the place of the file's, at once or not at all."""
+    """Replace the rows of the file, atomically."""
     replace_text(path, "".join(to_line(row) + "\n" for row in rows))
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Write a file at once or not at all."""
+    """Write a file atomically."""
     new = path.with_name(path.name + ".new")
     with new.open("w", encoding="utf-8") as file:
         file.write(text)
@@ -130,7 +130,7 @@ def replace_text(path: Path, text: str) -> None:
 
 @contextmanager
 def held(directory: Path, folders: Sequence[str] = ("answers", "scenes")) -> Iterator[None]:
-    """Make the directory and hold it against a second run. Raises InputError if that cannot be."""
+    """Create the directory and lock it against a second run. Raises InputError if that fails."""
     try:
         for folder in ("", *folders):
             (directory / folder).mkdir(parents=True, exist_ok=True)
@@ -138,7 +138,10 @@ def held(directory: Path, folders: Sequence[str] = ("answers", "scenes")) -> Ite
         lock.acquire()
     except filelock.Timeout:
         raise InputError.one(
-            "--out", "directory", str(directory), "another run is writing here: wait for it, or name another"
+            "--out",
+            "directory",
+            str(directory),
+            "another run is writing here: wait, or name another directory",
         ) from None
     except OSError as error:
         raise InputError.one("--out", "directory", str(directory), f"cannot be written: {error}") from error

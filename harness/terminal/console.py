@@ -1,4 +1,4 @@
-"""What commands share: their arguments, and what a person can put right as red lines and an exit code."""
+"""What commands share: arguments, and user errors shown as red lines with an exit code."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ def option(metavar: str, help: str, **limits: Any) -> Any:
 
 
 SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or own matrices .npz.")
+    str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or .npz with matrices.")
 ]
-Plugin = Annotated[Path | None, option("FILE", "Python file with a solver of your own.")]
+Plugin = Annotated[Path | None, option("FILE", "Python file with your own solver.")]
 Scheduler = Annotated[
-    str | None, option("WHERE", "Dask: local:N for N workers here, or a scheduler's address.")
+    str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
 ]
 
 
 @contextmanager
-def reported(
-    safe: str = "; the rows that were written are safe, run again to go on",
-    interrupted: str = "Interrupted. The rows so far are kept: the same command goes on from here.",
+def error_reporting(
+    safe: str = "; rows already written are safe, run again to continue",
+    interrupted: str = "Interrupted. The rows so far are kept: run the same command again to continue.",
 ) -> Iterator[Console]:
-    """A console; what a person can put right becomes a red line each and an exit code, not a traceback."""
+    """A console; each user error becomes a red line and an exit code, not a traceback."""
     from rich.console import Console
 
     from problems.errors import InputError

@@ -1,4 +1,4 @@
-"""What the terminal shows of a run: a row as it comes in, a bar, and the time that is left."""
+"""Terminal output of a run: each row as it is finished, a progress bar, and the time remaining."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from harness.planning.plan import Measurement
 from harness.results.records import Row
 
 GROWTH = 2.5  # seconds ~ n^GROWTH, between the n² of a product and the n³ of a factorisation
-SCENE = ("scene", "")  # the step of opening or building one
+SCENE = ("scene", "")  # the step of opening or building a scene
 STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no_answer": "red"}
 
-#: heading, width, and what stands in it.
+#: Heading, width (negative: left-aligned), content.
 COLUMNS = [
     ("scene", -23, lambda row: row["scene"]),
     ("solver", -14, lambda row: f"{row['solver']} {row['variant']}".strip()),
@@ -53,7 +53,7 @@ def _line(cells: list[str]) -> str:
 
 
 def row_text(row: Row) -> Text:
-    """One line of the table; the reason below it where there is no answer."""
+    """One line of the table; below it the reason, if there is no answer."""
     text = Text(_line([cell(row) for *_, cell in COLUMNS]), style=STYLES[row["verdict"]])
     if row["message"] and row["verdict"] == "no_answer":
         text.append(f"\n    {row['message'].splitlines()[0][:150]}", style="dim")
@@ -61,14 +61,14 @@ def row_text(row: Row) -> Text:
 
 
 class Display:
-    """Rows scroll by above a bar; without a terminal only the rows are printed."""
+    """Rows scroll above a progress bar; without a terminal only the rows are printed."""
 
     def __init__(self, console: Console, left: list[Measurement], done: int, sizes: dict[str, int]) -> None:
         self.console = console
         self.left = list(left)
-        self.closed = {m.scene for m in left}
+        self.unopened = {m.scene for m in left}
         self.sizes = sizes
-        self.seen: dict[tuple[str, str], tuple[int, float]] = {}
+        self.timed: dict[tuple[str, str], tuple[int, float]] = {}
         self.progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -89,38 +89,38 @@ class Display:
         self.progress.stop()
 
     def doing(self, text: str) -> None:
-        """What is being done now, beside the bar."""
+        """Show the current activity beside the bar."""
         self.progress.update(self.task, description=text, left=self._time_left())
 
     def building(self, scene: str, step: str, fraction: float) -> None:
-        """How far a step of building a scene has come."""
+        """Show the progress of a step of building a scene."""
         self.doing(f"{scene}: {step} {fraction:.0%}" if fraction else f"{scene}: {step}")
 
     def ready(self, scene: str, seconds: float) -> None:
-        """A scene is open, with its reference."""
-        self.closed.discard(scene)
-        self._learn(SCENE, scene, seconds)
+        """Note that a scene is open, with its reference."""
+        self.unopened.discard(scene)
+        self._record(SCENE, scene, seconds)
 
-    def _learn(self, step: tuple[str, str], scene: str, seconds: float) -> None:
-        self.seen[step] = self.sizes.get(scene, 0), seconds
+    def _record(self, step: tuple[str, str], scene: str, seconds: float) -> None:
+        self.timed[step] = self.sizes.get(scene, 0), seconds
 
     def finished(self, measurement: Measurement, row: Row, seconds: float) -> None:
-        """A measurement is done."""
+        """Note that a measurement is done, and print its row."""
         self.left.remove(measurement)
-        self._learn((measurement.solver, measurement.form), measurement.scene, seconds)
+        self._record((measurement.solver, measurement.form), measurement.scene, seconds)
         self.console.print(row_text(row), soft_wrap=True)
         self.progress.update(self.task, advance=1, left=self._time_left())
 
     def _time_left(self) -> str:
-        """From what the same step took before, carried over to the size; else from the other steps."""
-        if not self.seen or not self.left:
+        """Estimated from the last time of the same step, scaled by size; else from the other steps."""
+        if not self.timed or not self.left:
             return ""
-        total = sum(self._guess(SCENE, scene) for scene in self.closed)
-        total += sum(min(self._guess((m.solver, m.form), m.scene), m.time_limit_s) for m in self.left)
+        total = sum(self._estimate(SCENE, scene) for scene in self.unopened)
+        total += sum(min(self._estimate((m.solver, m.form), m.scene), m.time_limit_s) for m in self.left)
         return f"{time.strftime('%H:%M:%S', time.gmtime(total))} left"
 
-    def _guess(self, step: tuple[str, str], scene: str) -> float:
-        usual = sum(seconds for _, seconds in self.seen.values()) / len(self.seen)
-        size, seconds = self.seen.get(step, (0, usual))
+    def _estimate(self, step: tuple[str, str], scene: str) -> float:
+        mean = sum(seconds for _, seconds in self.timed.values()) / len(self.timed)
+        size, seconds = self.timed.get(step, (0, mean))
         growth = (self.sizes.get(scene, 0) / size) ** GROWTH if size else 1.0
         return seconds * growth

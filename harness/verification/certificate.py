@@ -8,8 +8,8 @@ so ‖e‖_K ≤ ‖r‖_{K⁻¹} + √(sᵀλ), and with 0 < κ ≤ λmin(K)
 
     max|e_i| ≤ ‖e‖₂ ≤ (‖r‖₂/√κ + √(sᵀλ)) / √κ.
 
-Nothing is assumed of the active set: weakly active contacts (λ_i = s_i = 0) are as good as others.
-With r and s enclosed and x, λ as sums of two float64, both terms are far below the rounding of x.
+Nothing is assumed about the active set: weakly active contacts (λ_i = s_i = 0) need no special treatment.
+With enclosures of r and s, and x, λ as sums of two float64, both terms are far below the rounding of x.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from scipy.sparse.linalg import splu
 
 from problems.forms.assembly import Assembly, LoadCase, Vector
 
-from .exact_residual import Double, Enclosed, U, forces, gaps
+from .exact_residual import DoubleDouble, Enclosure, U, forces, gaps
 
 MAX_REPAIRS = 20
 
@@ -32,35 +32,40 @@ MAX_REPAIRS = 20
 class Certificate:
     """x (n,) feasible, λ (m,) ≥ 0, max|x.hi − x*| ≤ bound_mm, and the contacts proven closed or open."""
 
-    x: Double
-    lam: Double
+    x: DoubleDouble
+    lam: DoubleDouble
     bound_mm: float
     closed: NDArray[np.bool_]
     open: NDArray[np.bool_]
 
 
 def certify(
-    assembly: Assembly, load: LoadCase, x: Double, lam: Double, active: NDArray[np.bool_], kappa: float
+    assembly: Assembly,
+    load: LoadCase,
+    x: DoubleDouble,
+    lam: DoubleDouble,
+    active: NDArray[np.bool_],
+    kappa: float,
 ) -> Certificate:
-    """Make x feasible and λ ≥ 0 by the least change, and bound what is then left. kappa : κ, N/mm."""
+    """Make x feasible and λ ≥ 0 by minimal changes, and bound the remaining error. kappa : κ, N/mm."""
     negative = lam.hi < 0
-    lam = Double(np.where(negative, 0.0, lam.hi), np.where(negative, 0.0, lam.lo))
+    lam = DoubleDouble(np.where(negative, 0.0, lam.hi), np.where(negative, 0.0, lam.lo))
     x, s, feasible = _repaired(assembly, load.g, x, active)
     r = forces(assembly, load.f, x, lam)
     if not (feasible and kappa > 0):
-        nothing = np.zeros(assembly.m, dtype=bool)
-        return Certificate(x, lam, np.inf, nothing, nothing)
-    up = 1 + 4 * (assembly.n + 2) * U  # of sums of so many positive terms
-    norm = float(np.linalg.norm(abs(r.value) + r.error)) * up
-    slack = float((s.value + s.error) @ (lam.hi + abs(lam.lo))) * up
-    error = (norm / np.sqrt(kappa) + np.sqrt(max(slack, 0.0))) / np.sqrt(kappa) * up
+        unproven = np.zeros(assembly.m, dtype=bool)
+        return Certificate(x, lam, np.inf, unproven, unproven)
+    inflation = 1 + 4 * (assembly.n + 2) * U  # for rounding in sums of that many positive terms
+    norm = float(np.linalg.norm(abs(r.value) + r.error)) * inflation
+    slack = float((s.value + s.error) @ (lam.hi + abs(lam.lo))) * inflation
+    error = (norm / np.sqrt(kappa) + np.sqrt(max(slack, 0.0))) / np.sqrt(kappa) * inflation
     return Certificate(x, lam, error + float(abs(x.lo).max(initial=0)), *_proven(assembly, lam, s, r, error))
 
 
 def _repaired(
-    assembly: Assembly, g: Vector, x: Double, active: NDArray[np.bool_]
-) -> tuple[Double, Enclosed, bool]:
-    """x moved by A(AᵀA)⁻¹d so that active gaps vanish and no gap is negative; whether that is proven."""
+    assembly: Assembly, g: Vector, x: DoubleDouble, active: NDArray[np.bool_]
+) -> tuple[DoubleDouble, Enclosure, bool]:
+    """x moved by A(AᵀA)⁻¹d so that active gaps vanish and no gap is negative, and whether that is proven."""
     A = sp.csc_array(assembly.A)
     factor = splu(sp.csc_array(A.T @ A)) if assembly.m else None
     s = gaps(assembly, g, x)
@@ -77,11 +82,11 @@ def _repaired(
 
 
 def _proven(
-    assembly: Assembly, lam: Double, s: Enclosed, r: Enclosed, error: float
+    assembly: Assembly, lam: DoubleDouble, s: Enclosure, r: Enclosure, error: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Contacts closed with a force for certain, and open for certain.
+    """Contacts proven to be closed with a force, and proven to be open.
 
-    |s* − s| ≤ |a|₂ ‖e‖₂. From A(λ* − λ) = Ke + r, in a row i of one entry a of A alone
+    |s* − s| ≤ |a|₂ ‖e‖₂. From A(λ* − λ) = Ke + r, in a row i of A with a single entry a
     |λ* − λ| ≤ (‖K_i‖₂ ‖e‖₂ + |r_i|)/|a|, where ‖K_i‖₂ ≤ √(K_ii · trace K) as K is positive definite.
     """
     A = sp.csc_array(assembly.A)
@@ -90,11 +95,11 @@ def _proven(
     diagonal = assembly.diagonal_K()
     trace = np.concatenate([np.full(K.shape[0], K.diagonal().sum()) for K in assembly.blocks])
     rows = sp.csr_array(A)
-    alone = np.flatnonzero(np.diff(rows.indptr) == 1)
-    entry = rows.indptr[alone]
-    doubt = 1.01 * (np.sqrt(diagonal * trace)[alone] * error + abs(r.value[alone]) + r.error[alone])
+    single = np.flatnonzero(np.diff(rows.indptr) == 1)
+    entry = rows.indptr[single]
+    uncertainty = 1.01 * (np.sqrt(diagonal * trace)[single] * error + abs(r.value[single]) + r.error[single])
     of_contact = rows.indices[entry]
-    sure = lam.hi[of_contact] - abs(lam.lo[of_contact]) > doubt / abs(rows.data[entry])
+    certain = lam.hi[of_contact] - abs(lam.lo[of_contact]) > uncertainty / abs(rows.data[entry])
     is_closed = np.zeros(assembly.m, dtype=bool)
-    is_closed[of_contact[sure]] = True
+    is_closed[of_contact[certain]] = True
     return is_closed, is_open

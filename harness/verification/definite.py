@@ -1,10 +1,10 @@
-"""A lower bound on the smallest eigenvalue of K that is proven, not estimated.
+"""A proven lower bound on the smallest eigenvalue of K.
 
 If a floating-point Cholesky factorisation of the rounded B = fl(K − sI) runs to completion, its factor R
-fulfils |RᵀR − B| ≤ γ_{n+1} |R|ᵀ|R|, entry by entry and whatever the order of its sums (Higham, Accuracy and
+satisfies |RᵀR − B| ≤ γ_{n+1} |R|ᵀ|R|, entry by entry and whatever the order of its sums (Higham, Accuracy and
 Stability of Numerical Algorithms, 2002, theorem 10.3), so that λmin(B) ≥ −γ_{n+1} ‖|R|ᵀ|R|‖₂ and
 λmin(K) ≥ s − γ_{n+1} ‖|R|ᵀ|R|‖₂ − u max(B_ii). A blocked factorisation may multiply by the reciprocal of a
-pivot where the theorem divides, one rounding more: γ_{2(n+1)} is taken in its place. The norm is at most
+pivot where the theorem divides, one more rounding: γ_{2(n+1)} is used instead. The norm is at most
 max (|R|ᵀ|R|v)_i/v_i for any v > 0 (Collatz and Wielandt): about 3 λmax for plates,
 a thousandth of the trace at n = 24080.
 """
@@ -23,9 +23,9 @@ STEPS = 5  # of the power method, for v
 
 
 def smallest_eigenvalue(K: Matrix, estimate: float) -> float:
-    """A proven lower bound on λmin(K), K (n, n) symmetric; 0 where no positive one was found.
+    """A proven lower bound on λmin(K), K (n, n) symmetric; 0 if no positive one was found.
 
-    estimate : of λmin; the better, the sharper the bound.
+    estimate : of λmin; the better it is, the sharper the bound.
     """
     diagonal = np.diag(K)
     for share in SHARES:
@@ -42,7 +42,7 @@ def smallest_eigenvalue(K: Matrix, estimate: float) -> float:
 
 
 def _norm(R: Matrix) -> float:
-    """‖|R|ᵀ|R|‖₂ from above, but for a rounding of 2nu of it; R, in the upper triangle, is overwritten."""
+    """Upper bound on ‖|R|ᵀ|R|‖₂, up to a relative rounding of 2nu; overwrites R, in the upper triangle."""
     np.abs(R, out=R)
     v, least = np.ones(len(R)), np.inf
     for _ in range(STEPS):

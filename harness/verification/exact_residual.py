@@ -1,12 +1,12 @@
-"""Residuals of the optimality conditions, nearly exact, each with a bound on its own error.
+"""Nearly exact residuals of the optimality conditions, each with a bound on its error.
 
     r = f − Kx − Aλ   (n,) N         s = g − Aᵀx   (m,) mm
 
-x and λ are unevaluated sums hi + lo of two float64 vectors. Sums and products are made free of error:
-two_sum and two_product give the rounding besides the result (Knuth; Dekker), K is cut into slices of
-so few bits that BLAS multiplies them exactly (Ozaki, Ogita, Oishi and Rump, Numer. Algorithms
-59:95–118, 2012), and the terms are added with their roundings (Ogita, Rump and Oishi, SIAM J. Sci.
-Comput. 26:1955–1988, 2005): |Σ computed − Σ| ≤ u|Σ| + γ²_k Σ|terms|, u = 2⁻⁵³, γ_k = ku/(1 − ku).
+x and λ are unevaluated sums hi + lo of two float64 vectors (double-double). Sums and products are error-free
+transformations: two_sum and two_product return the rounding error beside the result (Knuth; Dekker), K is
+cut into slices of so few bits that BLAS multiplies them exactly (Ozaki, Ogita, Oishi and Rump, Numer.
+Algorithms 59:95–118, 2012), and the terms are added with their rounding errors (Ogita, Rump and Oishi, SIAM
+J. Sci. Comput. 26:1955–1988, 2005): |Σ computed − Σ| ≤ u|Σ| + γ²_k Σ|terms|, u = 2⁻⁵³, γ_k = ku/(1 − ku).
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ import scipy.sparse as sp
 from problems.forms.assembly import Assembly, Matrix, Vector
 
 U = 2.0**-53
-ROWS_AT_A_TIME = 16  # with what is made of them they stay in the processor's cache
+ROWS_AT_A_TIME = 16  # they and what is computed from them stay in the processor's cache
 K_SLICES, X_SLICES = 2, 3
 
 
 @dataclass(frozen=True)
-class Double:
+class DoubleDouble:
     """hi + lo, |lo| at most about u|hi|."""
 
     hi: Vector
     lo: Vector
 
-    def plus(self, correction: Vector) -> Double:
+    def plus(self, correction: Vector) -> DoubleDouble:
         hi, error = two_sum(self.hi, correction)
-        return Double(*two_sum(hi, error + self.lo))
+        return DoubleDouble(*two_sum(hi, error + self.lo))
 
 
 @dataclass(frozen=True)
-class Enclosed:
-    """A vector and a bound on its error, entry by entry."""
+class Enclosure:
+    """A vector and an entrywise bound on its error."""
 
     value: Vector
     error: Vector
@@ -51,7 +51,7 @@ def two_sum(a: Vector, b: Vector) -> tuple[Vector, Vector]:
 
 
 def two_product(a: Vector, b: Vector) -> tuple[Vector, Vector]:
-    """(p, e) with p = fl(ab) and p + e = ab exactly, unless that under- or overflows."""
+    """(p, e) with p = fl(ab) and p + e = ab exactly, barring under- and overflow."""
     p = a * b
     (a1, a2), (b1, b2) = _halves(a), _halves(b)
     return p, a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
@@ -63,8 +63,8 @@ def _halves(a: Vector) -> tuple[Vector, Vector]:
     return hi, a - hi
 
 
-class Sum:
-    """Adds terms with their roundings; `error` is what the terms themselves are in doubt by."""
+class ErrorFreeSum:
+    """Adds terms with their rounding errors; `error` is the uncertainty of the terms themselves."""
 
     def __init__(self, size: int) -> None:
         self.hi, self.lo = np.zeros(size), np.zeros(size)
@@ -77,10 +77,10 @@ class Sum:
         self.size += abs(term)
         self.terms += 1
 
-    def enclosed(self) -> Enclosed:
+    def enclosed(self) -> Enclosure:
         value = self.hi + self.lo
         error = U * abs(value) + gamma(self.terms) ** 2 * self.size + self.error
-        return Enclosed(value, 1.01 * error)
+        return Enclosure(value, 1.01 * error)
 
 
 def gamma(k: int) -> float:
@@ -88,13 +88,13 @@ def gamma(k: int) -> float:
     return k * U / (1 - k * U)
 
 
-def forces(assembly: Assembly, f: Vector, x: Double, lam: Double) -> Enclosed:
+def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
     """r = f − Kx − Aλ with its error bound, N."""
-    total = Sum(assembly.n)
+    total = ErrorFreeSum(assembly.n)
     total.add(f)
     _subtract_sparse(total, slice(None), sp.csr_array(assembly.A), lam)
     for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
-        part = Double(x.hi[rows], x.lo[rows])
+        part = DoubleDouble(x.hi[rows], x.lo[rows])
         if sp.issparse(K):
             _subtract_sparse(total, rows, sp.csr_array(K), part)
         else:
@@ -102,15 +102,15 @@ def forces(assembly: Assembly, f: Vector, x: Double, lam: Double) -> Enclosed:
     return total.enclosed()
 
 
-def gaps(assembly: Assembly, g: Vector, x: Double) -> Enclosed:
+def gaps(assembly: Assembly, g: Vector, x: DoubleDouble) -> Enclosure:
     """s = g − Aᵀx with its error bound, mm."""
-    total = Sum(assembly.m)
+    total = ErrorFreeSum(assembly.m)
     total.add(g)
     _subtract_sparse(total, slice(None), sp.csr_array(assembly.A.T), x)
     return total.enclosed()
 
 
-def _subtract_sparse(total: Sum, rows: slice, A: sp.csr_array, v: Double) -> None:
+def _subtract_sparse(total: ErrorFreeSum, rows: slice, A: sp.csr_array, v: DoubleDouble) -> None:
     """total[rows] −= Av, one entry of every row at a time."""
     counts, size = np.diff(A.indptr), len(total.hi)
     first = rows.start or 0
@@ -125,11 +125,11 @@ def _subtract_sparse(total: Sum, rows: slice, A: sp.csr_array, v: Double) -> Non
             total.add(rounding)
 
 
-def _subtract_dense(total: Sum, rows: slice, K: Matrix, x: Double) -> None:
-    """total[rows] −= Kx: the products of the slices of K and x.hi exactly, what is left in float64.
+def _subtract_dense(total: ErrorFreeSum, rows: slice, K: Matrix, x: DoubleDouble) -> None:
+    """total[rows] −= Kx: the products of the slices of K and x.hi exactly, the remainder in float64.
 
-    A slice of b bits each makes n products of 2b bits; their sum has at most 53 where
-    2(b − 1) + log₂ n ≤ 53, whatever the order in which it is added.
+    Slices of b bits give n products of 2b bits; their sum has at most 53 bits if 2(b − 1) + log₂ n ≤ 53,
+    whatever the order of summation.
     """
     n = len(K)
     bits = (53 - int(np.ceil(np.log2(max(n, 2))))) // 2 + 1

@@ -31,7 +31,7 @@ from problems.storage.fingerprint import fingerprint
 
 from .certificate import certify
 from .definite import smallest_eigenvalue
-from .exact_residual import Double, forces, gaps
+from .exact_residual import DoubleDouble, forces, gaps
 from .principal_pivoting import contact_set
 
 MAX_REFINEMENTS = 12
@@ -126,7 +126,9 @@ def refined_active_set(prepared: Prepared, load: LoadCase) -> Reference:
     return Reference(proof.x.hi, proof.lam.hi, active, proof.bound_mm, route)
 
 
-def _refine(prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]) -> tuple[Double, Double]:
+def _refine(
+    prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]
+) -> tuple[DoubleDouble, DoubleDouble]:
     assembly = prepared.assembly
     rows = np.flatnonzero(active)
     A_C = assembly.A[:, rows]
@@ -134,8 +136,8 @@ def _refine(prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]) -> tu
     if rows.size:
         block = dense_submatrix(prepared.compliance, rows)
         factor = sla.cho_factor(block, lower=True, overwrite_a=True)
-    x = Double(np.zeros(assembly.n), np.zeros(assembly.n))
-    lam = Double(np.zeros(assembly.m), np.zeros(assembly.m))
+    x = DoubleDouble(np.zeros(assembly.n), np.zeros(assembly.n))
+    lam = DoubleDouble(np.zeros(assembly.m), np.zeros(assembly.m))
     force, gap = load.f, load.g  # the residuals at zero
     before = np.inf
     for _ in range(MAX_REFINEMENTS):

@@ -1,1 +1,1 @@
-"""Effects: each file is one physical effect, its parameters and the one term that it adds."""
+"""Effects: one file per physical effect, with its parameters and the term that it adds."""

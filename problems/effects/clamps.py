@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.model.effect import Between, ForceEffect, pressed, unknown_pair
+from problems.model.effect import Between, ForceEffect, pressing_forces, unknown_pair
 from problems.model.joint import Joint, Positive
 from problems.model.positions import Positions
 
@@ -16,8 +16,8 @@ from problems.model.positions import Positions
 class Clamps(Positions, ForceEffect):
     """f += force on the first part of every contact, −= on the second, shared by the nodes under the pad.
 
-    clamping_force in N a clamp, spread evenly over the junction nodes within `radius` mm of the clamp's node.
-    `between` names one contact; where it is not given, the clamp goes round all of them.
+    clamping_force in N per clamp, spread evenly over the junction nodes within `radius` mm of the clamp's
+    node. `between` names one contact; by default a clamp grips all of them.
     """
 
     units: ClassVar = {"clamping_force": "N", "radius": "mm", "points": "mm", "edge": "mm"}
@@ -36,4 +36,4 @@ class Clamps(Positions, ForceEffect):
         for centre in joint.nodes[self.nearest_nodes(joint)]:
             under = np.hypot(*(joint.nodes - centre).T) <= self.radius
             nodal[under] += self.clamping_force / under.sum()
-        return pressed(nodal, self.between, joint)
+        return pressing_forces(nodal, self.between, joint)

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.model.effect import Between, ForceEffect, pressed, unknown_pair
+from problems.model.effect import Between, ForceEffect, pressing_forces, unknown_pair
 from problems.model.joint import Joint, Positive
 from problems.model.positions import Positions
 
@@ -16,9 +16,9 @@ from problems.model.positions import Positions
 class Fasteners(Positions, ForceEffect):
     """f += preload on the first part of every contact, f −= preload on the second, in N.
 
-    A temporary fastener, or a rivet while it is set: a force, no stiffness. It acts on the junction node
-    nearest to it, at most half a node spacing away; two fasteners on one node add up. `between` names
-    one contact; where it is not given, a fastener goes through all of them.
+    A temporary fastener, or a rivet while it is being set: a force, no stiffness. It acts on the nearest
+    junction node, at most half a node spacing away; two fasteners on one node add up. `between` names one
+    contact; by default a fastener goes through all of them.
     """
 
     units: ClassVar = {"preload": "N", "points": "mm", "edge": "mm"}
@@ -34,4 +34,4 @@ class Fasteners(Positions, ForceEffect):
     def force(self, joint: Joint) -> Vector:
         nodal = np.zeros(joint.node_count)
         np.add.at(nodal, self.nearest_nodes(joint), self.preload)
-        return pressed(nodal, self.between, joint)
+        return pressing_forces(nodal, self.between, joint)

@@ -27,7 +27,7 @@ class InitialGap(GapEffect):
 
     The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
     roots Lx and Ly of two one-dimensional correlation matrices. A negative gap is an overclosure.
-    `between` names one contact; where it is not given, all of them get the gap, each a field of its own.
+    `between` names one contact; by default all of them get the gap, each with its own random field.
     """
 
     units: ClassVar = {"mean": "mm", "sd": "mm", "correlation_length": "mm"}
@@ -55,12 +55,12 @@ class InitialGap(GapEffect):
 
 
 def _square_root(grid: Vector, correlation_length: float) -> Matrix:
-    """Symmetric square root of exp(−(x_i − x_j)² / 2ℓ²); unique, so no sign depends on the machine."""
-    return _kept_root(grid.tobytes(), correlation_length)
+    """Symmetric square root of exp(−(x_i − x_j)² / 2ℓ²); unique, so that no sign depends on the machine."""
+    return _cached_root(grid.tobytes(), correlation_length)
 
 
 @lru_cache(maxsize=8)  # a series draws field after field on one grid
-def _kept_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
+def _cached_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     grid = np.frombuffer(grid_bytes)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / correlation_length) ** 2)
     w, V = np.linalg.eigh(C)

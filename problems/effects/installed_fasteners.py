@@ -18,9 +18,9 @@ class InstalledFasteners(Positions, TieEffect):
     """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = e_a − e_b.
 
     stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
-    shank through 20 mm. approach in mm: how much closer than in their initial state the parts were when
-    the fastener was set, so 0 keeps the gap as it was, and the initial gap keeps it closed. Each acts on
-    the junction node nearest to it. `between` names one contact; else a fastener ties all that it crosses.
+    shank through 20 mm. approach in mm: by how much the gap was reduced when the fastener was set; 0 keeps
+    the gap as it was, the value of the initial gap keeps it closed. Each fastener acts on the nearest
+    junction node. `between` names one contact; by default a fastener ties all that it crosses.
     """
 
     units: ClassVar = {"stiffness": "N/mm", "approach": "mm", "points": "mm", "edge": "mm"}
@@ -34,17 +34,17 @@ class InstalledFasteners(Positions, TieEffect):
         yield from unknown_pair(self.between, joint)
         yield from self.misplaced(joint)
         if joint.pairs and not self._tied(joint):
-            yield "between", self.between, "a contact of two parts; a fastener does not tie to the tool"
+            yield "between", self.between, "a contact of two parts; a fastener cannot tie a part to the tool"
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """A hole holds one element: no two ties, no tie and preload, at one node of one contact."""
+        """A hole holds one element: no two ties, nor a tie and a preload, at one node of one contact."""
         mine = set(self.nearest_nodes(joint))
         for other in others:
             if isinstance(other, Positions) and isinstance(other, ForceEffect):
                 shared = mine & set(other.nearest_nodes(joint))
                 if shared and set(self._tied(joint)) & set(pairs_of(getattr(other, "between", None), joint)):
                     where = [joint.nodes[node].tolist() for node in sorted(shared)]
-                    yield "points", where, f"nodes of their own: {other.kind} acts at the same nodes"
+                    yield "points", where, f"separate nodes: {other.kind} acts at the same nodes"
 
     def _tied(self, joint: Joint) -> list[Pair]:
         return [pair for pair in pairs_of(self.between, joint) if pair[1] != TOOL]

@@ -17,7 +17,7 @@ from problems.model.joint import Finite, Joint, Positive
 class LocalThickness(StiffnessEffect):
     """K += (D(t') − D(t)) / D(t) times the plate's own stiffness integrated over the rectangle; mm.
 
-    The mid-plane stays where it is. self_weight and thermal_bending see the thickness, too.
+    The mid-plane stays where it is. self_weight and thermal_bending take it into account.
     """
 
     units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
@@ -48,7 +48,7 @@ class LocalThickness(StiffnessEffect):
                 and max(self.x[0], other.x[0]) < min(self.x[1], other.x[1])
                 and max(self.y[0], other.y[0]) < min(self.y[1], other.y[1])
             ):
-                allowed = f"an area of its own: another local_thickness has {list(other.x)} × {list(other.y)}"
+                allowed = f"no overlap with another local_thickness, here {list(other.x)} × {list(other.y)}"
                 yield "x, y", [list(self.x), list(self.y)], allowed
 
     def stiffness(self, plate: Plate) -> sp.csr_array:

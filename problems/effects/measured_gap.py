@@ -1,4 +1,4 @@
-"""Measured gap: points with the gap that was found there, interpolated to the contacts."""
+"""Measured gap: values measured at points, interpolated to the contacts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from problems.forms.assembly import Vector
-from problems.input.csv_table import in_place_of_file
+from problems.input.csv_table import rows_from_file
 from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
 from problems.model.joint import Finite, Joint
 
@@ -18,8 +18,8 @@ from problems.model.joint import Finite, Joint
 class MeasuredGap(GapEffect):
     """g += linear interpolation of the points (x, y, gap) in mm, from `file`, a CSV with these columns.
 
-    Linear on the Delaunay triangles of the points; beyond their hull the gap of the nearest point. The
-    points may lie beside the junction. `between` names one contact; else all of them get the gap.
+    Linear on the Delaunay triangles of the points; outside their convex hull, the gap of the nearest point.
+    Points may lie outside the junction. `between` names one contact; by default all of them get the gap.
     """
 
     units: ClassVar = {"points": "mm"}
@@ -31,23 +31,23 @@ class MeasuredGap(GapEffect):
     @model_validator(mode="before")
     @classmethod
     def _from_file(cls, data: Any, info: ValidationInfo) -> Any:
-        return in_place_of_file(data, info, "points", ("x", "y", "gap"))
+        return rows_from_file(data, info, "points", ("x", "y", "gap"))
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from unknown_pair(self.between, joint)
         places = np.array(self.points)[:, :2]
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=1e-9 * np.ptp(places)) < 2:
-            yield "points", "all on one line", "three points off a line"
+            yield "points", "all on one line", "at least three points off a line"
         _, first, count = np.unique(places, axis=0, return_index=True, return_counts=True)
         for k in first[count > 1]:
-            yield f"points[{k}]", list(self.points[k]), "one gap at each point; this point comes twice"
+            yield f"points[{k}]", list(self.points[k]), "one gap per point; this point appears twice"
 
     def conflicts(self, others: Any, joint: Joint) -> Iterator[tuple[str, object, str]]:
         for other in others:
             if isinstance(other, MeasuredGap) and set(pairs_of(self.between, joint)) & set(
                 pairs_of(other.between, joint)
             ):
-                yield "between", self.between, "one measured_gap a contact: another one measured the same"
+                yield "between", self.between, "one measured_gap per contact: another one covers this contact"
 
     def gap(self, joint: Joint) -> Vector:
         points = np.array(self.points)

@@ -13,10 +13,10 @@ from problems.model.joint import Finite, Joint
 
 
 class Pressure(ForceEffect):
-    """f_i += value · a_i, with a_i the area that belongs to node i; value in N/mm² (MPa).
+    """f_i += value · a_i, with a_i the tributary area of node i; value in N/mm² (MPa).
 
-    The load stands on the junction nodes alone, as all loads of the model do, and the areas add up
-    to the junction's. A positive pressure pushes the part in the direction of positive x.
+    The load acts on the junction nodes only, and the areas sum to that of the junction. A positive pressure
+    pushes the part in the direction of positive displacements.
     """
 
     kind: Literal["pressure"]
@@ -28,11 +28,13 @@ class Pressure(ForceEffect):
 
     def force(self, joint: Joint) -> Vector:
         f = np.zeros(joint.size[0])
-        f[joint.unknowns(self.part)] = self.value * np.outer(_widths(joint.y), _widths(joint.x)).ravel()
+        f[joint.unknowns(self.part)] = (
+            self.value * np.outer(_tributary_lengths(joint.y), _tributary_lengths(joint.x)).ravel()
+        )
         return f
 
 
-def _widths(grid: Vector) -> Vector:
-    """The length of line that belongs to each grid point (trapezoidal rule)."""
+def _tributary_lengths(grid: Vector) -> Vector:
+    """The tributary length of each grid point (trapezoidal rule)."""
     h = np.diff(grid)
     return 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))

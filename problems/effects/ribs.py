@@ -1,4 +1,4 @@
-"""Ribs: beams along x over the part's whole length, bonded to the skin."""
+"""Ribs: beams along x over the full length of the part, bonded to the skin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rigid tool: a surface that one part may touch and not pass."""
+"""A rigid tool: a surface that one part may touch but not penetrate."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class RigidTool(GapEffect):
 
         g += distance + ½ κ_x (x − x_0)² + ½ κ_y (y − y_0)².
 
-    distance in mm; curvature = (κ_x, κ_y) in 1/mm: positive where the tool bends away from the part;
-    crest = (x_0, y_0) in mm, the middle of the junction where it is not given.
+    distance in mm; curvature = (κ_x, κ_y) in 1/mm, positive if the tool curves away from the part;
+    crest = (x_0, y_0) in mm, by default the centre of the junction.
     """
 
     units: ClassVar = {"distance": "mm", "curvature": "1/mm", "crest": "mm"}
@@ -38,7 +38,7 @@ class RigidTool(GapEffect):
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
         if any(isinstance(other, RigidTool) and other.part == self.part for other in others):
-            yield "part", self.part, "one rigid_tool a part: another one stands against this part"
+            yield "part", self.part, "one rigid_tool per part: another one faces this part"
 
     def gap(self, joint: Joint) -> Vector:
         crest = self.crest or (joint.junction.length / 2, joint.junction.width / 2)

@@ -1,4 +1,4 @@
-"""Self-weight of a part, with what of it lies beyond the junction."""
+"""Self-weight of a part, in the junction and beyond it."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ from problems.model.joint import Finite, Joint, Positive
 class Shims(GapEffect):
     """g −= thickness at every contact with x and y in the ranges, borders included; mm.
 
-    A shim is rigid. One thicker than the gap holds the parts apart there; two over one another add up.
-    `between` names the contact; where it is not given, each contact gets a shim.
+    A shim is rigid. One thicker than the gap holds the parts apart; overlapping shims add up. `between` names
+    one contact; by default every contact gets a shim.
     """
 
     units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
@@ -32,7 +32,7 @@ class Shims(GapEffect):
         yield from unknown_pair(self.between, joint)
         if not self._covered(joint).any():
             hx, hy = joint.x[1] - joint.x[0], joint.y[1] - joint.y[0]
-            allowed = f"ranges with a node in them; nodes stand every {hx:g} × {hy:g} mm from 0, 0"
+            allowed = f"ranges that contain a node; nodes are spaced {hx:g} × {hy:g} mm from (0, 0)"
             yield "x, y", [list(self.x), list(self.y)], allowed
 
     def _covered(self, joint: Joint) -> NDArray[np.bool_]:

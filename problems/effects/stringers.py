@@ -1,4 +1,4 @@
-"""Stringers: beams along y at an even pitch, bonded to the skin."""
+"""Stringers: equally spaced beams along y, bonded to the skin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Support shift: supports that do not stand where they should."""
+"""Support shift: supports displaced from their nominal position."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .supports import Supports
 class SupportShift(PartLoadEffect):
     """f += k · shift · e at each of `points`, where the scene has a support of stiffness k.
 
-    A support's spring then has its zero at w = shift (mm) instead of w = 0.
+    The spring of a support is then unloaded at w = shift (mm) instead of w = 0.
     """
 
     units: ClassVar = {"shift": "mm", "points": "mm"}
@@ -35,18 +35,22 @@ class SupportShift(PartLoadEffect):
             if isinstance(other, SupportShift) and other.part == self.part
             for point in other.points
         ]
-        standing = [
+        supported = [
             point
             for other in others
             if isinstance(other, Supports) and other.part == self.part
             for point in other.points
         ]
         for k, point in enumerate(self.points):
-            if point not in standing:
-                allowed = f"a point of a supports effect of part {self.part}, one of {standing}"
+            if point not in supported:
+                allowed = f"a point of a supports effect of part {self.part}, one of {supported}"
                 yield f"points[{k}]", list(point), allowed
             if point in shifted:
-                yield f"points[{k}]", list(point), "one support_shift a support: another one shifts this one"
+                yield (
+                    f"points[{k}]",
+                    list(point),
+                    "one support_shift per support: another one shifts this support",
+                )
 
     def load(self, model: PartModel) -> Vector:
         f = np.zeros(model.plate.size)

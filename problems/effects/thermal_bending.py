@@ -17,7 +17,7 @@ from problems.model.part import PartModel
 class ThermalBending(PartLoadEffect):
     """f −= D (1 + ν) κ ∫ (φ_xx + φ_yy) over the part, κ = α ΔT / t.
 
-    difference ΔT in K: the temperature of the face in the direction of positive displacements less that
+    difference ΔT in K: the temperature of the face in the direction of positive displacements minus that
     of the other, linear through the thickness; expansion α in 1/K. The free part would bend to
     w_xx = w_yy = −κ, without stress. Stringers and ribs stay at the mean temperature.
     """

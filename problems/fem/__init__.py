@@ -1,1 +1,1 @@
-"""Finite elements: Bogner–Fox–Schmit plates on tensor grids, and what stiffens and loads them."""
+"""Finite elements: Bogner–Fox–Schmit plates on tensor grids, their stiffeners and loads."""

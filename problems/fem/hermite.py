@@ -1,4 +1,4 @@
-"""Cubic Hermite functions on a line: the one-dimensional parts of the plate element.
+"""Cubic Hermite functions on a line: the one-dimensional factors of the plate element.
 
 Each grid point carries two degrees of freedom, value and derivative, numbered 2i and 2i + 1.
 """
@@ -71,7 +71,7 @@ def line_matrices(grid: Vector, start: float = -np.inf, stop: float = np.inf) ->
 
 
 def evaluate(grid: Vector, at: float, derivative: int = 0) -> sp.csr_array:
-    """Row vector e (1, 2N) with e·(degrees of freedom) = the field, or its derivative, at a point."""
+    """Row vector e (1, 2N): e·(degrees of freedom) is the field, or its derivative, at a point."""
     element = int(np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2))
     h = grid[element + 1] - grid[element]
     values = shape(np.array([(at - grid[element]) / h]), h, derivative)[:, 0]

@@ -1,6 +1,6 @@
 """A rectangular Kirchhoff plate of Bogner–Fox–Schmit elements on a tensor grid.
 
-Four degrees of freedom a node: w, w_x, w_y, w_xy. The shape functions are products of cubic
+Four degrees of freedom per node: w, w_x, w_y, w_xy. The shape functions are products of cubic
 Hermite functions, so the stiffness is a sum of Kronecker products of one-dimensional matrices:
 
     K = D [My⊗Hx + Hy⊗Mx + ν (By⊗Bxᵀ + Byᵀ⊗Bx) + 2(1−ν) Gy⊗Gx],   D = E t³ / (12 (1 − ν²))
@@ -64,7 +64,7 @@ class Plate:
         )
 
     def evaluate(self, x: float, y: float, dx: int = 0, dy: int = 0) -> sp.csr_array:
-        """Row (1, size) that reads the deflection, or a derivative of it, at a point."""
+        """Row vector (1, size) that gives the deflection, or a derivative of it, at a point."""
         return sp.kron(evaluate(self.y, y, dy), evaluate(self.x, x, dx)).tocsr()
 
     def beam_along_y(self, x: float, EI: float, GJ: float, start: float, stop: float) -> sp.csr_array:
@@ -74,7 +74,7 @@ class Plate:
         return (EI * sp.kron(line.H, e.T @ e) + GJ * sp.kron(line.G, slope.T @ slope)).tocsr()
 
     def beam_along_x(self, y: float, EI: float, GJ: float) -> sp.csr_array:
-        """Stiffness of a beam at y over the whole length: EI ∫w_xx² + GJ ∫w_xy², N·mm²."""
+        """Stiffness of a beam at y over the full length: EI ∫w_xx² + GJ ∫w_xy², N·mm²."""
         line = line_matrices(self.x)
         e, slope = evaluate(self.y, y), evaluate(self.y, y, 1)
         return (EI * sp.kron(e.T @ e, line.H) + GJ * sp.kron(slope.T @ slope, line.G)).tocsr()
@@ -85,5 +85,5 @@ class Plate:
         return np.arange(line * width, (line + 1) * width)
 
     def deflection_dofs(self, line: int) -> np.ndarray:
-        """The nx deflections on the grid line y[line], by ascending x."""
+        """The nx deflections on the grid line y[line], in order of ascending x."""
         return 4 * len(self.x) * line + 2 * np.arange(len(self.x))

@@ -1,7 +1,7 @@
 """File formats of K, A, f, g: one file each, with `write(path, data)` and `read(path)`.
 
-Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) where they are known. A format
-is imported when a file of its kind is met. A new one is one file here and a line in WRITERS and `module_of`.
+Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known. A format is imported
+when a file of its kind is read or written. A new one is one file here and a line in WRITERS and `module_of`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from problems.errors import Fault, InputError
 Data = dict[str, Any]
 NAMES = ("K", "A", "f", "g", "nodes")
 
-#: What each writes: a file, or a folder with a file for each matrix.
+#: What each writes: a file, or a folder with one file per matrix.
 WRITERS = {
     "npz": "a file .npz, bit for bit",
     "mtx": "a folder of Matrix Market files, bit for bit",
@@ -31,15 +31,15 @@ WRITERS = {
 DMIG_SUFFIXES = (".pch", ".bdf", ".nas", ".dat")
 
 
-def write(form: str, path: Path, data: Data) -> None:
+def write(name: str, path: Path, data: Data) -> None:
     """Write data in a format of WRITERS."""
-    _module(form).write(path, data)
+    _module(name).write(path, data)
 
 
 def read(path: Path) -> Data:
-    """The matrices of a file, by the names that it gives them; a file of one matrix names it by its stem.
+    """The matrices of a file, by their names in it; a file that holds one matrix names it by its stem.
 
-    Raises InputError where it is not readable.
+    Raises InputError if it is not readable.
     """
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
@@ -54,7 +54,7 @@ def read(path: Path) -> Data:
 
 
 def module_of(path: Path) -> ModuleType:
-    """The format of a file, from its suffix and, where that is not enough, from its content."""
+    """The format of a file, from its suffix and, if that is ambiguous, its content."""
     match path.suffix.lower():
         case ".npz":
             with np.load(path) as archive:
@@ -70,14 +70,14 @@ def module_of(path: Path) -> ModuleType:
     raise InputError.one(path, "suffix", path.suffix, allowed)
 
 
-def _module(form: str) -> ModuleType:
-    return importlib.import_module(f"problems.formats.{form}_format")
+def _module(name: str) -> ModuleType:
+    return importlib.import_module(f"problems.formats.{name}_format")
 
 
 def pyyeti(path: Path) -> Any:
-    """pyyeti.nastran, which reads and writes Nastran's files. Raises InputError where it is not installed."""
+    """pyyeti.nastran, which reads and writes Nastran's files. Raises InputError if it is not installed."""
     try:
-        with np.printoptions():  # which its import changes for good: files of text would have 12 digits
+        with np.printoptions():  # which its import changes for good: text files would have 12 digits
             from pyyeti import nastran
     except ModuleNotFoundError:
         allowed = "Nastran's formats need pyyeti: pip install 'rivetbench[nastran]'"
@@ -86,5 +86,5 @@ def pyyeti(path: Path) -> Any:
 
 
 def vector(values: Any) -> np.ndarray:
-    """A column or row of a matrix file as a vector."""
+    """A row or column of a matrix file as a vector."""
     return np.asarray(values, dtype=float).ravel()

@@ -3,7 +3,7 @@
     row node, row dof, column node, column dof, value      FORMAT=MATRIX INPUT
     row, column, value                                     FORMAT=COORDINATE
 
-One triangle of K or both. Abaqus has no text for A, f, g: they go beside it as Matrix Market files.
+One triangle of K or both. Abaqus has no text format for A, f, g: they become Matrix Market files beside it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from problems.formats import Data
 
 from .mtx_format import write_others
 
-NORMAL = 3  # the degree of freedom that displacements are written as
+NORMAL = 3  # the degree of freedom under which displacements are written
 
 
 def write(path: Path, data: Data) -> None:
@@ -48,7 +48,7 @@ def read(path: Path) -> Data:
 
 
 def _rows(path: Path) -> np.ndarray:
-    """(k, 5) or (k, 3) numbers. Raises InputError with the lines that are something else."""
+    """(k, 5) or (k, 3) numbers. Raises InputError with the invalid lines."""
     rows: list[list[float]] = []
     faults: list[Fault] = []
     with path.open(encoding="ascii", errors="replace") as file:
@@ -60,7 +60,7 @@ def _rows(path: Path) -> np.ndarray:
             except ValueError:
                 row = []
             if len(row) not in (3, 5) or (rows and len(row) != len(rows[0])):
-                allowed = "node, dof, node, dof, value; or row, column, value; on every line the same"
+                allowed = "node, dof, node, dof, value; or row, column, value; the same on every line"
                 faults.append(Fault(str(path), f"line {number}", line.strip(), allowed))
             else:
                 rows.append(row)

@@ -1,7 +1,7 @@
-"""Nastran DMIG cards by pyyeti: matrices K (symmetric) and A, F, G (rectangular); ten digits a number.
+"""Nastran DMIG cards by pyyeti: matrices K (symmetric) and A, F, G (rectangular); ten digits per number.
 
-The unknowns are points 1 … n with component 0 (scalar points). A card file has no zero, so rows that are
-not there stand at the points of K, and a load or gap that is zero everywhere is not written at all.
+The unknowns are points 1 … n with component 0 (scalar points). Cards hold no zeros, so missing rows
+are zeros at the points of K, and a load or gap that is zero everywhere is not written at all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from problems.formats import Data, pyyeti
 def write(path: Path, data: Data) -> None:
     n, m = data["A"].shape
     if m == 0:
-        allowed = "at least one: cards have no matrix without columns; take another format"
+        allowed = "at least one: DMIG has no matrix without columns; use another format"
         raise InputError.one(path, "contacts", m, allowed)
     points, contacts, one = _points(n), _points(m), pd.Index([1])
     frames = {
@@ -33,7 +33,7 @@ def write(path: Path, data: Data) -> None:
 
 def read(path: Path) -> Data:
     found = pyyeti(path).rddmig(str(path))
-    if "k" not in found:  # of other names, with the rows that are there
+    if "k" not in found:  # other names, with the rows present
         return {name: frame.to_numpy() for name, frame in found.items()}
     points = found["k"].index
     data = {"K": found["k"].to_numpy(), "f": _column(found.get("f"), points)}

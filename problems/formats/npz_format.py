@@ -1,4 +1,4 @@
-"""numpy's .npz with arrays K, A, f, g and optionally nodes: the format that scenes open."""
+"""NumPy's .npz with arrays K, A, f, g and optionally nodes: the format that scenes open."""
 
 from __future__ import annotations
 

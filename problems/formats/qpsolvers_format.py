@@ -23,6 +23,6 @@ def read(path: Path) -> Data:
     for name in ("A", "b", "lb", "ub"):
         if getattr(found, name) is not None:
             raise InputError.one(
-                path, name, "present", "contact problems have no equations and no bounds on x"
+                path, name, "present", "contact problems have no equality constraints and no bounds on x"
             )
     return {"K": found.P, "f": -found.q, "A": found.G.T, "g": found.h}

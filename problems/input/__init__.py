@@ -1,1 +1,1 @@
-"""What a user writes: tables, CSV files and matrices, read and checked; every fault in plain words."""
+"""User input: tables, CSV files and matrices, read and checked, every fault reported in plain words."""

@@ -16,7 +16,7 @@ from problems.errors import Fault
 
 @dataclass(frozen=True)
 class Rows:
-    """The good rows of a file that a table names in place of a field, their lines, and what is wrong."""
+    """The good rows of a file that a table names instead of a field, their line numbers, and the faults."""
 
     path: Path
     field: str
@@ -25,13 +25,13 @@ class Rows:
     faults: list[Fault]
 
     def line(self, key: str) -> tuple[str, str] | None:
-        """The file and the line of a row that a key as `points[3]` names."""
+        """The file and line of the row that a key such as `points[3]` refers to."""
         place = re.fullmatch(rf"{self.field}\[(\d+)\]", key)
         return (str(self.path), f"line {self.lines[int(place[1])]}") if place else None
 
 
 def read_columns(path: Path, field: str, names: tuple[str, ...]) -> Rows:
-    """The named columns of a file, row by row; other columns are passed over. Bad rows are faults."""
+    """The named columns of a file, row by row; other columns are ignored. Bad rows are faults."""
     read = Rows(path, field, [], [], [])
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -45,7 +45,7 @@ def read_columns(path: Path, field: str, names: tuple[str, ...]) -> Rows:
 def _read(reader: Any, names: tuple[str, ...], read: Rows) -> None:
     header = [cell.strip() for cell in next(reader, [])]
     if not set(names) <= set(header):
-        wanted = f"a first line that names the columns {', '.join(names)}, separated by commas"
+        wanted = f"a header line with the columns {', '.join(names)}, separated by commas"
         read.faults.append(Fault(str(read.path), "line 1", ",".join(header), wanted))
         return
     columns = [header.index(name) for name in names]
@@ -66,11 +66,11 @@ def _read(reader: Any, names: tuple[str, ...], read: Rows) -> None:
         read.faults.append(Fault(str(read.path), "rows", 0, "at least one row below the header"))
 
 
-def in_place_of_file(data: Any, info: ValidationInfo, field: str, names: tuple[str, ...]) -> Any:
-    """A table with `file = "x.csv"` becomes one with its good rows as `field`, so that a key depends on them.
+def rows_from_file(data: Any, info: ValidationInfo, field: str, names: tuple[str, ...]) -> Any:
+    """Replace `file = "x.csv"` in a table by the file's good rows as `field`, so that a key depends on them.
 
-    The validation's context gives the folder of the scene, from which a path starts, and the list `files`
-    that takes what was read.
+    The validation context holds `folder`, the scene's folder, to which the path is relative, and `files`, a
+    list to which the rows read are appended.
     """
     if not isinstance(data, dict) or "file" not in data:
         return data

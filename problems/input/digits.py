@@ -1,4 +1,4 @@
-"""How many digits the entries of a matrix seem to have, and what so few would do to the displacements."""
+"""The apparent precision of a matrix's entries, and its effect on the displacements."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from problems.forms.assembly import Vector
 from problems.forms.compliance import dense_submatrix
 from problems.forms.prepared import Prepared
 
-SAMPLE = 20_000
-DOUBLE, SINGLE = 16, 7  # digits of the two formats of floating-point numbers
+SAMPLE_SIZE = 20_000
+DOUBLE, SINGLE = 16, 7  # significant digits of the two floating-point formats
 DRAWS = 3
 
 
 def apparent_digits(values: Vector) -> int:
     """The smallest d with every value equal to itself rounded to d significant digits, at most 16.
 
-    Values that are all single precision have 7. Looks at a sample of 20 000.
+    7 if all values are in single precision. Examines a sample of 20 000.
     """
     v = values[values != 0]
-    if len(v) > SAMPLE:
-        v = np.random.default_rng(0).choice(v, SAMPLE, replace=False)
+    if len(v) > SAMPLE_SIZE:
+        v = np.random.default_rng(0).choice(v, SAMPLE_SIZE, replace=False)
     for d in range(1, DOUBLE):
-        if _rounded_alike(v, d):
+        if _unchanged_by_rounding(v, d):
             return d
     return SINGLE if np.array_equal(v, v.astype(np.float32)) else DOUBLE
 
 
-def _rounded_alike(v: Vector, digits: int) -> bool:
+def _unchanged_by_rounding(v: Vector, digits: int) -> bool:
     some = v[:50]
     if not np.array_equal(_rounded(some, digits), some):
         return False
@@ -39,10 +39,10 @@ def _rounded(v: Vector, digits: int) -> Vector:
 
 
 def expected_error(prepared: Prepared, x: Vector, lam: Vector, digits: int) -> float:
-    """max|δx| in mm that rounding K to so many digits would cause, to first order.
+    """max|δx|, mm, caused by rounding K to `digits` significant digits, to first order.
 
     δx = (K⁻¹ − K⁻¹A_C Q_CC⁻¹ A_CᵀK⁻¹) δK x with C the closed contacts, λ > 0, and δK symmetric, each entry
-    uniform within half a unit of its last digit; the largest of three draws.
+    uniform within half a unit of its last digit; the largest of three random draws.
     """
     assembly = prepared.assembly
     random = np.random.default_rng(0)

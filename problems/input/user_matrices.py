@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Assembly, LoadCase, Matrix
 
-SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| that is taken for rounding
+SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
 
 
 def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
@@ -21,7 +21,7 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
         nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
-    K is split into its diagonal blocks. Raises InputError with everything that is wrong.
+    K is split into its diagonal blocks. Raises InputError with all faults.
     """
     where = {key: str(path) for key, path in files.items()}
     if "problem" in files:
@@ -35,7 +35,9 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
     for key, values in data.items():
         if values.dtype.kind not in "fiub" or (key in "KA" and values.ndim != 2):
             found = f"{values.dtype} array of shape {values.shape}"
-            faults.append(Fault(where.get(key, "matrices"), key, found, "real numbers; K and A matrices"))
+            faults.append(
+                Fault(where.get(key, "matrices"), key, found, "real numbers; K and A must be matrices")
+            )
     if faults:
         raise InputError(faults)
     K, A = (sp.csr_array(data[key], dtype=float) for key in "KA")
@@ -56,7 +58,7 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
         raise InputError(faults)
     untouched = np.flatnonzero(abs(A).sum(axis=0) == 0)
     if untouched.size:
-        raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must touch an unknown")
+        raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must involve an unknown")
     asymmetry = abs(K - K.T).max() / max(abs(K).max(), np.finfo(float).tiny)
     if asymmetry > SYMMETRY:
         raise InputError.one(where["K"], "max|K − Kᵀ| / max|K|", float(asymmetry), f"must be ≤ {SYMMETRY:g}")
@@ -66,10 +68,10 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
 def _blocks(
     K: sp.csr_array, A: sp.csr_array, f: Matrix, g: Matrix, nodes: Matrix | None
 ) -> tuple[Assembly, LoadCase]:
-    """Split K into diagonal blocks; unknowns of one block must stand together in x."""
+    """Split K into diagonal blocks; the unknowns of one block must be contiguous in x."""
     count, label = connected_components(K, directed=False)
     starts = np.flatnonzero(np.diff(label, prepend=-1))
-    if len(starts) != count:  # interleaved blocks: one dense block is always right
+    if len(starts) != count:  # interleaved blocks: a single dense block is always valid
         starts = np.array([0])
     ends = np.append(starts[1:], K.shape[0])
     blocks = tuple(K[a:b, a:b].toarray(order="F") for a, b in zip(starts, ends, strict=True))
@@ -98,14 +100,14 @@ def _read_mtx(path: Path, key: str) -> Any:
 def read_mtx(path: Path) -> Any:
     """A Matrix Market file, array or sparse.
 
-    Raises ValueError if entries are missing. mmread takes these for zeros or dies of them, as it does of an
+    Raises ValueError if entries are missing: mmread would take them for zeros or crash, as it does on an
     array without entries.
     """
     rows, columns, entries, form, _, symmetry = scipy.io.mminfo(path)
     if form == "array":
         entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
     with path.open("rb") as file:
-        found = sum(1 for line in file if line.strip() and not line.startswith(b"%")) - 1  # the sizes
+        found = sum(1 for line in file if line.strip() and not line.startswith(b"%")) - 1  # the size line
     if found < entries:
         raise ValueError(f"truncated: {found} of {entries} entries")
     return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with a table, as faults in our words: with the unit and what is allowed."""
+"""Validation errors of pydantic as faults, with the unit and what is allowed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from problems.errors import Fault
 
-#: Units of what joints and stiffeners are described by; an effect names those of its own parameters.
+#: Units of the keys of joints and stiffeners; an effect gives those of its own parameters.
 UNITS = {
     **dict.fromkeys(["length", "width", "thickness", "points", "lines", "pitch", "start", "stop"], "mm"),
     **dict.fromkeys(["I", "J"], "mm⁴"),
@@ -29,12 +29,12 @@ def validation_faults(
     prefix: str = "",
     units: Mapping[str, str] = NO_UNITS,
 ) -> Iterator[Fault]:
-    """The faults of a table that is no `model`; units : of the keys that have one."""
+    """The faults of a table that is not a valid `model`. units : of the keys that have one."""
     items = error.errors()
     for item in items:
         depth = len(item["loc"])
         if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
-            continue  # it follows from a fault inside it
+            continue  # a consequence of a fault inside it
         key = ".".join(filter(None, [prefix, *map(str, item["loc"])]))
         value = None if item["type"] == "missing" else item["input"]
         unit = next((units[str(part)] for part in reversed(item["loc"]) if part in units), None)
@@ -43,10 +43,10 @@ def validation_faults(
 
 
 def unknown(kind: str, value: object, known: Sequence[str]) -> str:
-    """What is said of a name that is not known: those near it, and all that are allowed."""
-    near = get_close_matches(str(value), known, 3)
-    nearest = f"did you mean {' or '.join(near)}? " if near else ""
-    return f"no such {kind}; {nearest}allowed: {', '.join(known)}"
+    """The message for an unknown name: similar names, and all that are allowed."""
+    similar = get_close_matches(str(value), known, 3)
+    suggestion = f"did you mean {' or '.join(similar)}? " if similar else ""
+    return f"no such {kind}; {suggestion}allowed: {', '.join(known)}"
 
 
 def _allowed(item: Any, model: type[BaseModel]) -> str:

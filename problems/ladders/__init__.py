@@ -1,1 +1,1 @@
-"""Ladders: each file is one way in which a problem grows hard."""
+"""Ladders: each file makes problems harder in one way, step by step."""

@@ -7,22 +7,22 @@ from functools import partial
 import numpy as np
 
 from problems.forms.assembly import Assembly, LoadCase
-from problems.manufactured.exact import frame, solved, spectrum
-from problems.manufactured.ladder import Ladder, Made, Rung
+from problems.manufactured.exact import exact_model, manufacture, spectrum
+from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
 
-N = 64  # unknowns a part
+N = 64  # unknowns per part
 CONDITION = 1e4
 
 
 def _rung(bits: int) -> Rung:
     d = spectrum(N, CONDITION)
-    made = solved(frame(d, d), seed=4)
+    made = manufacture(exact_model(d, d), seed=4)
     spring = 2.0**bits  # N/mm; the part's largest eigenvalue is 64e4
     return Rung(f"Two parts, two nodes tied by {spring:.0e} N/mm", made=_tied(made, spring))
 
 
-def _tied(made: Made, spring: float) -> Made:
-    """K += k bbᵀ and f += k b(bᵀx) with b = e₀ − e₁: the same answer, still without rounding."""
+def _tied(made: ManufacturedProblem, spring: float) -> ManufacturedProblem:
+    """K += k bbᵀ and f += k b(bᵀx) with b = e₀ − e₁: the same solution, still without rounding."""
     assert made.x is not None
     b = np.zeros(N)
     b[:2] = 1.0, -1.0
@@ -31,7 +31,7 @@ def _tied(made: Made, spring: float) -> Made:
     f = made.load.f.copy()
     f[:N] += spring * b * (b @ made.x[:N])
     assembly = Assembly(blocks, made.assembly.A, None, made.assembly.parts)
-    return Made(assembly, LoadCase(f, made.load.g), made.x, made.lam)
+    return ManufacturedProblem(assembly, LoadCase(f, made.load.g), made.x, made.lam)
 
 
 RUNGS: Ladder = {f"{2.0**bits:.0e}": partial(_rung, bits) for bits in (22, 27, 32, 37, 42, 45)}

@@ -1,25 +1,25 @@
-"""Two parts whose spectrum is spread ever wider: cond(K) from 1e6 to 1e14."""
+"""Two parts with an ever wider spectrum: cond(K) from 1e6 to 1e14."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from problems.manufactured.exact import frame, solved, spectrum
-from problems.manufactured.ladder import Ladder, Made, Rung
+from problems.manufactured.exact import exact_model, manufacture, spectrum
+from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
 
-N = 64  # unknowns a part
+N = 64  # unknowns per part
 
 
 def _rung(condition: float) -> Rung:
     d = spectrum(N, condition)
-    return Rung(f"Two parts, cond(K) = {condition:g}", made=solved(frame(d, d), seed=1))
+    return Rung(f"Two parts, cond(K) = {condition:g}", made=manufacture(exact_model(d, d), seed=1))
 
 
 def _beyond(condition: float) -> Rung:
-    """Its K is no longer exact, which is of no consequence where it is refused."""
+    """K is no longer exact, which does not matter because it is refused."""
     d = spectrum(N, condition)
-    base = frame(d, d)
-    made = Made(base.assembly(), solved(frame(d[:1], d[:1]), seed=1).load)
+    model = exact_model(d, d)
+    made = ManufacturedProblem(model.assembly(), manufacture(exact_model(d[:1], d[:1]), seed=1).load)
     return Rung(f"Two parts, cond(K) = {condition:g}", made=made, refused="K must be positive definite")
 
 

@@ -1,10 +1,10 @@
-"""Two parts that touch at ever more contacts without a force: λᵢ = yᵢ = 0 in the answer."""
+"""Two parts with ever more weakly active contacts: λᵢ = yᵢ = 0 in the solution."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from problems.manufactured.exact import Shares, frame, solved, spectrum
+from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
 from problems.manufactured.ladder import Ladder, Rung
 
 N = 64  # contacts
@@ -14,7 +14,7 @@ CONDITION = 1e6
 def _rung(percent: int) -> Rung:
     weak = percent / 100
     d = spectrum(N, CONDITION)
-    made = solved(frame(d, d), seed=2, shares=Shares(min(0.4, 1 - weak), weak))
+    made = manufacture(exact_model(d, d), seed=2, shares=Shares(min(0.4, 1 - weak), weak))
     return Rung(f"Two parts, {percent} % of the contacts touch without a force", made=made)
 
 

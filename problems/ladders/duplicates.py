@@ -1,6 +1,6 @@
-"""Contacts that say nearly the same: columns of A that are nearly dependent, in the end exact copies.
+"""Nearly dependent constraints: nearly equal columns of A, in the end exact copies.
 
-Eight contacts stand twice; the second ones touch the second part a little beside the node of the first.
+Eight contacts are duplicated; a duplicate touches the second part slightly beside the node of the original.
 """
 
 from __future__ import annotations
@@ -10,33 +10,33 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from problems.manufactured.exact import frame, solved, spectrum
-from problems.manufactured.ladder import Ladder, Made, Rung
+from problems.manufactured.exact import exact_model, manufacture, spectrum
+from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
 
-N = 64  # unknowns a part
-TWICE = 8
+N = 64  # unknowns per part
+DUPLICATED = 8
 CONDITION = 1e4
 
 
-def _problem(tilt: float) -> Made:
+def _problem(tilt: float) -> ManufacturedProblem:
     one = np.eye(N)
-    beside = one[:, :TWICE] + tilt * one[:, TWICE : 2 * TWICE]
-    A = sp.csc_array(np.block([[one, one[:, :TWICE]], [-one, -beside]]))
+    beside = one[:, :DUPLICATED] + tilt * one[:, DUPLICATED : 2 * DUPLICATED]
+    A = sp.csc_array(np.block([[one, one[:, :DUPLICATED]], [-one, -beside]]))
     d = spectrum(N, CONDITION)
-    return solved(frame(d, d, A=A), seed=3)
+    return manufacture(exact_model(d, d, A=A), seed=3)
 
 
-def _near(bits: int) -> Rung:
+def _nearly_equal(bits: int) -> Rung:
     tilt = 2.0**-bits
-    return Rung(f"Two parts, {TWICE} contacts twice, {tilt:.0e} apart", made=_problem(tilt))
+    return Rung(f"Two parts, {DUPLICATED} contacts duplicated, {tilt:.0e} apart", made=_problem(tilt))
 
 
 def _copies() -> Rung:
-    title = f"Two parts, {TWICE} contacts exactly twice"
+    title = f"Two parts, {DUPLICATED} contacts duplicated exactly"
     return Rung(title, made=_problem(0.0), refused="must not depend on the columns before it")
 
 
 RUNGS: Ladder = {
-    **{f"{2.0**-bits:.0e}": partial(_near, bits) for bits in (4, 8, 12, 16)},
+    **{f"{2.0**-bits:.0e}": partial(_nearly_equal, bits) for bits in (4, 8, 12, 16)},
     "copies": _copies,
 }

@@ -1,19 +1,19 @@
-"""Parts that contact alone would hold: K is singular, and the model says so."""
+"""Parts held by contact alone: K is singular, and the model refuses it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from problems.manufactured.exact import frame, solved, spectrum
-from problems.manufactured.ladder import Ladder, Made, Rung, plates
+from problems.manufactured.exact import exact_model, manufacture, spectrum
+from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung, plates
 
-from .parts import FASTENERS, GAP, HELD, JUNCTION
+from .parts import CLAMPED_PART, FASTENERS, GAP, JUNCTION
 
 REFUSED = "K must be positive definite"
 
 
 def _on_a_part() -> Rung:
-    parts = [HELD | {"name": "clamped"}, {"name": "floating", "thickness": 6.0}]
+    parts = [CLAMPED_PART | {"name": "clamped"}, {"name": "floating", "thickness": 6.0}]
     joint = {"junction": JUNCTION, "part": parts}
     return plates("A free plate against a clamped one", joint, GAP, FASTENERS, refused=REFUSED)
 
@@ -26,9 +26,9 @@ def _on_a_tool() -> Rung:
 
 def _singular() -> Rung:
     d = spectrum(16, 1e4)
-    made = solved(frame(d, d), seed=13)
+    made = manufacture(exact_model(d, d), seed=13)
     free = np.concatenate([[0.0], d[1:]])
-    made = Made(frame(d, free).assembly(), made.load)
+    made = ManufacturedProblem(exact_model(d, free).assembly(), made.load)
     return Rung("A part that can move without strain", made=made, refused=REFUSED)
 
 

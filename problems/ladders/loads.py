@@ -8,24 +8,24 @@ from functools import partial
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Vector
-from problems.manufactured.exact import Frame, Random, Shares, frame, solved, spectrum
-from problems.manufactured.ladder import Ladder, Made, Rung
+from problems.manufactured.exact import ExactModel, Random, Shares, exact_model, manufacture, spectrum
+from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
 
 N = 64  # contacts
 FORCE = 1000.0  # N
-FLIP = 2.0**-40  # about 1e-12
+PERTURBATION = 2.0**-40  # about 1e-12
 
 
-def _frame() -> Frame:
+def _model() -> ExactModel:
     d = spectrum(N, 1e6)
-    return frame(d, d)
+    return exact_model(d, d)
 
 
 def _random(title: str, gap: Callable[[Random], Vector], force: float = FORCE) -> Rung:
-    """Random forces up to `force` on every node, no answer chosen."""
+    """Random forces up to `force` on every node, without a prescribed solution."""
     random = np.random.default_rng(7)
     f = random.uniform(-force, force, 2 * N)
-    return Rung(title, made=Made(_frame().assembly(), LoadCase(f, gap(random))))
+    return Rung(title, made=ManufacturedProblem(_model().assembly(), LoadCase(f, gap(random))))
 
 
 def _constant(value: float) -> Callable[[Random], Vector]:
@@ -33,18 +33,20 @@ def _constant(value: float) -> Callable[[Random], Vector]:
 
 
 def _everywhere() -> Rung:
-    return Rung("Every contact closed", made=solved(_frame(), seed=8, shares=Shares(1.0)))
+    return Rung("Every contact closed", made=manufacture(_model(), seed=8, shares=Shares(1.0)))
 
 
-def _flip(title: str, lam: float, gap: float) -> Rung:
-    """Of the contacts, a third would touch without a force; λ N or a gap in mm of almost nothing is added."""
-    made = solved(_frame(), seed=9, shares=Shares(0.3, 0.3))
+def _perturbed(title: str, lam: float, gap: float) -> Rung:
+    """A third of the contacts are weakly active; a tiny force `lam`, N, or `gap`, mm, is added to each."""
+    made = manufacture(_model(), seed=9, shares=Shares(0.3, 0.3))
     assert made.x is not None
     assert made.lam is not None
     A, y = made.assembly.A, made.load.g - made.assembly.A.T @ made.x
     weak = (made.lam == 0) & (y == 0)
     load = LoadCase(made.load.f + A @ np.where(weak, lam, 0.0), made.load.g + np.where(weak, gap, 0.0))
-    return Rung(title, made=Made(made.assembly, load, made.x, made.lam + np.where(weak, lam, 0.0)))
+    return Rung(
+        title, made=ManufacturedProblem(made.assembly, load, made.x, made.lam + np.where(weak, lam, 0.0))
+    )
 
 
 RUNGS: Ladder = {
@@ -58,6 +60,6 @@ RUNGS: Ladder = {
     "tiny-force": partial(_random, "Forces of 1e-9 N, no gap", _constant(0.0), force=1e-9),
     "no-load": partial(_random, "Gaps of 0.1 mm, no load", _constant(0.1), force=0.0),
     "nothing": partial(_random, "No gap, no load", _constant(0.0), force=0.0),
-    "flip-open": partial(_flip, "A third of the contacts open by 1e-12 mm", 0.0, FLIP),
-    "flip-closed": partial(_flip, "A third of the contacts closed by 1e-12 N", FLIP, 0.0),
+    "flip-open": partial(_perturbed, "A third of the contacts open by 1e-12 mm", 0.0, PERTURBATION),
+    "flip-closed": partial(_perturbed, "A third of the contacts closed by 1e-12 N", PERTURBATION, 0.0),
 }

@@ -1,4 +1,4 @@
-"""Unusual assemblies: stiff parts, stacks, a rigid tool, and the smallest problems that there are."""
+"""Unusual assemblies: stiff parts, stacks, a rigid tool, and the smallest possible problems."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase
-from problems.manufactured.exact import Shares, frame, solved, spectrum
-from problems.manufactured.ladder import Ladder, Made, Rung, plates
+from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
+from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung, plates
 
 JUNCTION = {"length": 1000.0, "width": 300.0, "nodes": (12, 5)}
-HELD = {"thickness": 6.0, "north": {"length": 300.0, "elements": 4}, "clamped": ("north",)}
+CLAMPED_PART = {"thickness": 6.0, "north": {"length": 300.0, "elements": 4}, "clamped": ("north",)}
 GAP = {"kind": "initial_gap", "mean": 0.3, "random": {"sd": 0.1, "correlation_length": 150.0, "seed": 1}}
 FASTENERS = {"kind": "fasteners", "preload": 1000.0, "pattern": {"columns": 4, "rows": 2, "edge": 50.0}}
 
 
 def _joint(*parts: dict[str, Any], **more: Any) -> dict[str, Any]:
-    named = [{"name": f"part {k + 1}"} | HELD | part for k, part in enumerate(parts)]
+    named = [{"name": f"part {k + 1}"} | CLAMPED_PART | part for k, part in enumerate(parts)]
     return {"junction": JUNCTION, "part": named, **more}
 
 
@@ -42,19 +42,22 @@ def _between() -> Rung:
 
 
 def _one_node() -> Rung:
-    one = frame(np.ones(1), A=sp.csc_array([[1.0]]))
-    return Rung("One node against a rigid tool", made=Made(one.assembly(), LoadCase(np.ones(1), np.zeros(1))))
+    one = exact_model(np.ones(1), A=sp.csc_array([[1.0]]))
+    return Rung(
+        "One node against a rigid tool",
+        made=ManufacturedProblem(one.assembly(), LoadCase(np.ones(1), np.zeros(1))),
+    )
 
 
 def _two_nodes() -> Rung:
-    made = solved(frame(np.ones(1), np.ones(1)), seed=10, shares=Shares(1.0))
+    made = manufacture(exact_model(np.ones(1), np.ones(1)), seed=10, shares=Shares(1.0))
     return Rung("Two parts of one node", made=made)
 
 
 def _one_contact() -> Rung:
     d, normal = spectrum(64, 1e6), np.zeros((128, 1))
     normal[[0, 64]] = [[1.0], [-1.0]]
-    made = solved(frame(d, d, A=sp.csc_array(normal)), seed=11, shares=Shares(1.0))
+    made = manufacture(exact_model(d, d, A=sp.csc_array(normal)), seed=11, shares=Shares(1.0))
     return Rung("Two parts of 64 nodes, one contact", made=made)
 
 
@@ -63,7 +66,7 @@ def _many_contacts() -> Rung:
     random = np.random.default_rng(12)
     A = sp.csc_array(np.hstack([np.eye(8), random.choice([-1.0, 1.0], (8, 4))]))
     d = spectrum(8, 1e3)
-    made = Made(frame(d, A=A).assembly(), LoadCase(np.ones(8), np.zeros(12)))
+    made = ManufacturedProblem(exact_model(d, A=A).assembly(), LoadCase(np.ones(8), np.zeros(12)))
     return Rung("More contacts than unknowns", made=made, refused="must not depend on the columns before it")
 
 

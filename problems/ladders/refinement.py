@@ -1,4 +1,4 @@
-"""Two plates of one size with ever more nodes along it: cond(K) grows like the fourth power."""
+"""Two plates of fixed size with ever more nodes along x: cond(K) grows with the fourth power."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from functools import partial
 
 from problems.manufactured.ladder import Ladder, Rung, plates
 
-from .parts import FASTENERS, GAP, HELD, JUNCTION
+from .parts import CLAMPED_PART, FASTENERS, GAP, JUNCTION
 
 
 def _rung(nodes: int) -> Rung:
-    parts = [HELD | {"name": "wing"}, HELD | {"name": "fragment"}]
+    parts = [CLAMPED_PART | {"name": "wing"}, CLAMPED_PART | {"name": "fragment"}]
     joint = {"junction": JUNCTION | {"nodes": (nodes, 3)}, "part": parts}
     return plates(f"Two plates, {nodes} × 3 nodes", joint, GAP, FASTENERS)
 

@@ -1,4 +1,4 @@
-"""A clamped plate and one on four springs that grow ever weaker."""
+"""A clamped plate, and one on four ever softer springs."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from functools import partial
 
 from problems.manufactured.ladder import Ladder, Rung, plates
 
-from .parts import FASTENERS, GAP, HELD, JUNCTION
+from .parts import CLAMPED_PART, FASTENERS, GAP, JUNCTION
 
 POINTS = ((100.0, 0.0), (900.0, 0.0), (100.0, 300.0), (900.0, 300.0))
 
 
 def _rung(stiffness: float) -> Rung:
-    parts = [{"name": "on springs", "thickness": 6.0}, HELD | {"name": "clamped"}]
+    parts = [{"name": "on springs", "thickness": 6.0}, CLAMPED_PART | {"name": "clamped"}]
     springs = {"kind": "supports", "part": "on springs", "points": POINTS, "stiffness_per_point": stiffness}
     title = f"A plate on springs of {stiffness:g} N/mm"
     return plates(title, {"junction": JUNCTION, "part": parts}, springs, GAP, FASTENERS)

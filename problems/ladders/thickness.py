@@ -1,4 +1,4 @@
-"""Two plates, the second ever thicker: its stiffness, and with it cond(K), grows with the cube."""
+"""Two plates, the second ever thicker: its stiffness, and with it cond(K), grows with its cube."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from functools import partial
 
 from problems.manufactured.ladder import Ladder, Rung, plates
 
-from .parts import FASTENERS, GAP, HELD, JUNCTION
+from .parts import CLAMPED_PART, FASTENERS, GAP, JUNCTION
 
 
 def _rung(times: int) -> Rung:
-    parts = [HELD | {"name": "thin"}, HELD | {"name": "thick", "thickness": 6.0 * times}]
+    parts = [CLAMPED_PART | {"name": "thin"}, CLAMPED_PART | {"name": "thick", "thickness": 6.0 * times}]
     title = f"A plate of 6 mm and one of {6 * times} mm"
     return plates(title, {"junction": JUNCTION, "part": parts}, GAP, FASTENERS)
 

@@ -1,6 +1,6 @@
-"""The same problem in other units, and with its unknowns and contacts each in a unit of its own.
+"""The same problem in other units, and with a separate unit for each unknown and contact.
 
-Powers of two stand for the thousands (1024 mm for a metre), so that nothing is rounded.
+Powers of two replace the thousands (1024 mm for a metre), so that nothing is rounded.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Vector
-from problems.manufactured.exact import frame, solved, spectrum
-from problems.manufactured.ladder import Ladder, Made, Rung
+from problems.manufactured.exact import exact_model, manufacture, spectrum
+from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
 
-N = 64  # unknowns a part
+N = 64  # unknowns per part
 CONDITION = 1e6
 KILO, MEGA = 2.0**10, 2.0**20
 
 
-def _problem() -> Made:
+def _problem() -> ManufacturedProblem:
     d = spectrum(N, CONDITION)
-    return solved(frame(d, d), seed=5)
+    return manufacture(exact_model(d, d), seed=5)
 
 
 def _rung(title: str, S: Vector | float = 1.0, C: Vector | float = 1.0, v: float = 1.0) -> Rung:
@@ -35,7 +35,9 @@ def _random(title: str, unknowns: int, contacts: int) -> Rung:
     return _rung(title, S, np.exp2(random.integers(-contacts, contacts + 1, N)))
 
 
-def rescaled(made: Made, S: Vector | float, C: Vector | float, v: float) -> Made:
+def rescaled(
+    made: ManufacturedProblem, S: Vector | float, C: Vector | float, v: float
+) -> ManufacturedProblem:
     """In x' = S⁻¹x, λ' = C⁻¹λ/v: K' = SKS/v, A' = SAC, f' = Sf/v, g' = Cg. S, C and v powers of two."""
     assert made.x is not None
     assert made.lam is not None
@@ -46,7 +48,7 @@ def rescaled(made: Made, S: Vector | float, C: Vector | float, v: float) -> Made
     A = sp.csc_array(sp.diags_array(S) @ made.assembly.A @ sp.diags_array(C))
     load = LoadCase(S * made.load.f / v, C * made.load.g)
     assembly = Assembly(blocks, A, None, made.assembly.parts)
-    return Made(assembly, load, made.x / S, made.lam / (C * v), S.copy(), 1 / C)
+    return ManufacturedProblem(assembly, load, made.x / S, made.lam / (C * v), S.copy(), 1 / C)
 
 
 RUNGS: Ladder = {
@@ -55,7 +57,7 @@ RUNGS: Ladder = {
     "mm-MN": partial(_rung, "mm and 1024² N", v=MEGA),
     "m-N": partial(_rung, "1024 mm and N", S=KILO, C=1 / KILO, v=KILO),
     "um-N": partial(_rung, "1/1024 mm and N", S=1 / KILO, C=KILO, v=1 / KILO),
-    "unknowns": partial(_random, "each unknown in a unit of its own, 1/16 to 16 mm", 4, 0),
-    "contacts": partial(_random, "each contact in a unit of its own, 1/1024 to 1024 mm", 0, 10),
-    "both": partial(_random, "each unknown and contact in a unit of its own", 4, 10),
+    "unknowns": partial(_random, "each unknown in its own unit, 1/16 to 16 mm", 4, 0),
+    "contacts": partial(_random, "each contact in its own unit, 1/1024 to 1024 mm", 0, 10),
+    "both": partial(_random, "each unknown and contact in its own unit", 4, 10),
 }

@@ -1,4 +1,4 @@
-"""The load cases of a series: many f and g on one assembly, each made when it is asked for."""
+"""The load cases of a series: many f and g on one assembly, each made on demand."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ class LoadCases(ABC):
     @property
     @abstractmethod
     def key(self) -> str:
-        """Hash of everything that determines case k, whatever the count."""
+        """Hash of everything that determines the cases, except their count."""
 
     @abstractmethod
     def load(self, k: int) -> LoadCase:
         """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
 
     def only(self, numbers: Sequence[int]) -> LoadCases:
-        """What is needed of it for these cases, to send it elsewhere. Their numbers stay."""
+        """The data of these cases alone, for a worker. They keep their numbers."""
         return self
 
     def parameters(self, k: int) -> dict[str, float | str]:
-        """What sets case k apart, for its row."""
+        """What distinguishes case k, for its row."""
         return {}

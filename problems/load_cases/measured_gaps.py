@@ -1,4 +1,4 @@
-"""Load cases with measured gaps: a table of a row a case and a column a contact, in mm."""
+"""Load cases with measured gaps: a table with one row per case and one column per contact, mm."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from problems.storage.cache import digest
 from .base import LoadCases
 
 ALLOWED = "every gap must be a finite number, in mm"
-FAULTS = 10  # named; the rest is counted
+MAX_FAULTS = 10  # reported one by one; the rest are counted
 ROWS_AT_A_TIME = 256
 
 
 @dataclass(frozen=True)
 class MeasuredGaps(LoadCases):
-    """Case k is the scene with a row of the table in place of its gaps.
+    """Case k is the scene with its gaps replaced by a row of the table.
 
-    gaps : (rows, m) mm. numbers : the cases that the rows are, where they are not 0, 1, 2, …
+    gaps : (rows, m) mm. numbers : the case numbers of the rows, unless 0, 1, 2, …
     """
 
     forces: LoadCase
@@ -37,11 +37,11 @@ class MeasuredGaps(LoadCases):
 
     @property
     def key(self) -> str:
-        """Of the width alone: a table may grow while it is being solved, and each case has its own hash."""
+        """Hash of the width alone: a table may grow during a series, and each case has its own hash."""
         return digest("table", self.gaps.shape[1])
 
     def parameters(self, k: int) -> dict[str, float | str]:
-        """The hash of its gaps, by which a row that has changed since is found."""
+        """The hash of its gaps, which reveals a row that has changed since."""
         return {"gaps": digest(np.ascontiguousarray(self._row(k)).tobytes())}
 
     def load(self, k: int) -> LoadCase:
@@ -58,8 +58,8 @@ class MeasuredGaps(LoadCases):
 def measured_gaps(scene: Scene, path: Path, count: int | None = None) -> MeasuredGaps:
     """The first `count` rows, or all, of a .csv (numbers; # begins a comment), .npz or .npy.
 
-    Of an .npz the array `gaps` is taken, or the only one; an .npy is memory-mapped, the others are read
-    whole. Raises InputError that names the cases that cannot be used.
+    An .npz must hold an array `gaps`, or a single array; an .npy is memory-mapped, the others are read into
+    memory. Raises InputError naming the cases with faults.
     """
     gaps = _read(path)
     if isinstance(scene, JointScene):
@@ -68,14 +68,16 @@ def measured_gaps(scene: Scene, path: Path, count: int | None = None) -> Measure
     forces = load_case(scene)
     m = len(forces.g)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
-        raise InputError.one(path, "shape", gaps.shape, f"a row a case and a column for each of {m} contacts")
+        raise InputError.one(
+            path, "shape", gaps.shape, f"one row per case, one column for each of {m} contacts"
+        )
     if count is not None and count > len(gaps):
         raise InputError.one("--cases", "cases", count, f"{path} has {len(gaps)} rows")
     faults = list(_faults(path, gaps))
     if faults:
-        more = len(faults) - FAULTS
+        more = len(faults) - MAX_FAULTS
         rest = [Fault(str(path), "cases", f"{more} more", ALLOWED)] if more > 0 else []
-        raise InputError(faults[:FAULTS] + rest)
+        raise InputError(faults[:MAX_FAULTS] + rest)
     return MeasuredGaps(forces, gaps, len(gaps) if count is None else count)
 
 
@@ -93,7 +95,7 @@ def _read(path: Path) -> Matrix:
     try:
         match path.suffix:
             case ".csv":
-                # What is no number becomes NaN, as what is missing is, and is named with its case.
+                # Invalid and missing entries become NaN, which is reported with its case.
                 table = pd.read_csv(path, header=None, comment="#", low_memory=False)
                 return table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
             case ".npy":
@@ -102,7 +104,7 @@ def _read(path: Path) -> Matrix:
                 with np.load(path) as archive:
                     (name,) = ["gaps"] if "gaps" in archive.files else archive.files
                     return _real(archive[name])
-    except Exception as error:  # pandas, numpy and zipfile raise kinds of their own
+    except Exception as error:  # pandas, numpy and zipfile raise their own kinds
         said = f"{type(error).__name__}: {error}"
         raise InputError.one(path, "file", said, "a readable table of numbers") from error
     raise InputError.one(path, "file", path.suffix, "a .csv, .npz or .npy")

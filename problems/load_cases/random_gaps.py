@@ -19,13 +19,13 @@ from problems.storage.cache import digest
 
 from .base import LoadCases
 
-#: The bits of a case's seed: so many are exact in every reader of JSON.
+#: The bits of a case's seed: integers of this size are exact in every JSON reader.
 SEED_BITS = 53
 
 
 @dataclass(frozen=True)
 class RandomGaps(LoadCases):
-    """Case k is the scene with its `initial_gap` drawn anew, with a seed made of (seed, k).
+    """Case k is the scene with its `initial_gap` drawn anew, with a seed derived from (seed, k).
 
     rest : the scene's forces and its other gaps. field : the `initial_gap`.
     """
@@ -60,9 +60,10 @@ def random_gaps(
     sd: float | None = None,
     correlation_length: float | None = None,
 ) -> RandomGaps:
-    """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) go before what it says.
+    """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) override its values.
 
-    Raises InputError where neither says them, or the scene has no joint or more than one `initial_gap`.
+    Raises InputError if one of them is given by neither, or if the scene has no joint or more than one
+    `initial_gap`.
     """
     where = f"scene {scene.name}"
     if not isinstance(scene, JointScene):
@@ -72,13 +73,13 @@ def random_gaps(
     if len(found) > 1:
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     own = found[0].random if found else None
-    said = {
+    from_scene = {
         "mean": found[0].mean if found else None,
         "sd": own.sd if own else None,
         "correlation_length": own.correlation_length if own else None,
     }
-    asked = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    given = said | {key: value for key, value in asked.items() if value is not None}
+    from_options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
+    given = from_scene | {key: value for key, value in from_options.items() if value is not None}
     missing = [
         Fault(where, key, None, f"is not in the scene: give --{key.replace('_', '-')}, in mm")
         for key, value in given.items()

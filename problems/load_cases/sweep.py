@@ -20,7 +20,7 @@ from problems.storage.cache import digest
 
 from .base import LoadCases
 
-FORM = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
+SYNTAX = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
 
 
 NOTHING, OTHER = "the scene has no force or gap to sweep", "what changes K would be another assembly"
@@ -28,7 +28,7 @@ NOTHING, OTHER = "the scene has no force or gap to sweep", "what changes K would
 
 @dataclass(frozen=True)
 class Step:
-    """One --sweep: the key as it was written, the effect and the keys in it, the values."""
+    """One --sweep: the key as written, the index of the effect and the keys in it, and the values."""
 
     name: str
     effect: int
@@ -38,7 +38,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Sweep(LoadCases):
-    """All combinations of the steps' values, the last one running fastest."""
+    """All combinations of the steps' values, the last step varying fastest."""
 
     scene: JointScene
     steps: tuple[Step, ...]
@@ -60,7 +60,7 @@ class Sweep(LoadCases):
 
 
 def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
-    """The cases of some --sweep options. Raises InputError with everything that is wrong."""
+    """The cases of some --sweep options. Raises InputError with all faults."""
     if not isinstance(scene, JointScene):
         raise InputError.one("--sweep", "key", ", ".join(texts), f"{NOTHING}; {OTHER}")
     faults: list[Fault] = []
@@ -84,13 +84,13 @@ def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
 
 
 def effect_name(scene: JointScene, index: int) -> str:
-    """initial_gap, or pressure.0 and pressure.1 where there are several."""
+    """initial_gap, or pressure.0 and pressure.1 if there are several."""
     kind = scene.effects[index].kind
     alike = [i for i, effect in enumerate(scene.effects) if effect.kind == kind]
     return kind if len(alike) == 1 else f"{kind}.{alike.index(index)}"
 
 
-def _makes_K(scene: JointScene, index: int) -> bool:
+def _changes_K(scene: JointScene, index: int) -> bool:
     """Whether K or A depends on an effect."""
     if isinstance(scene.effects[index], TieEffect):
         return True
@@ -102,9 +102,9 @@ def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
     name, equals, values = text.partition("=")
     numbers = _values(values)
     if not equals or not numbers:
-        faults.append(Fault("--sweep", "sweep", text, FORM))
+        faults.append(Fault("--sweep", "sweep", text, SYNTAX))
         return None
-    effects = {effect_name(scene, i): i for i in range(len(scene.effects)) if not _makes_K(scene, i)}
+    effects = {effect_name(scene, i): i for i in range(len(scene.effects)) if not _changes_K(scene, i)}
     keys = {
         f"{prefix}.{'.'.join(path)}": Step(name, i, path, numbers)
         for prefix, i in effects.items()
@@ -128,7 +128,7 @@ def _numbers(table: dict[str, Any]) -> list[tuple[str, ...]]:
 
 
 def _values(text: str) -> tuple[float, ...]:
-    """The values of 0.1:1.0:10 or of 0.1,0.5,1; none where it is neither."""
+    """The values of 0.1:1.0:10 or of 0.1,0.5,1; empty if it is neither."""
     try:
         if ":" in text:
             first, last, count = text.split(":")
@@ -141,7 +141,7 @@ def _values(text: str) -> tuple[float, ...]:
 
 
 def _changed(effect: Any, step: Step, value: float) -> Any:
-    """The effect with one number changed, checked as when it is read."""
+    """The effect with one number changed, validated as on reading."""
     table = copy.deepcopy(effect.model_dump())
     inner = table
     for key in step.keys[:-1]:

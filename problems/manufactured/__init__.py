@@ -1,1 +1,1 @@
-"""Problems whose answers are known without a solver, and the ladders made of them."""
+"""Manufactured problems, with solutions known without a solver, and the ladders made of them."""

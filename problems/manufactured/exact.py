@@ -1,12 +1,12 @@
-"""Problems whose spectrum and answer are exact: nothing in them is rounded.
+"""Manufactured problems with an exact spectrum and an exact solution: nothing in them is rounded.
 
 With the Hadamard matrix H (n, n), Hᵀ = H, HH = nI, entries ±1 and n a power of two,
 
-    K = HDH/n,  D = diag(d) of whole numbers,    x = Hc, c whole,    Kx = H(Dc),
+    K = HDH/n,  D = diag(d) of integers,    x = Hc, c integer,    Kx = H(Dc),
 
-so K has the eigenvalues d, and all entries and partial sums are whole numbers. With λ ≥ 0 and y ≥ 0,
-λᵢyᵢ = 0, on the same grid, f = Kx + Aλ and g = Aᵀx + y hold in float64 as they stand, as long as no sum
-passes 2⁵³: x and λ are the answer, without an error. All is multiplied by powers of two at the end.
+so K has the eigenvalues d, and all entries and partial sums are integers. With λ ≥ 0 and y ≥ 0, λᵢyᵢ = 0,
+on the same grid, f = Kx + Aλ and g = Aᵀx + y hold exactly in float64 as long as no sum exceeds 2⁵³: x and λ
+are the exact solution. Finally everything is scaled by powers of two.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 
-from .ladder import Made
+from .ladder import ManufacturedProblem
 
 STIFFNESS = 64.0  # N/mm: the smallest eigenvalue of K
 
@@ -28,17 +28,17 @@ Random = np.random.Generator
 
 @dataclass(frozen=True)
 class Shares:
-    """Of the contacts: those closed with a force, and those that touch without one (λᵢ = yᵢ = 0)."""
+    """Fractions of the contacts: closed with a force, and weakly active (λᵢ = yᵢ = 0)."""
 
     closed: float = 0.4
     weak: float = 0.0
 
 
 @dataclass(frozen=True)
-class Frame:
-    """K and A in whole numbers times a power of two, and the grid that answers are chosen on.
+class ExactModel:
+    """K and A as integers times a power of two, and the grid of the solutions.
 
-    d : the eigenvalues of each block of K, whole. A : (n, m). length : mm, force : N, of one step.
+    d : the eigenvalues of each block of K, integers. A : (n, m). length : mm, force : N, of one grid step.
     """
 
     d: tuple[Vector, ...]
@@ -57,36 +57,36 @@ class Frame:
 
 
 def spectrum(n: int, condition: float) -> Vector:
-    """n whole numbers from 1 to about `condition`, evenly spread by their logarithms."""
+    """n integers from 1 to about `condition`, evenly spaced on a logarithmic scale."""
     return np.round(np.geomspace(1.0, condition, n))
 
 
-def frame(*d: Vector, A: sp.csc_array | None = None) -> Frame:
-    """Parts with these eigenvalues; where no A is given, two equal parts in contact at every node.
+def exact_model(*d: Vector, A: sp.csc_array | None = None) -> ExactModel:
+    """Parts with these eigenvalues; by default A is for two equal parts in contact at every node.
 
-    One step is so fine that a force of STIFFNESS · 1 mm moves the stiffest mode by one.
+    A grid step is so fine that a force of STIFFNESS · 1 mm moves the stiffest mode by one step.
     """
     if A is None:
         one = sp.eye_array(len(d[0]))
         A = sp.csc_array(sp.vstack([one, -one]))
     length = 2.0 ** -np.ceil(np.log2(max(part.max() for part in d)))
-    return Frame(d, A, length, STIFFNESS * length)
+    return ExactModel(d, A, length, STIFFNESS * length)
 
 
-def solved(base: Frame, seed: int, shares: Shares | None = None) -> Made:
-    """A load whose answer is chosen: forces of one size in all modes, gaps up to about 0.5 mm."""
+def manufacture(model: ExactModel, seed: int, shares: Shares | None = None) -> ManufacturedProblem:
+    """A problem with a prescribed solution: forces of similar size in all modes, gaps up to about 0.5 mm."""
     random = np.random.default_rng(seed)
-    parts = [_modes(random, d, base.largest) for d in base.d]
+    parts = [_modes(random, d, model.largest) for d in model.d]
     x, Kx = np.concatenate([x for x, _ in parts]), np.concatenate([Kx for _, Kx in parts])
-    lam, y = _contacts(random, base, shares or Shares())
-    return from_answer(base, x, Kx, lam, y)
+    lam, y = _contacts(random, model, shares or Shares())
+    return from_solution(model, x, Kx, lam, y)
 
 
-def from_answer(base: Frame, x: Vector, Kx: Vector, lam: Vector, y: Vector) -> Made:
-    """The problem that x, λ and the gaps y answer, all in steps of the grid."""
-    f, g = Kx + base.A @ lam, base.A.T @ x + y
-    load = LoadCase(f * base.force, g * base.length)
-    return Made(base.assembly(), load, x * base.length, lam * base.force)
+def from_solution(model: ExactModel, x: Vector, Kx: Vector, lam: Vector, y: Vector) -> ManufacturedProblem:
+    """The problem with the solution x, λ and the gaps y, all in grid steps."""
+    f, g = Kx + model.A @ lam, model.A.T @ x + y
+    load = LoadCase(f * model.force, g * model.length)
+    return ManufacturedProblem(model.assembly(), load, x * model.length, lam * model.force)
 
 
 def _stiffness(d: Vector) -> Matrix:
@@ -95,16 +95,16 @@ def _stiffness(d: Vector) -> Matrix:
 
 
 def _modes(random: Random, d: Vector, force: float) -> tuple[Vector, Vector]:
-    """x and Kx of a part with a force of half to all of `force`, either way, in each of its modes."""
+    """x and Kx of a part with a force of ±½ to ±1 times `force` in each of its modes."""
     H = sla.hadamard(len(d), dtype=float)
     share = random.integers(128, 256, len(d)) / 256
     c = np.where(random.random(len(d)) < 0.5, -1.0, 1.0) * np.round(share * force / d)
     return H @ c, H @ (d * c)
 
 
-def _contacts(random: Random, base: Frame, shares: Shares) -> tuple[Vector, Vector]:
-    """λ up to STIFFNESS · 1 mm and gaps up to half a millimetre, in steps."""
-    m, largest = base.A.shape[1], int(base.largest)
+def _contacts(random: Random, model: ExactModel, shares: Shares) -> tuple[Vector, Vector]:
+    """λ up to STIFFNESS · 1 mm and gaps up to half a millimetre, in grid steps."""
+    m, largest = model.A.shape[1], int(model.largest)
     kind = random.permutation(m)
     closed, weak = round(shares.closed * m), round(shares.weak * m)
     lam = random.integers(max(largest // 8, 1), largest + 1, m).astype(float)

@@ -1,7 +1,7 @@
-"""Ladders: problems that grow harder rung by rung, to see where a solver breaks and whether it says so.
+"""Ladders: problems that grow harder rung by rung, to see where a solver fails and whether it reports that.
 
 A ladder is a file of problems/ladders with RUNGS, its rungs by name, the easiest first; each is a function
-that makes one, the same at every call. A rung is a scene, `hard/<ladder>/<rung>`.
+that makes the same rung at every call. A rung is a scene, `hard/<ladder>/<rung>`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from problems.forms.made import Made
+from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.model.effect import Effect, effect_class
 from problems.model.joint import Joint
 
@@ -22,20 +22,20 @@ PREFIX = "hard/"
 
 @dataclass(frozen=True, eq=False)
 class Rung:
-    """A joint with its effects, or what was made in its place.
+    """A joint with its effects, or a manufactured problem instead.
 
-    refused : words of the InputError by which the model refuses the problem; "" where it takes it.
+    refused : part of the InputError with which the model refuses the problem; "" if it accepts it.
     """
 
     title: str
     joint: Joint | None = None
     effects: tuple[Effect, ...] = ()
-    made: Made | None = None
+    made: ManufacturedProblem | None = None
     refused: str = ""
 
 
 def plates(title: str, joint: dict[str, Any], *effects: dict[str, Any], refused: str = "") -> Rung:
-    """A rung of plates: the tables of a scene's file."""
+    """A rung of plates, from the tables of a scene file."""
     checked = tuple(effect_class(table["kind"]).model_validate(table) for table in effects)
     return Rung(title, Joint.model_validate(joint), checked, refused=refused)
 
@@ -44,7 +44,7 @@ Ladder = Mapping[str, Callable[[], Rung]]
 
 
 def ladder_names() -> list[str]:
-    """The ladders: the files of problems/ladders."""
+    """All ladders: the files of problems/ladders."""
     package = importlib.import_module("problems.ladders")
     return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
 
@@ -56,7 +56,7 @@ def rung_names() -> list[str]:
 
 @cache
 def make_rung(name: str) -> Rung:
-    """The rung of a name out of `rung_names`."""
+    """The rung with a name of `rung_names`."""
     ladder, rung = name.removeprefix(PREFIX).split("/")
     return _rungs(ladder)[rung]()
 

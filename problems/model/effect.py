@@ -1,4 +1,4 @@
-"""What an effect is: its parameters, and the one term that it adds.
+"""What an effect is: its parameters and the term that it adds.
 
 An effect `kind = "some_effect"` in a scene is the class SomeEffect of problems/effects/some_effect.py.
 Its module is imported only when a scene names it.
@@ -6,8 +6,8 @@ Its module is imported only when a scene names it.
     StiffnessEffect   to the stiffness of one part, before condensation
     ForceEffect       forces on the junction nodes
     PartLoadEffect    a load anywhere on one part, condensed onto its junction nodes
-    GapEffect         to the initial gap; it may bring the contact that it is about
-    TieEffect         springs between the junction nodes of two parts, and the forces they were set with
+    GapEffect         to the initial gap; it may add the contact that it acts on
+    TieEffect         springs between the junction nodes of two parts, and their installation forces
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 Pair = tuple[str, str]
 Range = tuple[float, float]
 
-#: A contact, or None for all. None stays out of a scene's key: it is as if the parameter did not exist.
+#: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
 
-#: What somebody may look for, and why the model has no place for it.
+#: Effects that a user may look for, and the assumption of the model that excludes each.
 EXCLUDED = {
     "friction": "assumption 4: friction between the parts is neglected",
-    "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
-    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements are left",
+    "tangential": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
+    "sliding": "assumption 2: fasteners hold the parts tangentially, only normal displacements remain",
     "large_displacement": "assumption 5: linear elasticity, so displacements and rotations are small",
     "large_rotation": "assumption 5: linear elasticity, so displacements and rotations are small",
     "plasticity": "assumption 5: linear elasticity",
@@ -60,15 +60,15 @@ class Effect(Table):
 
     @property
     def contacts(self) -> tuple[Pair, ...]:
-        """Pairs that are in contact because of this effect."""
+        """The contacts that this effect adds."""
         return ()
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """(key, value, what is allowed) of whatever does not fit the joint."""
+        """(key, value, what is allowed) for each parameter that does not fit the joint."""
         yield from ()
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """The same of whatever contradicts the scene's other effects."""
+        """The same for each contradiction to the other effects of the scene."""
         yield from ()
 
 
@@ -79,12 +79,12 @@ class StiffnessEffect(Effect):
 
     @property
     def held_points(self) -> tuple[tuple[float, float], ...]:
-        """Where the effect keeps the part from floating away."""
+        """The points at which the effect supports the part."""
         return ()
 
     @property
     def pad(self) -> tuple[float, Range, Range] | None:
-        """Thickness, range of x and range of y, in mm, of an area that the effect makes as thick as that."""
+        """Thickness, x range and y range, mm, of an area whose thickness the effect sets."""
         return None
 
     @abstractmethod
@@ -103,7 +103,7 @@ class ForceEffect(Effect):
         """(n,) forces in N, positive from the first part of a pair towards the second."""
 
     def marks(self, joint: Joint) -> Matrix:
-        """(k, 2) points in mm that a picture of the junction should mark."""
+        """(k, 2) points to mark in figures of the junction, mm."""
         return np.zeros((0, 2))
 
 
@@ -120,7 +120,7 @@ class TieEffect(ForceEffect):
 
     @abstractmethod
     def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
-        """T (n, r) with a spring's direction in each column, and k (r,) in N/mm."""
+        """T (n, r), one column per spring with its direction, and k (r,) in N/mm."""
 
 
 class PartLoadEffect(Effect):
@@ -130,7 +130,7 @@ class PartLoadEffect(Effect):
 
     @abstractmethod
     def load(self, model: PartModel) -> Vector:
-        """(plate.size,) work of the load on each degree of freedom: N, N·mm, N·mm²."""
+        """(plate.size,) generalised force on each degree of freedom: N, N·mm, N·mm²."""
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from unknown_part(self.part, joint)
@@ -142,13 +142,13 @@ def pairs_of(between: Pair | None, joint: Joint) -> tuple[Pair, ...]:
 
 
 def contacts_of(pair: Pair, joint: Joint) -> slice:
-    """Where the contacts of a pair stand in g and λ."""
+    """The contacts of a pair, as a slice of g and λ."""
     start = joint.pairs.index(pair) * joint.node_count
     return slice(start, start + joint.node_count)
 
 
-def pressed(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
-    """f (n,) of forces (node_count,) in N that press the two parts of each contact together."""
+def pressing_forces(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
+    """f (n,) for nodal forces (node_count,), N, that press the two parts of each contact together."""
     f = np.zeros(joint.size[0])
     for first, second in pairs_of(between, joint):
         f[joint.unknowns(first)] += nodal
@@ -158,10 +158,12 @@ def pressed(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
 
 
 def unknown_pair(between: Pair | None, joint: Joint) -> Iterator[tuple[str, object, str]]:
-    """What is wrong with the contact of an effect that acts on contacts."""
+    """The faults of `between`, for an effect that acts on contacts."""
     if not joint.pairs:
         only = joint.part[0].name
-        allowed = f'needs a contact, and part {only} is alone: add a part, a rigid_tool or "tool" in contacts'
+        allowed = (
+            f'needs a contact, but {only} is the only part: add a part, a rigid_tool or "tool" in contacts'
+        )
         yield "between", between, allowed
     elif between is not None and between not in joint.pairs:
         yield "between", list(between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
@@ -174,12 +176,12 @@ def unknown_part(part: str, joint: Joint) -> Iterator[tuple[str, object, str]]:
 
 
 def effect_kinds() -> list[str]:
-    """The kinds there are: the files of problems/effects."""
+    """All kinds: the files of problems/effects."""
     package = importlib.import_module("problems.effects")
     return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
 
 
 def effect_class(kind: str) -> type[Effect]:
-    """The class of a kind, imported now. Raises ModuleNotFoundError if there is no such kind."""
+    """The class of a kind, imported on demand. Raises ModuleNotFoundError if there is no such kind."""
     module = importlib.import_module(f"problems.effects.{kind}")
     return getattr(module, kind.title().replace("_", ""))

@@ -1,4 +1,4 @@
-"""The tables [[effect]] of a scene, each read into its effect, and everything that is wrong with them."""
+"""The [[effect]] tables of a scene, read into effects, and all their faults."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 
 @dataclass
 class EffectTable:
-    """A table, where it stands, its effect (None if it is none), and the rows of the files that it names.
+    """A table, its file and index, its effect (None if invalid), and the rows of the files that it names.
 
-    A file with bad rows leaves an effect of the good ones: these and the other parameters are checked.
+    If a file has bad rows, the effect is made of the good ones, so that these and the other parameters are
+    still checked.
     """
 
     where: Path
@@ -34,7 +35,7 @@ class EffectTable:
     files: list[Rows] = field(default_factory=list)
 
     def read(self) -> Iterator[Fault]:
-        """Make the effect; what is wrong with the table by itself."""
+        """Make the effect; yields the faults of the table by itself."""
         kind = self.content.get("kind")
         if kind not in effect_kinds():
             allowed = unknown("effect", kind, effect_kinds())
@@ -49,13 +50,13 @@ class EffectTable:
         except ValidationError as error:
             units = UNITS | effect.units
             for fault in validation_faults(self.where, effect, error, self._name, units):
-                if not self._follows(fault.key.removeprefix(self._name).lstrip(".")):
+                if not self._is_consequence(fault.key.removeprefix(self._name).lstrip(".")):
                     yield fault
         for rows in self.files:
             yield from rows.faults
 
     def misfits(self, joint: Joint) -> Iterator[Fault]:
-        """What does not fit the joint."""
+        """The faults with respect to the joint."""
         found: Iterator[tuple[str, object, str]] = iter(())
         if self.effect is not None:
             found = self.effect.faults(joint)
@@ -64,7 +65,7 @@ class EffectTable:
         yield from self._faults(found)
 
     def conflicts(self, others: Sequence[EffectTable], joint: Joint) -> Iterator[Fault]:
-        """What contradicts the other effects."""
+        """The contradictions to the other effects."""
         if self.effect is not None:
             effects = [other.effect for other in others if other.effect is not None]
             yield from self._faults(self.effect.conflicts(effects, joint))
@@ -75,13 +76,13 @@ class EffectTable:
         return f"effect[{self.index}]" + (f" ({kind})" if kind else "")
 
     def _faults(self, found: Iterator[tuple[str, object, str]]) -> Iterator[Fault]:
-        """The faults of parameters; those of a file's rows by their lines."""
+        """The faults of parameters; those of a file's rows are located by line."""
         for key, value, allowed in found:
             lines = [line for rows in self.files if (line := rows.line(key))]
             where, name = lines[0] if lines else (str(self.where), f"{self._name}.{key}")
-            if not self._follows(key):
+            if not self._is_consequence(key):
                 yield Fault(where, name, value, allowed)
 
-    def _follows(self, key: str) -> bool:
-        """Whether a fault of a whole field, or of the whole table, may follow from bad rows of a file."""
+    def _is_consequence(self, key: str) -> bool:
+        """Whether a fault of a whole field, or of the whole table, may result from bad rows of a file."""
         return any(rows.faults and key in ("", rows.field) for rows in self.files)

@@ -1,4 +1,4 @@
-"""The joint: the junction strip, the parts that meet there, and which of them touch.
+"""The joint: the junction strip, the parts that meet there, and the contacts between them.
 
 y = width + north.length   ┌──────────────┐   far edge, may be clamped
                            │   fragment   │
@@ -50,7 +50,7 @@ class Extension(Table):
 
 
 class Part(Table):
-    """A plate with the junction strip and an extension to either side.
+    """A plate: the junction strip and an optional extension on either side.
 
     thickness in mm, young in N/mm²; clamped names the far edges where the part is built in.
     """
@@ -73,7 +73,7 @@ class Joint(Table):
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """The contacts; where none are given, each part against the next one; none of a part alone."""
+        """The contacts; by default each part with the next one, so none if there is one part."""
         names = [part.name for part in self.part]
         return self.contacts or tuple(itertools.pairwise(names))
 
@@ -102,7 +102,7 @@ class Joint(Table):
         return np.column_stack([X.ravel(), Y.ravel()])
 
     def unknowns(self, part: str) -> slice:
-        """Where the part's displacements stand in x."""
+        """The part's displacements, as a slice of x."""
         index = [p.name for p in self.part].index(part)
         return slice(index * self.node_count, (index + 1) * self.node_count)
 
@@ -135,10 +135,10 @@ class Joint(Table):
         return Plate(self.x, np.concatenate(y), part.thickness, part.young, part.poisson)
 
     def faults(self) -> Iterator[tuple[str, object, str]]:
-        """(key, value, what is allowed) of everything that the types alone cannot catch."""
+        """(key, value, what is allowed) for every fault that the types cannot catch."""
         names = [part.name for part in self.part]
         if len(set(names)) < len(names) or TOOL in names:
-            yield "part.name", names, f'each part has a name of its own, other than "{TOOL}"'
+            yield "part.name", names, f'each part needs a unique name other than "{TOOL}"'
         for part in self.part:
             for edge in part.clamped:
                 if getattr(part, edge) is None:
@@ -146,7 +146,7 @@ class Joint(Table):
         for pair in self.contacts:
             if pair[0] not in names or pair[1] not in (*names, TOOL) or pair[0] == pair[1]:
                 yield "contacts", list(pair), f'two different parts of {names}; the second may be "{TOOL}"'
-        # Q = AᵀK⁻¹A is positive definite only if no contact follows from others.
+        # Q = AᵀK⁻¹A is positive definite only if no contact is implied by others.
         sides = [[(name == a) - (name == b) for name in names] for a, b in self.pairs]
         if self.pairs and np.linalg.matrix_rank(sides) < len(sides):
             yield "contacts", [list(pair) for pair in self.pairs], "no pair twice, no closed chain of pairs"

@@ -1,4 +1,4 @@
-"""Where fastening elements sit: points on the junction, each taken to the node nearest to it."""
+"""Positions of fastening elements: points on the junction, each moved to its nearest node."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, model_validator
 
 from problems.forms.assembly import Matrix, Vector
-from problems.input.csv_table import in_place_of_file
+from problems.input.csv_table import rows_from_file
 
 from .joint import Finite, Joint, Table
 
 
 class Pattern(Table):
-    """columns × rows points, evenly spread over the junction up to `edge` mm from its border."""
+    """columns × rows points, evenly spaced over the junction up to `edge` mm from its border."""
 
     columns: Annotated[int, Field(ge=1)]
     rows: Annotated[int, Field(ge=1)]
@@ -32,12 +32,12 @@ class Positions(Table):
     @model_validator(mode="before")
     @classmethod
     def _from_file(cls, data: Any, info: ValidationInfo) -> Any:
-        return in_place_of_file(data, info, "points", ("x", "y"))
+        return rows_from_file(data, info, "points", ("x", "y"))
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Positions:
+    def _exactly_one(self) -> Positions:
         if bool(self.points) == bool(self.pattern):
-            raise ValueError("give one of points, file and pattern")
+            raise ValueError("give exactly one of points, file and pattern")
         return self
 
     def marks(self, joint: Joint) -> Matrix:
@@ -50,7 +50,7 @@ class Positions(Table):
         return np.column_stack([X.ravel(), Y.ravel()])
 
     def misplaced(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """(key, value, what is allowed) of points that are not on the junction."""
+        """(key, value, what is allowed) for points that are not on the junction."""
         length, width = joint.junction.length, joint.junction.width
         if pattern := self.pattern:
             spread = [size for size, n in ((length, pattern.columns), (width, pattern.rows)) if n > 1]
@@ -73,5 +73,5 @@ class Positions(Table):
 
 
 def _spread(size: float, edge: float, count: int) -> Vector:
-    """count points between edge and size − edge; a single one in the middle."""
+    """`count` points from edge to size − edge; a single one in the middle."""
     return np.linspace(edge, size - edge, count) if count > 1 else np.array([size / 2])

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from problems.forms.assembly import Matrix
-from problems.forms.made import Made
+from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.storage.cache import digest
 
 from .effect import Effect, ForceEffect, StiffnessEffect
@@ -118,7 +118,7 @@ class MatricesScene(Scene):
 class MadeScene(Scene):
     """Matrices that were made in memory: a ladder's rung without plates."""
 
-    made: Made
+    made: ManufacturedProblem
 
     @property
     def assembly_key(self) -> str:

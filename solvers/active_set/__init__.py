@@ -1,1 +1,1 @@
-"""What the active-set methods are made of."""
+"""Building blocks of the active-set methods."""

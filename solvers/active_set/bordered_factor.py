@@ -1,13 +1,13 @@
-"""Solves G_SS u_S = b_S for one set S after another, with one Cholesky factorisation for many of them.
+"""Solves G_SS u_S = b_S for a sequence of sets S; many of them share one Cholesky factorisation.
 
-For the base set B, G_BB = LLᵀ is factored. Another set S = (B \\ R) ∪ E enters as a border: with
-multipliers ν that hold u_R = 0,
+For the base set B, G_BB = LLᵀ is factored. Another set S = (B \\ R) ∪ E adds a border: with
+multipliers ν that enforce u_R = 0,
 
     [ G_BB  W ] [ u_B ]   [ b_B ]          W = [ G_BE  I_R ],    C = [ G_EE  0 ]
     [ Wᵀ    C ] [  v  ] = [  c  ],         v = (u_E, ν),             [  0    0 ],  c = (b_E, 0),
 
 so that (C − ZᵀZ) v = c − Zᵀt with Z = L⁻¹W, t = L⁻¹b_B, and u_B = L⁻ᵀ(t − Zv). Each index is either
-in B or not, so its column of Z serves every later set in which it counts again.
+in B or not, so its column of Z is reused by every later set that needs it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ Set = NDArray[np.bool_]
 
 
 class BorderedFactor:
-    """G : (m, m) symmetric, stored by columns. base : (m,) the set that is factored.
+    """G : (m, m) symmetric, column-major. base : (m,) the factored set.
 
-    Raises LinAlgError where G_BB is not positive definite.
+    Raises LinAlgError if G_BB is not positive definite.
     """
 
     def __init__(self, G: Matrix, base: Set) -> None:
@@ -34,20 +34,20 @@ class BorderedFactor:
         self.rows = np.flatnonzero(base)
         self.L = np.empty((0, 0), order="F")
         if self.rows.size:
-            block = G.T[np.ix_(self.rows, self.rows)].T  # symmetric, and so it is stored by columns
+            block = G.T[np.ix_(self.rows, self.rows)].T  # symmetric, and column-major like G
             self.L, info = lapack.dpotrf(block, lower=1, clean=False, overwrite_a=True)
             if info:
                 raise np.linalg.LinAlgError(f"the leading minor {info} of G_BB is not positive definite")
-        self.column = np.full(len(base), -1)  # of each index in Z
+        self.column = np.full(len(base), -1)  # of Z for each index; −1 if none yet
         self.Z = np.empty((self.rows.size, 0), order="F")
         self.move_to(base)
 
     def changes(self, S: Set) -> int:
-        """The width of the border for S."""
+        """The width of the border that S needs."""
         return int((S ^ self.base).sum())
 
     def move_to(self, S: Set) -> None:
-        """Take S for the solves that follow."""
+        """Use S in the solves that follow."""
         self.S = S
         self.border = np.flatnonzero(S ^ self.base)
         if not self.border.size:
@@ -74,11 +74,11 @@ class BorderedFactor:
             if self.border.size:
                 t = blas.dgemv(-1.0, self.Z_border, v, 1.0, t)
             u[self.rows] = blas.dtrsv(self.L, t, lower=1, trans=1)
-        u[~self.S] = 0.0  # as the multipliers have made it but for rounding
+        u[~self.S] = 0.0  # which the multipliers enforce only up to rounding
         return u
 
     def _extend(self, new: NDArray[np.intp]) -> None:
-        """Columns of Z for indices that have none yet."""
+        """Add columns of Z for indices that have none yet."""
         if not new.size:
             return
         W = np.zeros((self.rows.size, new.size), order="F")

@@ -1,13 +1,13 @@
-"""Constraints that enter and leave the active set, with one factor for many of them.
+"""Constraints that enter and leave the active set; many of these changes share one factorisation.
 
-For the active set C that they start from, G_CC = RᵀR. One that enters, k, and one that leaves, the j-th
-of C, are columns of a border (see bordered_factor.py) with W_k = G_Ck and W_j = e_j; kept of each are
-D = R⁻ᵀW, V = R⁻¹D and its row of S = G_EE − DᵀD, without the first term for those that leave. With E the
-columns that count now, raising u_k by one while the active slacks stay zero changes
+For the initial active set C, G_CC = RᵀR. An entering constraint k and a leaving one, the j-th of C, are
+columns of a border (see bordered_factor.py) with W_k = G_Ck and W_j = e_j. Stored for each are D = R⁻ᵀW,
+V = R⁻¹D and its row of S = G_EE − DᵀD, without the first term for leaving ones. With E the columns
+currently in use, raising u_k by one while the active slacks stay zero changes
 
     u_E by −r_E,  r_E = S_EE⁻¹ S_Ek,    u_C by −r_C,  r_C = V_k − V_E r_E,    s by S_k − S_E r_E:
 
-products with a few columns in the place of two solves with R.
+products with a few columns instead of two solves with R.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Indices = NDArray[np.intp]
 
 
 class Border:
-    """candidates : the constraints that may enter, the first columns. V is stored by rows."""
+    """candidates : the constraints that may enter, the first columns. V is row-major."""
 
     def __init__(self, G: Matrix, C: Indices, factor: GrowingFactor, candidates: Indices) -> None:
         self.C, self.factor = C, factor
@@ -32,35 +32,35 @@ class Border:
         self.D = factor.solve_transposed(G[np.ix_(C, candidates)])
         self.V = np.ascontiguousarray(factor.solve(self.D).T)
         self.S = G[np.ix_(candidates, candidates)] - self.D.T @ self.D
-        self.left: list[int] = []  # positions in C; their columns come after the candidates'
-        self.entered: list[int] = []  # columns of the candidates that are active
+        self.removed: list[int] = []  # positions in C; their columns follow those of the candidates
+        self.added: list[int] = []  # columns of the active candidates
 
     @property
     def active(self) -> Indices:
-        """C, those that left among them, and the candidates that entered."""
-        return np.append(self.C, self.candidates[self.entered])
+        """C, including the removed constraints, then the added candidates."""
+        return np.append(self.C, self.candidates[self.added])
 
     def direction(self, column: int) -> tuple[Vector, Vector]:
-        """(r, ds) for the candidate of that column: r of `active`, ds of the candidates.
+        """(r, ds) for the candidate in `column`: r for `active`, ds for the candidates.
 
-        Raises LinAlgError where the active constraints depend on each other.
+        Raises LinAlgError if the active constraints are linearly dependent.
         """
         n = len(self.candidates)
         r_C, r_E, ds = self.V[column].copy(), np.empty(0), self.S[:n, column]
-        E = self.entered + list(range(n, len(self.S)))
+        E = self.added + list(range(n, len(self.S)))
         if E:
             _, _, r_E, info = lapack.dgesv(self.S[np.ix_(E, E)], self.S[E, column])
             if info:
-                raise np.linalg.LinAlgError("the active constraints depend on each other")
+                raise np.linalg.LinAlgError("the active constraints are linearly dependent")
             r_C -= r_E @ self.V[E]
             ds = ds - self.S[:n, E] @ r_E
-        r_C[self.left] = 0.0
-        return np.append(r_C, r_E[: len(self.entered)]), ds
+        r_C[self.removed] = 0.0
+        return np.append(r_C, r_E[: len(self.added)]), ds
 
     def drop(self, place: int) -> None:
-        """The constraint of that place in `active` is active no longer."""
+        """Remove the constraint at this position of `active`."""
         if place >= len(self.C):
-            del self.entered[place - len(self.C)]
+            del self.added[place - len(self.C)]
         else:
             self._leave(place)
 
@@ -71,4 +71,4 @@ class Border:
         row = -np.append(self.V[:, position], v[position])
         self.S = np.block([[self.S, row[:-1, None]], [row]])
         self.V = np.vstack([self.V, v])
-        self.left.append(position)
+        self.removed.append(position)

@@ -21,18 +21,18 @@ from solvers.linear_algebra.product import product
 from .gi_border import Border
 from .growing_factor import GrowingFactor
 
-#: u → (s, T): the slacks from the original data, and for each the size of its terms.
+#: u → (s, T): the slacks from the original data, and the magnitude of the terms of each.
 Slacks = Callable[[Vector], tuple[Vector, Vector]]
 
-CANDIDATES = 64  # violated constraints looked at between two products with all of G
+CANDIDATES = 64  # violated constraints considered between two products with the whole of G
 MAX_REFINEMENTS = 20
-FAILED_REFINEMENTS = 2  # that do not help, before the method gives up
+FAILED_REFINEMENTS = 2  # without progress, before the method gives up
 EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class GiResult:
-    """u (m,), the active constraints C with the factor of G_CC, and how they were reached."""
+    """u (m,), the active constraints C with the factor of G_CC, and the iteration counts."""
 
     status: Status
     u: Vector
@@ -47,28 +47,28 @@ class GiResult:
 def goldfarb_idnani(G: Matrix, slacks: Slacks, tolerance: float, max_pivots: int) -> GiResult:
     """Solve from u = 0.
 
-    A slack counts as violated when s_k < −max(tolerance, 4ε T_k). Once none is after a refinement, and
-    |s_C| is as small, the pivots go on to what rounding alone explains, 4ε T_k, as long as that helps:
-    beside contacts that say nearly the same, a slack within the tolerance can hide a wrong set.
-    "inaccurate" when refinements no longer help, "iteration_limit" at max_pivots.
+    A slack is violated if s_k < −max(tolerance, 4ε T_k). Once none is after a refinement, and |s_C| is as
+    small, pivoting continues down to the rounding level 4ε T_k as long as this makes progress: with nearly
+    dependent constraints, a slack within the tolerance can hide a wrong set. "inaccurate" if refinement
+    makes no more progress, "iteration_limit" at max_pivots.
     """
     state = _State(G, max_pivots)
-    size = state.refer_to(slacks)  # Algorithm 1, step 2
-    asked, worst, chances = tolerance, np.inf, FAILED_REFINEMENTS
+    size = state.reset_base(slacks)  # Algorithm 1, step 2
+    threshold, worst, attempts_left = tolerance, np.inf, FAILED_REFINEMENTS
     for refinements in range(1, MAX_REFINEMENTS + 1):
-        state.pivot_until_feasible(np.maximum(asked, 4 * EPS * size))  # steps 3 to 12
+        state.pivot_until_feasible(np.maximum(threshold, 4 * EPS * size))  # steps 3 to 12
         if state.pivots >= max_pivots:
             return state.result("iteration_limit", refinements - 1)
         size = state.refine(slacks)
         violation = state.violation(np.maximum(tolerance, 4 * EPS * size))
         if violation == 0.0:
-            asked, violation = 0.0, state.violation(4 * EPS * size)
+            threshold, violation = 0.0, state.violation(4 * EPS * size)
             if violation == 0.0 or violation >= worst:
                 return state.result("solved", refinements)
-        elif violation >= worst and chances == 0:
+        elif violation >= worst and attempts_left == 0:
             cause = f"rounding: a slack of {float(state.base.min()):.1e} remains after refinement"
             return state.result("inaccurate", refinements, cause)
-        chances -= violation >= worst
+        attempts_left -= violation >= worst
         worst = min(worst, violation)
     return state.result("inaccurate", MAX_REFINEMENTS, "refinement does not settle the active set")
 
@@ -76,8 +76,8 @@ def goldfarb_idnani(G: Matrix, slacks: Slacks, tolerance: float, max_pivots: int
 class _State:
     """Multipliers u, the active set C in the order of the factor, and the counts.
 
-    base : the slacks of the multipliers u_base, from the original data; s = base + G(u − u_base), so that
-    the rounding of G weighs on what has changed since alone.
+    base : the slacks at u_base, from the original data. s = base + G(u − u_base), so that the rounding of G
+    affects only the change since then.
     """
 
     def __init__(self, G: Matrix, max_pivots: int) -> None:
@@ -95,28 +95,28 @@ class _State:
         u = np.maximum(self.u, 0.0)
         return GiResult(status, u, active, self.factor, self.pivots, self.drops, refinements, reason)
 
-    def refer_to(self, slacks: Slacks) -> Vector:
-        """Take the slacks of u from the original data; returns the size of their terms."""
+    def reset_base(self, slacks: Slacks) -> Vector:
+        """Compute the slacks at u from the original data; returns the magnitude of their terms."""
         self.base, size = slacks(self.u)
         self.u_base = self.u.copy()
         return size
 
     def slacks(self) -> Vector:
-        """s, of the multipliers as they are now."""
+        """s at the current u."""
         return self.base + product(self.G, self.u - self.u_base)
 
     def refine(self, slacks: Slacks) -> Vector:
-        """Powell: s from the original data, and u_C so that s_C = 0; drops what is then negative in u."""
+        """Powell: s from the original data, u_C corrected so that s_C = 0; drops negative multipliers."""
         while True:
             self.correct(slacks(self.u)[0])
             if not (self.u < 0).any():
-                return self.refer_to(slacks)
+                return self.reset_base(slacks)
             self.drop_negative()
 
     def violation(self, limit: Vector) -> float:
-        """How far s_C from zero, or any other slack below it, is outside the limit."""
-        away = np.where(self.is_active, abs(self.base), -self.base) - limit
-        return max(float(away.max()), 0.0)
+        """The largest excess over the limit: of |s_C|, and of −s elsewhere."""
+        excess = np.where(self.is_active, abs(self.base), -self.base) - limit
+        return max(float(excess.max()), 0.0)
 
     def pivot_until_feasible(self, limit: Vector) -> None:
         """Add violated constraints, worst first, until s ≥ −limit."""
@@ -130,15 +130,15 @@ class _State:
             self.pivot_among(worst, s[worst], limit[worst])
 
     def pivot_among(self, worst: NDArray[np.intp], s: Vector, limit: Vector) -> None:
-        """Add of these constraints, with the slacks s, the worst one as long as there is a violated one."""
+        """Add the most violated of these constraints, with the slacks s, as long as there is one."""
         border = Border(self.G, np.array(self.C, dtype=np.intp), self.factor, worst)
-        while self.pivots < self.max_pivots and len(border.left) < len(worst):
+        while self.pivots < self.max_pivots and len(border.removed) < len(worst):
             outside = ~self.is_active[worst]
             column = int(np.argmin(np.where(outside, s + limit, np.inf)))
             if not outside[column] or s[column] >= -limit[column]:
                 break
             self.add(border, column, s)
-        self.take_in(border)
+        self.absorb(border)
 
     def add(self, border: Border, column: int, s: Vector) -> None:
         """Raise u_k until s_k = 0, dropping each active constraint whose multiplier reaches zero."""
@@ -154,12 +154,14 @@ class _State:
             partial = float(ratios.min(initial=np.inf))
             step = min(full, partial)
             if not np.isfinite(step):
-                raise np.linalg.LinAlgError(f"constraint {k} depends on the active ones: G is not definite")
+                raise np.linalg.LinAlgError(
+                    f"constraint {k} depends on the active ones: G is not positive definite"
+                )
             self.u[active] -= step * r
             self.u[k] += step
             s += step * ds
             if full <= partial:
-                border.entered.append(column)
+                border.added.append(column)
                 self.is_active[k] = True
                 return
             self.drops += 1
@@ -167,13 +169,17 @@ class _State:
             self.u[active[place]], self.is_active[active[place]] = 0.0, False
             border.drop(place)
 
-    def take_in(self, border: Border) -> None:
-        """Make C and its factor those of the border's end."""
-        for position in sorted(border.left, reverse=True):
+    def absorb(self, border: Border) -> None:
+        """Apply the changes of the border to C and its factor."""
+        for position in sorted(border.removed, reverse=True):
             del self.C[position]
             self.factor.delete(position)
-        C, E = np.array(self.C, dtype=np.intp), border.candidates[border.entered]
-        D = self.factor.solve_transposed(self.G[np.ix_(C, E)]) if border.left else border.D[:, border.entered]
+        C, E = np.array(self.C, dtype=np.intp), border.candidates[border.added]
+        D = (
+            self.factor.solve_transposed(self.G[np.ix_(C, E)])
+            if border.removed
+            else border.D[:, border.added]
+        )
         self.factor.extend(D, sla.cholesky(self.G[np.ix_(E, E)] - D.T @ D, check_finite=False))
         self.C += E.tolist()
 

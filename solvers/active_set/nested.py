@@ -1,7 +1,7 @@
 """Nested subsets of the contacts, for a first guess from a smaller problem.
 
-The contacts are put in square cells; of each cell the contact with the largest overlap p stands for it,
-so that a fastener's contact is in the subset. Without coordinates a cell is a run of numbers.
+The contacts are grouped into square cells, each represented by the contact with the largest overlap p, so
+that the contact of a fastener is in the subset. If coordinates are unknown, a cell is a run of numbers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Cells = NDArray[np.intp]
 
 
 def cells_of(nodes: Matrix | None, m: int, width: int) -> Cells:
-    """(m,) the number of each contact's cell, of width² contacts on average. nodes : (m, 2) mm, or None."""
+    """(m,) the cell of each contact, with width² contacts per cell on average. nodes : (m, 2) mm, or None."""
     if nodes is None:
         return np.arange(m) // width**2
     low, extent = nodes.min(axis=0), np.ptp(nodes, axis=0)
@@ -25,7 +25,7 @@ def cells_of(nodes: Matrix | None, m: int, width: int) -> Cells:
 
 
 def representatives(cells: Cells, p: Vector) -> NDArray[np.intp]:
-    """The contact with the largest p of each cell, in the order of their numbers."""
+    """The contact with the largest p in each cell, in ascending order."""
     order = np.lexsort((-p, cells))
     first = np.r_[True, np.diff(cells[order]) > 0]
     return np.sort(order[first])

@@ -1,1 +1,1 @@
-"""What the interior-point methods are made of."""
+"""Building blocks of the interior-point methods."""

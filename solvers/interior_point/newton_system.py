@@ -1,6 +1,6 @@
-"""Solves the Newton systems (Q + D) v = b of the interior-point method, one D after another.
+"""Solves the Newton systems (Q + D) v = b of the interior-point method for a sequence of D.
 
-D is a positive diagonal that changes from system to system, Q stays: what is factored of it once is
+D is a positive diagonal that changes from system to system, Q does not: what can be factored once is
 factored in `prepare`, when the system is made.
 """
 
@@ -18,12 +18,12 @@ from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
 
 from .preconditioner import CholeskyFactor, CholeskyPlusRoot, Identity, Preconditioner, Splitting
 
-#: CG iterations after which a factor in a new order pays. One Cholesky factorisation takes m³/3
-#: operations out of the cache, a CG iteration 2m² out of memory.
-REORDER = 25
+#: CG iterations after which a factorisation in a new order pays off. A Cholesky factorisation takes m³/3
+#: operations on data in cache, a CG iteration 2m² on data in memory.
+REORDER_AFTER = 25
 
-#: At most so many CG iterations a system, in units of m.
-LIMIT = 10
+#: The most CG iterations per system, in units of m.
+CG_LIMIT = 10
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,13 @@ class Solved:
 
 
 class NewtonSystem(Protocol):
-    """What the iterations ask of it. `factorisations` counts those of the present load case."""
+    """What the iterations need. `factorisations` counts those of the current load case."""
 
     @property
     def factorisations(self) -> int: ...
 
     def begin(self) -> None:
-        """A new load case."""
+        """Start a new load case."""
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
         """v with (Q + D) v = b to the tolerance, in at most `limit` inner iterations."""
@@ -56,7 +56,7 @@ class Direct:
         self.begin()
 
     def begin(self) -> None:
-        """A new load case."""
+        """Start a new load case."""
         self.D = np.full(len(self.Q), np.nan)
         self.factorisations = 0
 
@@ -75,25 +75,24 @@ class Pcg:
 
     def __init__(self, V: Preconditioner) -> None:
         self.V = V
-
         self.begin()
 
     def begin(self) -> None:
-        """A new load case."""
+        """Start a new load case."""
         self.factorisations = 0
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
         self.factorisations += self.V.update(D)
-        limit = min(limit, LIMIT * len(b))
+        limit = min(limit, CG_LIMIT * len(b))
         cg = conjugate_gradients(self.V.multiply, self.V.to_transformed(b), tolerance, limit)
         return Solved(self.V.from_transformed(cg.z), cg.iterations, cg.converged)
 
 
 class OpenLast(Pcg):
-    """PCG with V = U + √D and the nodes in the order of growing D, the open gaps (large D) last.
+    """PCG with V = U + √D and the nodes in the order of increasing D, open gaps (large D) last.
 
-    The order is made anew, and Q factored in it, for the system that follows one of more than REORDER
-    CG iterations. Each load case begins in the order of the nodes' numbers.
+    The nodes are reordered, and Q refactored, for the system that follows one of more than REORDER_AFTER CG
+    iterations. Each load case begins with the nodes as they are numbered.
     """
 
     def __init__(self, Q: Matrix) -> None:
@@ -104,18 +103,18 @@ class OpenLast(Pcg):
     def begin(self) -> None:
         super().begin()
         self.V = self.first
-        self.late = False
+        self.reorder = False
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
-        if self.late:
+        if self.reorder:
             self.V = CholeskyPlusRoot(self.Q, np.argsort(D, kind="stable"))
             self.factorisations += 1
         solved = super().solve(D, b, tolerance, limit)
-        self.late = solved.iterations > REORDER
+        self.reorder = solved.iterations > REORDER_AFTER
         return solved
 
 
-#: The option `preconditioner`, in the order of the nodes' numbers.
+#: The option `preconditioner`, with the nodes as they are numbered.
 SYSTEMS: dict[str, Callable[[Matrix], NewtonSystem]] = {
     "V": lambda Q: Pcg(CholeskyPlusRoot(Q)),
     "U": lambda Q: Pcg(CholeskyFactor(Q)),

@@ -1,6 +1,6 @@
-"""Preconditioners V for the conjugate gradients on H = Q + D: they work with V⁻ᵀHV⁻¹.
+"""Preconditioners V for conjugate gradients on H = Q + D, which work with V⁻ᵀHV⁻¹.
 
-The paper's is V = U + √D (eq. 15) with Q = UᵀU; beside it stand those that it is compared with.
+The paper's is V = U + √D (eq. 15) with Q = UᵀU; the others are there for comparison.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Preconditioner(ABC):
 
     @abstractmethod
     def update(self, D: Vector) -> int:
-        """Take a new D ≥ 0, (m,); returns how many factorisations that took."""
+        """Take a new D ≥ 0, (m,); returns the number of factorisations it took."""
 
     @abstractmethod
     def multiply(self, v: Vector) -> Vector:
@@ -36,7 +36,7 @@ class Preconditioner(ABC):
 
 
 class Identity(Preconditioner):
-    """V = I: none."""
+    """V = I: no preconditioning."""
 
     def __init__(self, Q: Matrix) -> None:
         self.Q = np.asfortranarray(Q)
@@ -57,7 +57,7 @@ class Identity(Preconditioner):
 
 
 class CholeskyFactor(Preconditioner):
-    """V = U: the Cholesky factor of Q, which knows nothing of D."""
+    """V = U: the Cholesky factor of Q, which ignores D."""
 
     def __init__(self, Q: Matrix) -> None:
         self.U = np.asfortranarray(sla.cholesky(Q, check_finite=False))
@@ -78,16 +78,16 @@ class CholeskyFactor(Preconditioner):
 
 
 class CholeskyPlusRoot(Preconditioner):
-    """V = U + S with S = √D: upper triangular, and exact where D is zero or dominates.
+    """V = U + S with S = √D: upper triangular, and exact if D is zero or dominates.
 
-    VᵀV = H + UᵀS + SU, so λmin(V⁻ᵀHV⁻¹) ≥ 1/2; the largest eigenvalue has no such bound. Where D → ∞
+    VᵀV = H + UᵀS + SU, so λmin(V⁻ᵀHV⁻¹) ≥ 1/2; the largest eigenvalue has no such bound. If D → ∞
     on a set B and D → 0 on the rest I, the spectrum tends to 1 and 1 + eig(U_II⁻ᵀ U_BIᵀ U_BI U_II⁻¹),
-    with U_BI = 0 where B stands last in the order of the nodes.
+    with U_BI = 0 if B comes last in the order of the nodes.
 
     Parameters
     ----------
     Q : (m, m)
-    order : (m,) the order in which the nodes are eliminated; as they are numbered where None.
+    order : (m,) the order in which the nodes are eliminated; as they are numbered if None.
     """
 
     def __init__(self, Q: Matrix, order: NDArray[np.intp] | None = None) -> None:
@@ -128,7 +128,7 @@ class Splitting(Preconditioner):
     """V = √diag(D_B + q_BB) ⊕ chol(Q_II + D_I), where B = {i : D_i > q_ii} and I is the rest.
 
     The splitting of Oliveira and Sorensen (Linear Algebra Appl. 394:1–24, 2005) by small and large D,
-    carried over to constraints λ ≥ 0. It takes a new factor for each D.
+    adapted to constraints λ ≥ 0. It takes a new factorisation for each D.
     """
 
     def __init__(self, Q: Matrix) -> None:

@@ -1,7 +1,7 @@
 """The iterations of the interior-point method on min ½λᵀQλ − pᵀλ, λ ≥ 0: Algorithms 2 and 3, and Mehrotra's.
 
 With A = I the unknowns are λ, its slack w and the multiplier y = Qλ − p (the gaps). w = λ holds at
-the start and every step keeps it, so w is not stored.
+the start and is preserved by every step, so w is not stored.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .newton_system import NewtonSystem
 
 
 class CgExhausted(Exception):
-    """The CG iterations that the options allow are used up."""
+    """The limit on CG iterations has been reached."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Point:
     def infeasibility(self) -> float:
         """The larger of the overlap max(p − Qλ) and the force-weighted mean λᵀ|s1| / Σλ, mm.
 
-        Where a gap is open, λ → 0 and s1 is of no consequence while the gap stays open.
+        At an open gap λ → 0, and s1 does not matter as long as the gap stays open.
         """
         overlap = float((self.s1 - self.y).max())
         return max(overlap, float(self.lam @ abs(self.s1)) / float(self.lam.sum()))
@@ -45,9 +45,9 @@ class Point:
 
 @dataclass
 class Newton:
-    """Directions and steps of one load case, and the CG iterations that they took.
+    """Directions and steps for one load case, and the CG iterations that they took.
 
-    theta : share of the step to the boundary, in (0, 1). sigma : the centring of Algorithm 2.
+    theta : fraction of the step to the boundary, in (0, 1). sigma : centring parameter of Algorithm 2.
     """
 
     Q: Matrix
@@ -88,13 +88,13 @@ class Newton:
 
 
 def algorithm_2(newton: Newton, point: Point) -> Point:
-    """One Newton step with the centring σ as given: plain path following."""
+    """One Newton step with a given centring parameter σ: plain path following."""
     s3 = newton.sigma * point.mu - point.lam * point.y
     return newton.moved(point, *newton.direction(point, s3, "predictor"))
 
 
 def algorithm_3(newton: Newton, point: Point) -> Point:
-    """The predictor step is taken; the corrector is a second Newton step, with a matrix of its own."""
+    """The predictor step is taken; the corrector is a second Newton step, with its own matrix."""
     s3 = -point.lam * point.y
     predicted = newton.moved(point, *newton.direction(point, s3, "predictor"))  # step 5
     sigma = (predicted.mu / point.mu) ** 3

@@ -1,7 +1,7 @@
 """Feasible starting points of the interior-point method: Algorithms 4 and 5 of the paper.
 
-Contact forces high enough open every gap: λ > 0 with y = Qλ − p > 0. Algorithm 4 finds them by
-displacements, Algorithm 5 by Q; with Q = AᵀK⁻¹A they are the same point.
+Sufficiently large contact forces open every gap: λ > 0 with y = Qλ − p > 0. Algorithm 4 finds them from
+displacements, Algorithm 5 from Q; with Q = AᵀK⁻¹A the points are the same.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 
-MULT = 2.0  # the multiplier of λ, > 1
+MULTIPLIER = 2.0  # the multiplier of λ, > 1
 MAX_STEPS = 200  # multiplications, and sweeps of corrections
 
 
@@ -24,7 +24,7 @@ class NoStart(ValueError):
 
 @dataclass(frozen=True)
 class Start:
-    """λ (N) and y (mm), (m,); the corrections below (16) and the multiplications that led there."""
+    """λ (N) and y (mm), (m,); the numbers of corrections, below eq. (16), and of multiplications."""
 
     lam: Vector
     y: Vector
@@ -35,14 +35,14 @@ class Start:
 def algorithm_5(Q: Matrix, p: Vector, force: float = 1.0) -> Start:
     """λ = force·e (N), corrected until Qλ > 0 (16), then multiplied until y = Qλ − p ≥ 0.
 
-    And once more, because the interior needs y > 0: mult·Qλ − p > Qλ − p ≥ 0. Raises NoStart where
-    no λ > 0 with Qλ > 0 was found.
+    One more multiplication follows, because the interior needs y > 0: mult·Qλ − p > Qλ − p ≥ 0. Raises
+    NoStart if no λ > 0 with Qλ > 0 is found.
     """
     return _opened(lambda lam: Q @ lam, lambda i: Q[:, i], p, force)
 
 
 def algorithm_4(prepared: Prepared, load: LoadCase, force: float = 1.0) -> Start:
-    """The same by displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
+    """The same from displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
     A = prepared.assembly.A
 
     def response(lam: Vector) -> Vector:
@@ -61,10 +61,12 @@ def _opened(
     for multiplications in range(1, MAX_STEPS + 1):  # step 2
         y = Qlam - p  # step 3
         opened = bool((y >= 0).all())  # step 4
-        lam, Qlam = MULT * lam, MULT * Qlam  # step 7, and the margin
+        lam, Qlam = MULTIPLIER * lam, MULTIPLIER * Qlam  # step 7, and the margin
         if opened:
             return Start(lam, Qlam - p, corrections, multiplications)  # steps 9 and 10, with w = λ
-    raise NoStart(f"the start: y = Qλ − p still has a negative entry after {MAX_STEPS} multiplications")
+    raise NoStart(
+        f"no starting point: y = Qλ − p still has a negative entry after {MAX_STEPS} multiplications"
+    )
 
 
 def _positive_response(
@@ -82,4 +84,4 @@ def _positive_response(
             others = q @ lam - q[i] * lam[i]
             lam[i] = max(lam[i], -others / q[i] + epsilon[i])
             corrections += 1
-    raise NoStart(f"the start: no λ > 0 with Qλ > 0 was found in {MAX_STEPS} sweeps of corrections")
+    raise NoStart(f"no starting point: no λ > 0 with Qλ > 0 found in {MAX_STEPS} sweeps of corrections")

@@ -1,1 +1,1 @@
-"""Products, factors and inverses that several methods share."""
+"""Products, factors and inverses shared by several methods."""

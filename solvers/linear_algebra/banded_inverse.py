@@ -1,11 +1,11 @@
-"""M ≈ Q⁻¹ with a narrow band, from the inverses of the small blocks along the diagonal of Q.
+"""A factorised sparse approximate inverse (FSAI) M ≈ Q⁻¹ with a narrow band.
 
-Q is a Green's function: what happens at a contact is all but settled by what happens near it, and Q⁻¹, a
-stiffness, is all but zero between contacts that are far from each other. With the contacts in order along
-the joint, the Cholesky factor of Q⁻¹ is found row by row from the contacts just before (L. Yu. Kolotilina
-and A. Yu. Yeremin, SIAM J. Matrix Anal. Appl. 14:45–58, 1993): for a window W of contacts whose last ones
-are the line at hand, Q_WW = LLᵀ and the last rows of L⁻¹ are theirs. M is the sum of the rows' squares,
-positive definite whatever the window, and Q⁻¹ itself where a window holds all contacts.
+Q is a Green's function: the state of a contact is almost determined by its neighbourhood, and Q⁻¹, a
+stiffness, is almost zero between distant contacts. With the contacts ordered along the joint, each row of
+the Cholesky factor of Q⁻¹ is computed from the contacts just before it (L. Yu. Kolotilina and A. Yu. Yeremin,
+SIAM J. Matrix Anal. Appl. 14:45–58, 1993): for a window W of contacts that ends with the current line,
+Q_WW = LLᵀ, and the last rows of L⁻¹ are those of the line. M is the sum of the outer products of these rows
+with themselves: positive definite for any window, and equal to Q⁻¹ if a window holds all contacts.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from scipy.linalg import blas, lapack
 from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.bordered_factor import Set
 
-LINES = 4  # of contacts across the joint that a window holds before the line at hand
-ACROSS = 16  # contacts taken for a line where nobody knows where they are
+WINDOW_LINES = 4  # lines of contacts across the joint in a window, before the current one
+DEFAULT_LINE = 16  # contacts per line if coordinates are unknown
 
 
 @dataclass(frozen=True)
 class BandedInverse:
     """order : (m,) the contacts along the joint; all vectors are in this order.
 
-    band : (b + 2, m) by columns, M[j + d, j] in row d, the last row zero.
+    band : (b + 2, m) column-major, M[j + d, j] in row d, the last row zero.
     """
 
     order: NDArray[np.intp]
@@ -38,7 +38,7 @@ class BandedInverse:
         return blas.dsbmv(len(self.band) - 1, 1.0, self.band, v, lower=1)
 
     def factor(self, S: Set) -> BandFactor:
-        """Of M_SS. Raises LinAlgError where rounding leaves it indefinite."""
+        """The Cholesky factor of M_SS. Raises LinAlgError if rounding makes it indefinite."""
         rows, width = np.flatnonzero(S), len(self.band) - 1
         nearer = np.arange(len(rows)) - np.searchsorted(rows, rows - width)
         deep = int(nearer.max(initial=0)) + 1
@@ -70,15 +70,15 @@ class BandFactor:
 
 
 def banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse:
-    """Q (m, m). nodes : (m, 2) of the contacts, mm, or None where they are unknown.
+    """Q (m, m). nodes : (m, 2) of the contacts, mm, or None if they are unknown.
 
-    Raises LinAlgError where Q is not positive definite.
+    Raises LinAlgError if Q is not positive definite.
     """
     m = len(Q)
-    order, across = along(nodes, m)
-    band = np.zeros((min((LINES + 1) * across, m) + 1, m), order="F")
+    order, across = order_along_joint(nodes, m)
+    band = np.zeros((min((WINDOW_LINES + 1) * across, m) + 1, m), order="F")
     for start in range(0, m, across):
-        first, stop = max(start - LINES * across, 0), min(start + across, m)
+        first, stop = max(start - WINDOW_LINES * across, 0), min(start + across, m)
         window = order[first:stop]
         L, info = lapack.dpotrf(Q.T[np.ix_(window, window)].T, lower=1, overwrite_a=1)
         if info:
@@ -90,10 +90,10 @@ def banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse:
     return BandedInverse(order, band)
 
 
-def along(nodes: Matrix | None, m: int) -> tuple[NDArray[np.intp], int]:
-    """The contacts in order along the longer side of the joint, and how many a line across it holds."""
+def order_along_joint(nodes: Matrix | None, m: int) -> tuple[NDArray[np.intp], int]:
+    """The contacts in order along the longer side of the joint, and the contacts per line across it."""
     if nodes is None:
-        return np.arange(m), min(ACROSS, m)
+        return np.arange(m), min(DEFAULT_LINE, m)
     extent = np.ptp(nodes, axis=0)
     longer, shorter = (0, 1) if extent[0] >= extent[1] else (1, 0)
     order = np.lexsort((nodes[:, shorter], nodes[:, longer]))

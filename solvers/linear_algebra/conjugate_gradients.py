@@ -24,8 +24,8 @@ def conjugate_gradients(
 ) -> CgResult:
     """Solve Hz = b from z = 0 until ‖r‖₂ ≤ tolerance·‖b‖₂.
 
-    Stops unconverged after max_iterations, or when a direction shows no positive curvature, which
-    for a positive definite H means that rounding has taken over.
+    Stops unconverged after max_iterations, or at a direction without positive curvature, which for a
+    positive definite H means that rounding dominates.
     """
     z = np.zeros_like(b)
     r = b.copy()

@@ -1,4 +1,4 @@
-"""The inverse of a symmetric positive definite matrix, in full."""
+"""The full inverse of a symmetric positive definite matrix."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ BLOCK = 256  # rows mirrored at once: a block and its mirror stay in the cache
 
 
 def inverse_with_factor(Q: Matrix) -> tuple[Matrix, Matrix]:
-    """(Q⁻¹, U) with Q = UᵀU, both (m, m). Raises LinAlgError where Q is not positive definite."""
+    """(Q⁻¹, U) with Q = UᵀU, both (m, m). Raises LinAlgError if Q is not positive definite."""
     U = sla.cholesky(Q, check_finite=False)
     inverse, info = lapack.dpotri(U)
     if info != 0:

@@ -1,8 +1,8 @@
-"""Newton systems (Q + D) v = b by a factor in single precision, refined in double precision.
+"""Newton systems (Q + D) v = b with a factor in single precision, refined in double precision.
 
-Q is scaled to a unit diagonal first, for the range of float32; D needs no scaling, because Cholesky's
-factor does not care. Half the time and half the memory of a double factor; each refinement takes one
-product with Q.
+Q is first scaled to a unit diagonal, for the range of float32; D needs no scaling, to which a Cholesky
+factorisation is insensitive. This takes half the time and memory of a factor in double precision; each
+refinement step takes one product with Q.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from solvers.interior_point.newton_system import Direct, Solved
 
 from .product import product
 
-LARGEST = 1e30  # on the diagonal
+MAX_DIAGONAL = 1e30  # on the diagonal
 
 
 class SinglePrecision:
-    """Iterative refinement until ‖b − Hv‖₂ ≤ tolerance · ‖b‖₂, by `Direct` once that no longer halves."""
+    """Iterative refinement until ‖b − Hv‖₂ ≤ tolerance · ‖b‖₂; `Direct` once that no longer halves."""
 
     def __init__(self, Q: Matrix) -> None:
         self.Q = Q
@@ -28,27 +28,27 @@ class SinglePrecision:
         self.scaled = np.array(Q, dtype=np.float32, order="F")
         self.scaled *= self.T.astype(np.float32)
         self.scaled *= self.T.astype(np.float32)[:, None]
-        self.exact = Direct(Q)
+        self.double = Direct(Q)
         self.begin()
 
     def begin(self) -> None:
-        """A new load case."""
-        self.exact.begin()
+        """Start a new load case."""
+        self.double.begin()
         self.D = np.full(len(self.Q), np.nan)
-        self.single = True
-        self.made = 0
+        self.use_single = True
+        self.single_factorisations = 0
 
     @property
     def factorisations(self) -> int:
-        return self.made + self.exact.factorisations
+        return self.single_factorisations + self.double.factorisations
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
-        if self.single:
+        if self.use_single:
             solved = self._refined(D, b, tolerance)
             if solved.converged:
                 return solved
-            self.single = False
-        return self.exact.solve(D, b, tolerance, limit)
+            self.use_single = False
+        return self.double.solve(D, b, tolerance, limit)
 
     def _refined(self, D: Vector, b: Vector, tolerance: float) -> Solved:
         try:
@@ -56,16 +56,16 @@ class SinglePrecision:
         except np.linalg.LinAlgError:
             return Solved(b, 0, False)
         v, r, steps = np.zeros_like(b), b, 0
-        size = before = float(np.linalg.norm(b))
-        while before > tolerance * size:
-            scaled = (self.T * r / before).astype(np.float32)
+        size = previous = float(np.linalg.norm(b))
+        while previous > tolerance * size:
+            scaled = (self.T * r / previous).astype(np.float32)
             scaled = blas.strsv(self.L, scaled, lower=1, overwrite_x=True)
-            v = v + before * self.T * blas.strsv(self.L, scaled, lower=1, trans=1)
+            v = v + previous * self.T * blas.strsv(self.L, scaled, lower=1, trans=1)
             r = b - (product(self.Q, v) + D * v)
-            steps, left = steps + 1, float(np.linalg.norm(r))
-            if not left <= before / 2:
+            steps, norm = steps + 1, float(np.linalg.norm(r))
+            if not norm <= previous / 2:
                 return Solved(v, steps, False)
-            before = left
+            previous = norm
         return Solved(v, steps, True)
 
     def _factor(self, D: Vector) -> None:
@@ -73,9 +73,9 @@ class SinglePrecision:
         if np.array_equal(D, self.D):
             return
         H = self.scaled.copy(order="F")
-        H[np.diag_indices_from(H)] = np.minimum(1.0 + D / self.compliance, LARGEST)
+        H[np.diag_indices_from(H)] = np.minimum(1.0 + D / self.compliance, MAX_DIAGONAL)
         self.L, info = lapack.spotrf(H, lower=1, clean=False, overwrite_a=True)
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} is not positive in single precision")
         self.D = D
-        self.made += 1
+        self.single_factorisations += 1

@@ -1,13 +1,13 @@
 """Goldfarb–Idnani's dual active-set method with Powell's safeguards, on either form.
 
-Both forms have one shape in the space of the constraints. With u ≥ 0 the multipliers and s the
-slacks, s = s0 + G u, and the method looks for s ≥ 0, uᵀs = 0:
+In the space of the constraints both forms have the same structure. With multipliers u ≥ 0 and slacks
+s = s0 + G u, the method finds s ≥ 0, uᵀs = 0:
 
     primal form:  constraints Aᵀx ≤ g   u = λ   s = g − Aᵀx   G = AᵀK⁻¹A = Q   s0 = −p
     dual form:    constraints λ ≥ 0     u = y   s = λ         G = Q⁻¹          s0 = Q⁻¹p
 
 u = 0 is the unconstrained minimum, where Algorithm 1 starts. The pivots are Goldfarb and Idnani's;
-carried out here they need a factor of G_CC instead of their (n, n) matrices.
+in this space they need a factor of G_CC instead of (n, n) matrices.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_i
 from solvers.active_set.growing_factor import GrowingFactor
 from solvers.active_set.solve import solve_from
 from solvers.base import FORMS, Answer, Form, LoadCase, Problem, Solver, failed
-from solvers.kkt import checked
+from solvers.kkt import kkt_status
 from solvers.linear_algebra.inverse import inverse_with_factor
 
 FINISHING_SETS = 1000
@@ -42,15 +42,15 @@ class _Prepared:
 class GoldfarbIdnani(Solver):
     """Goldfarb–Idnani with Powell's safeguards.
 
-    Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) by more than
-    rounding explains. In the dual form the answer is then checked as it is returned: λ ≥ 0 and, with
-    y = Qλ − p, max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Q|λ)) mm make it "solved",
-    anything else "inaccurate". Iterations are changes of the active set. Where the rounding of Q⁻¹ leaves
-    it inaccurate, block principal pivoting goes on from its set (details: finishing_sets).
+    Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) beyond rounding. In
+    the dual form the answer λ ≥ 0, y = Qλ − p is then checked: "solved" if max(max(−y), max_{λ>0} |y|) ≤
+    max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are changes of the active set. If
+    rounding in Q⁻¹ leaves it inaccurate, block principal pivoting continues from its set (details:
+    finishing_sets).
 
     Options
     -------
-    max_pivots : at most max_pivots · m changes of the active set.
+    max_pivots : limit on the changes of the active set, in units of m.
     """
 
     forms: ClassVar[tuple[Form, ...]] = FORMS
@@ -61,7 +61,7 @@ class GoldfarbIdnani(Solver):
         self.max_pivots = max_pivots
 
     def prepare(self, data: Problem) -> _Prepared | Answer:
-        """G: Q itself, or Q⁻¹ by the Cholesky factor of Q; where that cannot be, the answer that says so."""
+        """G: Q itself, or Q⁻¹ from the Cholesky factor of Q; a failed answer if there is none."""
         if not data.bounded:
             return _Prepared(data, data.Q, None)
         try:
@@ -92,7 +92,7 @@ class GoldfarbIdnani(Solver):
         if result.status == "inaccurate":
             return _finished(ready, load, result, tolerance, details)
         lam = _on_support(ready, load, slacks(result.u)[0], result)
-        status, residual = checked(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
+        status, residual = kkt_status(data.Q, load.p, lam, data.Q @ lam - load.p, tolerance)
         if status == "inaccurate" and result.status == "solved":
             return _finished(ready, load, result, tolerance, details)
         details["kkt_residual_mm"] = residual
@@ -103,7 +103,7 @@ class GoldfarbIdnani(Solver):
 def _finished(
     ready: _Prepared, load: LoadCase, result: GiResult, tolerance: float, details: dict[str, Any]
 ) -> Answer:
-    """Where the rounding of Q⁻¹ misleads the pivots: block pivoting from the set that they have reached."""
+    """Block pivoting from the set that the pivots reached, if rounding in Q⁻¹ misled them."""
     closed = np.ones(len(load.p), dtype=bool)
     closed[result.active] = False
     sets = ContactSets(ready.problem.Q, load.p, ready.G)
@@ -122,7 +122,7 @@ def _primal_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
     def slacks(u: Vector) -> tuple[Vector, Vector]:
         """s = g − Aᵀx with x = K⁻¹(f − Au) refined by δ, and T = |g| + |A|ᵀ(|x| + max|δ|/ε).
 
-        δ, the rounding of the first solution, tells what that of the refined one may still be.
+        δ, the rounding error of the first solution, estimates that of the refined one.
         """
         b = load.f - A @ u
         x = prepared.solve_K(b)
@@ -139,7 +139,7 @@ def _dual_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
     def slacks(u: Vector) -> tuple[Vector, Vector]:
         """s = λ with Qλ = p + u, refined once.
 
-        εT with T = |Q⁻¹| (|p + u| + |Q| |λ|) bounds what the rounding of the residual moves it by.
+        εT with T = |Q⁻¹| (|p + u| + |Q| |λ|) bounds the effect of rounding in the residual.
         """
         lam = sla.cho_solve(factor, load.p + u, check_finite=False)
         lam += sla.cho_solve(factor, load.p + u - Q @ lam, check_finite=False)
@@ -149,10 +149,10 @@ def _dual_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
 
 
 def _on_support(ready: _Prepared, load: LoadCase, lam: Vector, result: GiResult) -> Vector:
-    """λ with λ_C = 0 exactly and Q_SS λ_S = p_S refined on the rest S, so that no rounding of λ_C is left.
+    """λ with λ_C = 0 exactly and Q_SS λ_S = p_S refined on the rest S, so that no rounding of λ_C remains.
 
-    With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). What is then negative, where a
-    contact is closed without a force, goes over to C.
+    With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). Entries that are then negative, at
+    contacts closed without a force, move to C.
     """
     C = result.active
     while True:

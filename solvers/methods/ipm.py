@@ -1,8 +1,8 @@
 """The paper's primal–dual interior-point method on the dual form min ½λᵀQλ − pᵀλ, λ ≥ 0.
 
-As it comes: Algorithm 3 as printed (a full predictor step, then a second Newton system at the new
-point; so two matrices H an iteration), the systems solved by conjugate gradients preconditioned with
-V = U + √D (eq. 15), from the start of Algorithm 5. The options change one ingredient at a time.
+By default: Algorithm 3 as printed (a full predictor step, then a second Newton system at the new point,
+hence two matrices H per iteration), the systems solved by conjugate gradients preconditioned with
+V = U + √D (eq. 15), from the start of Algorithm 5. Each option changes one ingredient.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Ordering = Literal["lexicographic", "open_last"]
 
 @dataclass(frozen=True)
 class _Ready:
-    """units : (m,) max_j |a_ji|, what a displacement of 1 mm is in the gap of contact i."""
+    """units : (m,) max_j |a_ji|, the change in the gap of contact i per 1 mm of displacement."""
 
     problem: Problem
     system: NewtonSystem
@@ -43,30 +43,30 @@ class Ipm(Solver):
     """Primal–dual interior point.
 
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ feasibility with
-    s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance asked for; the paper tests μ alone, because it
-    solves its systems exactly. No feasibility is asked for below the rounding of Qλ − p, which is at most
-    4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). And it goes on until each contact is closed or open,
-    min(y_i, q_ii λ_i) / max_j |a_ji|, to that or √(0.1 mm/N · ε_μ): one that touches without a force
-    stands off by √(μ q_ii), which is more than ε_μ vouches for where the contact is soft; and a gap of
-    y_i is y_i / max_j |a_ji| of displacement, in whatever unit the contact is written.
+    s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance; the paper tests μ alone, because it solves its
+    systems exactly. Feasibility is not required below the rounding of Qλ − p, which is at most
+    4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). In addition each contact must be closed or open:
+    min(y_i, q_ii λ_i) / max_j |a_ji| at most that or √(0.1 mm/N · ε_μ). A contact that touches without a
+    force is off by √(μ q_ii), more than ε_μ guarantees if the contact is compliant; and a gap of y_i is
+    y_i / max_j |a_ji| of displacement, whatever the unit of the contact.
 
-    Where the iteration stalls, because what inexact systems leave in s1 outlasts y or because a step ended
-    too near to the boundary, it begins anew with a smaller cg_tolerance and theta (details: restarts).
+    If the iteration stalls, because the error of inexact systems in s1 outlasts y or because a step ended
+    too close to the boundary, it restarts with a smaller cg_tolerance and theta (details: restarts).
 
     Options
     -------
-    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra. Where the first two find no
-        feasible point, Mehrotra's, which need not be one (details: start_instead).
+    start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra. If the first two find no
+        feasible point, Mehrotra's start, which may be infeasible (details: start_instead).
     scheme : algorithm_3 as printed; algorithm_2, with a fixed σ; mehrotra, the textbook's.
     preconditioner : V, U, none, splitting; direct is a Cholesky factorisation of every H instead.
-    ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by growing D.
-    theta : share of the step to the boundary, in (0, 1).
-    sigma : the centring of algorithm_2, in [0, 1].
-    rho : of stp1 and stp2, the residual allowed as a share of λᵀy. epsilon : of stp2, its least gap, mm.
+    ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by increasing D.
+    theta : fraction of the step to the boundary, in (0, 1).
+    sigma : centring parameter of algorithm_2, in [0, 1].
+    rho : residual allowed by stp1 and stp2, as a fraction of λᵀy. epsilon : smallest gap of stp2, mm.
     cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
-    feasibility : mm; what inexact systems may leave in y = Qλ − p. By default 1e-3 √ε_μ: the error that μ
-        leaves goes with √μ as well.
-    max_iterations : of the scheme, each time it begins. max_cg : of the conjugate gradients in all.
+    feasibility : error allowed in y = Qλ − p for inexact systems, mm. By default 1e-3 √ε_μ: the error due
+        to μ is proportional to √μ as well.
+    max_iterations : of the scheme, per start or restart. max_cg : of the conjugate gradients, in total.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
@@ -119,7 +119,7 @@ class Ipm(Solver):
         self.max_cg = max_cg
 
     def prepare(self, data: Problem) -> _Ready | Answer:
-        """What is factored of Q once; where that cannot be, the answer that says so."""
+        """The factors of Q; a failed answer if Q is not positive definite."""
         units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
         try:
             return _Ready(data, self.make_system(data.Q), units)
@@ -178,7 +178,7 @@ class Ipm(Solver):
     def _iterate(
         self, newton: Newton, point: Point, tolerance: float, units: Vector
     ) -> tuple[Status, str, Point]:
-        """Algorithm 3, steps 4 to 8; the last finite point with what is to be said of it."""
+        """Algorithm 3, steps 4 to 8: status, cause and the last finite point."""
         feasibility = self.feasibility or FEASIBLE * np.sqrt(tolerance)
         smallest, stalled = np.inf, 0
         for _ in range(self.max_iterations):  # step 4
@@ -217,12 +217,12 @@ def _about(start: Start, point: Point) -> dict[str, float]:
 
 
 def _undecided(newton: Newton, point: Point, units: Vector) -> float:
-    """max min(y_i, q_ii λ_i) / max_j |a_ji|: how far from closed and from open a contact may be, mm."""
+    """max min(y_i, q_ii λ_i) / max_j |a_ji|: the largest distance from being closed or open, mm."""
     return float((np.minimum(point.y, np.diag(newton.Q) * point.lam) / units).max())
 
 
 def _rounding(newton: Newton, lam: Vector) -> float:
-    """What rounding may leave in Qλ − p, mm."""
+    """Bound on the rounding error of Qλ − p, mm."""
     root = np.sqrt(np.diag(newton.Q))
     return 4 * EPS * float((abs(newton.p) + root * (root @ lam)).max())
 

@@ -1,8 +1,8 @@
-"""A primal–dual interior-point method on the dual form, made fast: each ingredient can be left out.
+"""A fast primal–dual interior-point method on the dual form; each ingredient can be switched off.
 
-Mehrotra's predictor–corrector (one matrix, two right-hand sides an iteration) from the start STP2;
-the Newton systems factored in single precision and refined in double; and once the iteration has told
-most closed contacts from open ones, the exact answer from that set on. Beside it stands `ipm`, the paper's.
+Mehrotra's predictor–corrector (one matrix, two right-hand sides per iteration) from the start STP2; Newton
+systems factored in single precision and refined in double; and, once most closed contacts are separated
+from open ones, an exact finish on the active set it identified. The paper's method is `ipm`.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.single_precision import SinglePrecision
 
 THETA = 0.995
-LEAST_GAP = 0.01  # mm, of the start
-RHO = 10.0  # with 0.1 the start is up to a hundred times as large, far from the answer
-REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: what is left of y = Qλ − p shrinks by that, or 1 − α, an iteration
+LEAST_GAP = 0.01  # mm, at the start
+RHO = 10.0  # with 0.1 the start is up to a hundred times as large, and far from the solution
+REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: per iteration, the error in y = Qλ − p shrinks by that or by 1 − α
 MAX_ITERATIONS = 100
 MAX_SETS = 1000
 STALLED = 10
 LIMIT = {"cause": f"{MAX_ITERATIONS} iterations"}
-TOLD = 1e-4  # of the μ at the start: before, a contact that looks closed may only not have moved yet
+IDENTIFICATION_RATIO = 1e-4  # of the initial μ: above, a contact may look closed before it has moved
 UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 
 
@@ -44,18 +44,18 @@ class _Ready:
 
 
 class FastIpm(Solver):
-    """Interior point with a finish on the active set.
+    """Interior point with an exact finish on the active set it identified.
 
-    When μ = λᵀy/m has fallen to 1e-4 of its start and at most m/4 contacts are undecided, or the
-    interior point is as good as it gets, C = {q_ii λ_i > y_i} is where `active_set.solve_from` begins,
-    whose status is the answer's. As good as it gets: the natural residual max|min(q_ii λ_i, (Qλ − p)_i)|
-    is at most the tolerance, in mm, or has not fallen for 10 iterations. That, too, is the end without
-    the finish. Iterations are Newton matrices, inner iterations the contact sets of the finish.
+    The finish, `active_set.solve_from` with C = {q_ii λ_i > y_i}, begins when μ = λᵀy/m has fallen to 1e-4
+    of its initial value and at most m/4 contacts are undecided, or when the interior point ends; its status
+    is the answer's. The interior point ends when the natural residual max|min(q_ii λ_i, (Qλ − p)_i)| is at
+    most the tolerance, mm, or has not decreased for 10 iterations. Iterations are Newton matrices, inner
+    iterations the contact sets of the finish.
 
     Options
     -------
-    finish, single, start_at_gaps : false leaves out the finish, the single precision, or the start STP2,
-        in whose place Algorithm 5's is taken.
+    finish, single, start_at_gaps : false switches off the finish, single precision, or the start STP2, which
+        Algorithm 5's then replaces.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
@@ -68,7 +68,7 @@ class FastIpm(Solver):
         self.finish, self.single, self.start_at_gaps = finish, single, start_at_gaps
 
     def prepare(self, data: Problem) -> _Ready | Answer:
-        """Q in single precision, and Q⁻¹ for the finish; where Q has no factor, the answer that says so."""
+        """Q in single precision, and Q⁻¹ for the finish; a failed answer if Q is not positive definite."""
         system: NewtonSystem = SinglePrecision(data.Q) if self.single else Direct(data.Q)
         try:
             return _Ready(data, system, inverse_with_factor(data.Q)[0] if self.finish else None)
@@ -91,7 +91,7 @@ class FastIpm(Solver):
         start = stp2(Q, p, RHO, LEAST_GAP) if self.start_at_gaps else algorithm_5(Q, p)
         point = newton.at(start.lam, start.y)
         details: dict[str, Any] = {"start": {"mu": point.mu}}
-        told, least, stalled = TOLD * point.mu, np.inf, 0
+        identifying_mu, least, stalled = IDENTIFICATION_RATIO * point.mu, np.inf, 0
         for k in range(MAX_ITERATIONS):
             ratio = compliance * point.lam / point.y
             undecided = int(((ratio > 0.1) & (ratio < 10)).sum())
@@ -100,7 +100,7 @@ class FastIpm(Solver):
             least = min(least, residual)
             details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
             done = residual <= tolerance or stalled == STALLED
-            if self.finish and (done or (point.mu <= told and undecided <= UNDECIDED * len(p))):
+            if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
                 answer = solve_from(ratio > 1, ContactSets(Q, p, ready.inverse), tolerance, MAX_SETS)
                 details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)

@@ -2,11 +2,11 @@
 
     λ ≥ 0,   y = Qλ − p ≥ 0,   λᵀy = 0
 
-For a guess C of the contact set the linear equations λ_N = 0, y_C = 0 are solved, and every index whose
-sign is wrong changes sides: Newton's method on min(λ, y) = 0 (Hintermüller, Ito and Kunisch, SIAM J.
+For a guess C of the contact set, the linear equations λ_N = 0, y_C = 0 are solved and every index with a
+wrong sign changes sides: Newton's method on min(λ, y) = 0 (Hintermüller, Ito and Kunisch, SIAM J.
 Optim. 13:865–888, 2002), made finite by block principal pivoting. The first guess comes from the
-answers on a sixteenth and a quarter of the contacts, whose problems have principal submatrices of Q, or
-is all contacts that overlap, if most of the quarter are closed.
+solutions on a sixteenth and a quarter of the contacts, whose matrices are principal submatrices of Q; if
+most of the quarter are closed, it is all contacts that overlap.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ class ActiveSetNewton(Solver):
     """Active-set Newton with nested starts.
 
     Stops when, with λ_C refined against Q, no q_ii λ_i and no y_i is below −max(tolerance, 10 × rounding)
-    mm. λ is then made ≥ 0, and max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Q|λ)) mm makes
-    it "solved", anything else "inaccurate". Iterations are contact sets tried on all contacts, inner
+    mm. Negative λ are then set to 0: "solved" if max(max(−y), max_{λ>0} |y|) ≤ max(tolerance,
+    4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are the contact sets tried on all contacts, inner
     iterations those on the subsets.
 
     Options
     -------
     nested : begin with the subsets; without, with C = {p > 0}. In a series both come after a near answer
         that is wrong at no more than an eighth of the contacts.
-    max_sets : at most so many contact sets.
+    max_sets : limit on the contact sets tried.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
@@ -66,7 +66,7 @@ class ActiveSetNewton(Solver):
         self.max_sets = max_sets
 
     def prepare(self, data: Problem) -> _Ready | Answer:
-        """Q⁻¹, and the cells; where Q has no factor, the answer that says so."""
+        """Q⁻¹, and the cells; a failed answer if Q is not positive definite."""
         assembly = data.assembly
         widths = WIDTHS if self.nested else ()
         cells = tuple(cells_of(assembly.contact_nodes, assembly.m, width) for width in widths)

@@ -8,12 +8,12 @@ from .assembly import Assembly, LoadCase, Vector
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
-    """Matrices and load of a rung that no plates make, with their exact answer where it is known.
+class ManufacturedProblem:
+    """Matrices and load case of a rung without plates, with the exact solution if it is known.
 
-    x (n,), lam (m,) : K x + A λ = f, Aᵀx ≤ g, λ ≥ 0, λᵀ(g − Aᵀx) = 0 hold for these very numbers
-        without any rounding; None where no answer is known.
-    unit_mm (n,), gap_unit_mm (m,) : the lengths that 1 stands for in x and in g, mm.
+    x (n,), lam (m,) : K x + A λ = f, Aᵀx ≤ g, λ ≥ 0, λᵀ(g − Aᵀx) = 0 hold exactly for these numbers, without
+        any rounding; None if the solution is unknown.
+    unit_mm (n,), gap_unit_mm (m,) : the length of one unit of x and of g, mm.
     """
 
     assembly: Assembly
