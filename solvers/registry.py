@@ -15,6 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from problems import __version__
 from problems.errors import Fault, InputError
 
 from .base import Solver
@@ -34,7 +35,7 @@ SOLVERS = {
 
 IN_HOUSE = ("ipm", "gi", "newton", "ipm-fast")
 #: Where the distribution that is installed has another name than the solver.
-DISTRIBUTIONS = dict.fromkeys(IN_HOUSE, "rivetbench") | {"proxqp": "proxsuite", "highs": "highspy"}
+DISTRIBUTIONS = {"proxqp": "proxsuite", "highs": "highspy"}
 
 
 def solver_names() -> list[str]:
@@ -65,6 +66,8 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
     """Version of the package that solves; for a plugin a hash of its file; else "unknown"."""
     if plugin is not None and name == plugin.stem:
         return "sha256:" + hashlib.sha256(plugin.read_bytes()).hexdigest()[:12]
+    if name in IN_HOUSE:
+        return __version__
     try:
         return version(DISTRIBUTIONS.get(name, name))
     except PackageNotFoundError:

@@ -276,7 +276,8 @@ def test_a_suite_on_workers_one_of_which_is_killed(cluster: Any, tmp_path: Path)
     assert rows.keys() == wanted.keys()
     for key, row in rows.items():
         assert (row["status"], row["verdict"]) == ("solved", "within")
-        assert row["machine"] == wanted[key]["machine"]
+        for name in ("machine", "commit", "clean"):
+            assert row[name] == wanted[key][name]
         with np.load(out / row["answer"]) as got, np.load(here / wanted[key]["answer"]) as expected:
             np.testing.assert_allclose(got["x"], expected["x"], atol=1e-8)
 

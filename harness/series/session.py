@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from harness.measurement.answers import checked
 from harness.measurement.loads import loads_of
 from harness.measurement.warm_starts import WarmStarts
+from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.verification.batched.bound import Bound
 from harness.verification.batched.vouch import Vouched, vouch
@@ -74,6 +75,7 @@ class Desk:
     def __init__(self, job: Job) -> None:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
+        self.code = provenance()
         self.data: Prepared = prepared(job.scene)
         self.bound = Bound.of(self.data)
         self.solver = make_solver(job.solver, job.options, job.plugin)
@@ -193,6 +195,7 @@ class Desk:
             "form_s": vouch_s,
             "verdict": "no_answer",
             "limit_mm": job.limit_mm,
+            **self.code,
         }
         if about is None:
             return Result(row, None)
