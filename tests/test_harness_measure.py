@@ -16,6 +16,8 @@ import tiny
 from harness.measurement.process import measure
 from harness.planning.plan import Measurement
 
+pytestmark = pytest.mark.slow
+
 MIB = 300
 
 
