@@ -160,10 +160,14 @@ def test_a_worker_that_something_else_kills_is_a_row(folder: Path) -> None:
 
 
 def test_of_two_runs_at_once_one_gives_way(folder: Path) -> None:
-    suite = suite_of(folder / "two", "gives_up", "gives_up")
-    out = folder / "two" / "out"
+    """The one that has the directory is not done before the other has given way."""
+    suite = suite_of(folder / "two", "waits", "gives_up")
+    out, go = folder / "two" / "out", folder / "two" / "go"
     pipes: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "cwd": ROOT}
+    pipes["env"] = {**os.environ, "GO": str(go)}
     both = [subprocess.Popen(command(suite, out), **pipes) for _ in range(2)]
+    wait_for(lambda: any(going.poll() is not None for going in both))
+    go.touch()
     said = [going.communicate(timeout=60)[1].decode() for going in both]
     codes = [going.returncode for going in both]
     assert sorted(codes) == [2, 3]
