@@ -17,7 +17,8 @@ from problems.condensation.condensed_part import condensed_part, part_key
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.stages import Progress, Stored, indefinite
 from problems.input import user_matrices
-from problems.model.effect import ForceEffect, GapEffect, PartLoadEffect, TieEffect
+from problems.model.effect import ForceEffect, GapEffect, TieEffect
+from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint

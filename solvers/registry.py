@@ -17,6 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from problems import __version__
 from problems.errors import Fault, InputError
 
 from .base import Solver
@@ -71,6 +72,8 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
     """Version of the package that solves; for a plugin a hash of its file; else "unknown"."""
     if plugin is not None and name == plugin.stem:
         return "sha256:" + hashlib.sha256(plugin.read_bytes()).hexdigest()[:12]
+    if in_house(name):
+        return __version__
     try:
         return version(_distribution(name))
     except PackageNotFoundError:
@@ -79,8 +82,6 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
 
 def _distribution(name: str) -> str:
     """What the package that solves is called where it is installed."""
-    if in_house(name):
-        return "rivetbench"
     if name in modules():
         return _class_of(name).distribution or name
     from .libraries.qpsolvers import DISTRIBUTIONS

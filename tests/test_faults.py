@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import signal
@@ -25,6 +26,8 @@ from harness.measurement import row as rows_module
 from harness.measurement.run import run
 from harness.planning.suite import read_suite
 from harness.results import records
+
+pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parent.parent
 
@@ -136,23 +139,35 @@ def test_a_run_killed_again_and_again_ends_with_every_row_once(folder: Path) -> 
     assert [row["variant"][0] for row in rows_of(out)] == ["0", "1", "2", "3"]
 
 
+def workers_of(driver: int) -> list[psutil.Process]:
+    """The workers among a driver's children, some of which may end while they are looked at."""
+    found = []
+    for child in psutil.Process(driver).children():
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if "harness.measurement.worker" in child.cmdline():
+                found.append(child)
+    return found
+
+
 def test_a_worker_that_something_else_kills_is_a_row(folder: Path) -> None:
     suite = suite_of(folder / "worker", "sleep", "gives_up")
     out = folder / "worker" / "out"
     going = subprocess.Popen(command(suite, out), cwd=ROOT, stdout=subprocess.DEVNULL)
-    driver = psutil.Process(going.pid)
-    name = "harness.measurement.worker"
-    worker = wait_for(lambda: [c for c in driver.children() if name in " ".join(c.cmdline())])[0]
+    worker = wait_for(lambda: workers_of(going.pid))[0]
     worker.send_signal(signal.SIGKILL)
     assert going.wait(60) == 3  # nothing could be judged
     assert [row["status"] for row in rows_of(out)] == ["crashed", "iteration_limit"]
 
 
 def test_of_two_runs_at_once_one_gives_way(folder: Path) -> None:
-    suite = suite_of(folder / "two", "gives_up", "gives_up")
-    out = folder / "two" / "out"
+    """The one that has the directory is not done before the other has given way."""
+    suite = suite_of(folder / "two", "waits", "gives_up")
+    out, go = folder / "two" / "out", folder / "two" / "go"
     pipes: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "cwd": ROOT}
+    pipes["env"] = {**os.environ, "GO": str(go)}
     both = [subprocess.Popen(command(suite, out), **pipes) for _ in range(2)]
+    wait_for(lambda: any(going.poll() is not None for going in both))
+    go.touch()
     said = [going.communicate(timeout=60)[1].decode() for going in both]
     codes = [going.returncode for going in both]
     assert sorted(codes) == [2, 3]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ import tiny
 
 from harness.measurement.process import measure
 from harness.planning.plan import Measurement
+
+pytestmark = pytest.mark.slow
 
 MIB = 300
 
@@ -50,6 +53,22 @@ def outcome(folder: Path, fault: str | None, **changes: Any) -> dict[str, Any]:
         }
     )
     return measure([measurement], [folder / "answer.npz"])[0]
+
+
+def test_a_worker_that_dies_before_it_has_its_job(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The job cannot be handed over, neither when it is written nor when the pipe is closed."""
+    popen = subprocess.Popen
+
+    def stillborn(*arguments: Any, **options: Any) -> Any:
+        process = popen(*arguments, **options)
+        process.kill()
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # dead, but not yet waited for
+        return process
+
+    monkeypatch.setattr(subprocess, "Popen", stillborn)
+    row = outcome(folder, None)
+    assert row["status"] == "crashed"
+    assert "SIGKILL" in row["message"]
 
 
 def test_an_answer_with_its_times_and_threads(folder: Path) -> None:

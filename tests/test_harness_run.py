@@ -26,13 +26,15 @@ from harness.planning.suite import read_suite
 from harness.results import records
 from harness.verification.gate import gate
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parent.parent
 CONTRACT = {
     "suite", "scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeat",
     "status", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s",
     "solver_reported_s", "displacement_error_mm", "limit_mm", "verdict", "reference_bound_mm",
     "contact_mismatch", "min_gap_mm", "primal_residual", "dual_residual", "duality_gap", "peak_rss_mib",
-    "machine",
+    "machine", "commit", "clean",
 }  # fmt: skip
 TWO = """
 [[solver]]

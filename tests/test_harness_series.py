@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import time
 from io import StringIO
 from pathlib import Path
@@ -27,6 +28,8 @@ from problems.errors import InputError
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 from report.sections.series import compared
+
+pytestmark = pytest.mark.slow
 
 SUITE = """
 scenes = ["strip.toml"]
@@ -108,8 +111,26 @@ def made(suite: str, out: str) -> tuple[str, list[dict[str, Any]]]:
     return text, records.read(Path(out) / records.MEASUREMENTS)
 
 
-def test_each_case_has_a_row_and_an_answer_of_its_own() -> None:
-    _, rows = made("two.toml", "two")
+@pytest.fixture(scope="module")
+def two(_here: None) -> Path:
+    """A run of two.toml. A test that changes it takes a copy."""
+    made("two.toml", "two")
+    return Path("two").absolute()
+
+
+@pytest.fixture(scope="module")
+def together(_here: None) -> Path:
+    """A run of together.toml."""
+    made("together.toml", "together")
+    return Path("together").absolute()
+
+
+def read(run: Path) -> list[dict[str, Any]]:
+    return records.read(run / records.MEASUREMENTS)
+
+
+def test_each_case_has_a_row_and_an_answer_of_its_own(two: Path) -> None:
+    rows = read(two)
     assert [(row["solver"], row["case"]) for row in rows] == [
         (solver, k) for solver in ("newton", "piqp") for k in range(4)
     ]
@@ -131,8 +152,8 @@ def test_each_case_has_a_row_and_an_answer_of_its_own() -> None:
     assert code == 0
 
 
-def test_a_case_that_is_missing_is_measured_alone() -> None:
-    made("two.toml", "gap")
+def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:
+    shutil.copytree(two, "gap")
     path = Path("gap") / records.MEASUREMENTS
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:2] + lines[3:]))
@@ -143,8 +164,8 @@ def test_a_case_that_is_missing_is_measured_alone() -> None:
     assert rows[-1]["verdict"] == "within"
 
 
-def test_a_spoilt_answer_of_a_case_is_seen_by_the_gate() -> None:
-    _, rows = made("two.toml", "spoilt")
+def test_a_spoilt_answer_of_a_case_is_seen_by_the_gate(two: Path) -> None:
+    rows = read(shutil.copytree(two, Path("spoilt")))
     for k in (0, 1):  # the answer of another case
         with np.load(Path("spoilt") / rows[k]["answer"]) as saved:
             np.savez(Path("spoilt") / rows[1 - k + 2]["answer"], **dict(saved))
@@ -171,40 +192,40 @@ def test_a_case_that_ends_the_process_leaves_those_before_it(fault: str, status:
     assert "case=2" in rows[3]["message"]
 
 
-def test_cases_solved_together_share_the_seconds() -> None:
+def test_cases_solved_together_share_the_seconds(together: Path) -> None:
     """A row a case, each judged for itself; the second call begins with what the first has found."""
-    _, rows = made("together.toml", "together")
-    alone, together, faulty = rows[:2], rows[2:6], rows[6:]
+    rows = read(together)
+    alone, batched, faulty = rows[:2], rows[2:6], rows[6:]
     assert [(row["case"], row["warm"], row["batched"]) for row in alone] == [
         (0, False, None),
         (1, True, None),
     ]
-    assert [(row["case"], row["warm"], row["batched"]) for row in together] == [
+    assert [(row["case"], row["warm"], row["batched"]) for row in batched] == [
         *((k, False, 3) for k in range(3)),
         (3, True, 1),
     ]
-    assert {row["verdict"] for row in alone + together} == {"within"}
+    assert {row["verdict"] for row in alone + batched} == {"within"}
     assert len({row["key"] for row in rows}) == len(rows)
     for name in ("solve_s", "form_s"):
-        assert len({row[name] for row in together[:3]}) == 1
-        assert len({row[name] for row in together}) == 2
-    assert len({row["prepare_s"] for row in together}) == 1
+        assert len({row[name] for row in batched[:3]}) == 1
+        assert len({row[name] for row in batched}) == 2
+    assert len({row["prepare_s"] for row in batched}) == 1
     scene = read_scene("strip.toml")
     data = prepared(scene)
     cases = random_gaps(scene, 4, 9)
-    for row in together:
+    for row in batched:
         case = cases.load(row["case"])
         x, lam = solve_by_nnls(data, case)
-        with np.load(Path("together") / row["answer"]) as saved:
+        with np.load(together / row["answer"]) as saved:
             np.testing.assert_allclose(saved["x"], x, atol=1e-8)
             np.testing.assert_allclose(saved["lam"], lam, atol=1e-4)
     assert {row["status"] for row in faulty} == {"unsupported"}
     assert faulty[0]["message"] == "takes one load case at a time"
 
 
-def test_other_gaps_are_another_series() -> None:
+def test_other_gaps_are_another_series(two: Path) -> None:
     """More cases are added; rows of another random field are set aside."""
-    made("two.toml", "changed")
+    shutil.copytree(two, "changed")
     text, rows = made(write("more.toml", SUITE.replace("cases = 4", "cases = 5")), "changed")
     assert "10 measurements, 8 of them already" in text
     assert len(rows) == 10
@@ -236,11 +257,10 @@ def test_repeats_of_a_series_stay_together(tmp_path: Path) -> None:
     assert validated(__import__("tomllib").loads(to_toml(suite)), tmp_path) == suite
 
 
-def test_the_table_of_the_report() -> None:
-    made("two.toml", "reported")
+def test_the_table_of_the_report(two: Path) -> None:
     from report.writers.markdown import write as report
 
-    text = report(Path("reported")).read_text()
+    text = report(two).read_text()
     assert "## Series of load cases" in text
     assert len(re.findall(r"\| +4 of 4 \|", text)) == 2
     assert "PIQP `update`" in text
@@ -248,11 +268,10 @@ def test_the_table_of_the_report() -> None:
     assert "Repeatability" not in text  # cases are no repeats
 
 
-def test_a_report_without_a_library_and_with_cases_that_failed() -> None:
-    made("together.toml", "alone")
+def test_a_report_without_a_library_and_with_cases_that_failed(together: Path) -> None:
     from report.writers.markdown import write as report
 
-    text = report(Path("alone")).read_text()
+    text = report(together).read_text()
     assert "*Batched*: given many load cases at once" in text
     assert re.search(r"newton \(dual\) batched +\| +4 of 4 \| .* – \|", text)
     assert re.search(r"faulty \(dual\) batched +\| +0 of 4 \| +– \|", text)

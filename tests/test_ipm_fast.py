@@ -9,7 +9,7 @@ from test_gi import definite
 
 from problems.errors import InputError
 from problems.forms.problem import in_form
-from solvers.linear_algebra.single_precision import SinglePrecision
+from solvers.interior_point.single_precision import SinglePrecision
 from solvers.methods.ipm_fast import FastIpm
 
 

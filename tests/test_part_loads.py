@@ -19,9 +19,10 @@ from problems.effects.support_shift import SupportShift
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
 from problems.forms.prepared import Prepared
-from problems.model.effect import Effect, PartLoadEffect, StiffnessEffect
+from problems.model.effect import Effect, StiffnessEffect
 from problems.model.joint import Joint
 from problems.model.part import PartModel
+from problems.model.part_load import PartLoadEffect
 
 E, T = 70e3, 6.0
 #: A strip along y, clamped at y = −200, free at y = 150, bending like a beam since ν = 0.

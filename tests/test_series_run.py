@@ -28,6 +28,8 @@ from problems.forms.dual import Dual
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parent.parent
 SLOW = tiny.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
 
@@ -41,6 +43,12 @@ def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
         (folder / "slow.py").write_text(SLOW)
         patch.chdir(folder)
         yield
+
+
+@pytest.fixture(autouse=True)
+def _no_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its pictures take most of the time, and are tested in test_series_report."""
+    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
 
 
 def series(*arguments: str, code: int = 0) -> Any:
@@ -57,9 +65,13 @@ def gaps_of(directory: str) -> np.ndarray:
     return np.fromfile(Path(directory) / store.GAPS, np.float32).reshape(-1, 45)
 
 
-def test_rows_and_gaps_against_nnls_on_scenes_of_their_own(tmp_path: Path) -> None:
-    """Each case solved again as the scene that its row names, by another method."""
+def test_rows_and_gaps_against_nnls_on_scenes_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each case solved again as the scene that its row names, by another method; with the report."""
+    monkeypatch.undo()
     series("--cases", "70", "--seed", "5", "--check", "10", "--out", "plain")
+    assert Path("plain/report/report.md").is_file()
     rows, gaps = rows_of("plain"), gaps_of("plain")
     assert [row["case"] for row in rows] == list(range(70))
     assert {row["verdict"] for row in rows} == {"within"}

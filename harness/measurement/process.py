@@ -232,4 +232,5 @@ class Worker:
         self.selector.close()
         for stream in (self.events, self.process.stdin, self.process.stderr):
             if stream is not None:
-                stream.close()
+                with contextlib.suppress(BrokenPipeError):  # a job that the worker did not live to read
+                    stream.close()

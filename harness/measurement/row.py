@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from harness.planning.plan import Measurement
+from harness.results.machine import installed_version, machine
+from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.results.schema import MEASURED, MEASURED_OF_CASES, STEPS
 from harness.verification.ground_truth import Ground
@@ -21,7 +23,6 @@ from problems.scene import read_scene
 from solvers.base import Form
 
 from .describe import Description
-from .machine import installed_version, machine
 from .process import measure
 
 
@@ -41,13 +42,14 @@ class Order:
 class Measured:
     """What the worker processes told, and how long it took.
 
-    From a worker of a scheduler also the answers' files, None where there is none, and its machine.
+    From a worker of a scheduler also the answers' files, None where there is none, its machine and its code.
     """
 
     told: list[Row]
     elapsed_s: float
     files: list[bytes | None] | None = None
     machine: dict[str, Any] | None = None
+    code: Row | None = None
 
 
 def measured(order: Order, answers: Path) -> Measured:
@@ -71,11 +73,11 @@ def measured_on_worker(order: Order) -> Measured:
         made = measured(order, Path(folder))
         paths = [Path(folder) / f"{m.stem}.npz" for m in order.batch]
         files = [path.read_bytes() if path.exists() else None for path in paths]
-    return Measured(made.told, made.elapsed_s, files, machine())
+    return Measured(made.told, made.elapsed_s, files, machine(), provenance())
 
 
 def rows_of(
-    batch: list[Measurement], made: Measured, base: Ground, directory: Path, solver: Description, here: str
+    batch: list[Measurement], made: Measured, base: Ground, directory: Path, solver: Description, here: Row
 ) -> list[Row]:
     """Judge what was measured, and put together the rows."""
     answers = [directory / "answers" / f"{m.stem}.npz" for m in batch]
@@ -89,9 +91,9 @@ def rows_of(
 
 
 def one_row(
-    m: Measurement, answer: Path, told: Row, base: Ground, solver: Description, here: str, elapsed: float
+    m: Measurement, answer: Path, told: Row, base: Ground, solver: Description, here: Row, elapsed: float
 ) -> Row:
-    """The row of a measurement of which the worker told that."""
+    """The row of a measurement of which the worker told that. here : its `machine`, `commit` and `clean`."""
     if "cannot_save" in told:
         raise OSError(told["cannot_save"])
     series = m.series.model_dump() if m.series else None
@@ -123,7 +125,7 @@ def one_row(
         **asdict(judgement),
         **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
         "overhead_s": elapsed - sum(known) if m.case is None else None,
-        "machine": here,
+        **here,
         "scene_key": base.scene.key,
         "in_house": solver.in_house,
         "solver_version": solver.version,

@@ -19,6 +19,8 @@ from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, to_toml
 from harness.planning.timeouts import predicted_timeout
 from harness.results import records
+from harness.results.machine import machine
+from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
 from harness.terminal.progress import Display
@@ -26,7 +28,6 @@ from harness.verification.ground_truth import Ground, ground, record, record_ref
 from problems.scene import read_scene
 
 from .describe import Description, Solvers, describe
-from .machine import machine
 from .resume import resumed
 from .row import Measured, Order, measured, measured_on_worker, rows_of
 from .scheduler import done_as_completed, workers
@@ -50,7 +51,7 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)
-        here = remember_machine(directory, machine())
+        here = {"machine": remember_machine(directory, machine()), **provenance()}
         made = {row["key"] for row in rows}
         left = [m for m in plan if m.key not in made]
         done = len(plan) - len(left)
@@ -103,7 +104,7 @@ def measure_all(
     done: int,
     directory: Path,
     solvers: Solvers,
-    here: str,
+    here: Row,
     outcomes: Outcomes,
     console: Console,
 ) -> list[Row]:
@@ -116,7 +117,9 @@ def measure_all(
                 why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
                 console.print(f"{due.batch[0].key}: not measured: {why}", style="red")
                 continue
-            where = remember_machine(directory, outcome.machine) if outcome.machine else here
+            where = here
+            if outcome.machine and outcome.code:
+                where = {"machine": remember_machine(directory, outcome.machine), **outcome.code}
             made = rows_of(due.batch, outcome, due.base, directory, due.solver, where)
             records.append(directory / records.MEASUREMENTS, *made)
             rows += made

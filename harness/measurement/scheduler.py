@@ -13,9 +13,9 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from harness.results.machine import PACKAGES, installed_version
 from problems.errors import Fault, InputError
-
-from .machine import PACKAGES, installed_version
+from problems.storage.fingerprint import ROOT, fingerprint
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -23,6 +23,7 @@ R = TypeVar("R")
 
 ANSWERS_WITHIN = "20s"
 RETRIES = 2  # of a task that raises
+CODE = ("problems", "solvers", "harness")
 AHEAD = 2  # tasks handed out for each worker: one being done, one that waits
 
 
@@ -84,8 +85,10 @@ def _versions_of(client: Any) -> dict[str, dict[str, str]]:
 
 
 def versions() -> dict[str, str]:
-    """Of Python, and of the packages that an answer can depend on."""
-    return {"python": platform.python_version(), **{name: installed_version(name) for name in PACKAGES}}
+    """Of Python and of the packages that an answer can depend on; the fingerprint of this project's code."""
+    code = fingerprint(file for folder in CODE for file in (ROOT / folder).rglob("*.py"))
+    packages = {name: installed_version(name) for name in PACKAGES}
+    return {"python": platform.python_version(), **packages, "code": code}
 
 
 def other_versions(who: str, here: dict[str, str], there: dict[str, str]) -> list[Fault]:

@@ -23,6 +23,7 @@ from typing import Any
 
 import threadpoolctl
 
+from harness.results.machine import resident_mib
 from harness.results.records import Row, to_line
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -33,7 +34,6 @@ from solvers.base import Answer
 from solvers.registry import make_solver
 
 from .answers import Refused, figures, save
-from .machine import resident_mib
 from .solver_session import SolverSession
 from .yardstick import yardstick
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from harness.measurement.machine import physical_memory_mib
+from harness.results.machine import physical_memory_mib
 from problems.errors import Fault, InputError
 from problems.model.effect import TieEffect
 from problems.model.joint import Joint, Part

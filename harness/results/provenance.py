@@ -1,33 +1,77 @@
-"""The code that runs: the project's commit, or the installed version."""
+"""Which code made a row: its commit and whether that was changed since, or else its version."""
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from problems import __version__
+
+#: The folder that holds the project's packages.
+ROOT = Path(__file__).resolve().parents[2]
+#: What can change a number; results that are written meanwhile do not count.
+CODE = ("problems", "solvers", "harness", "report", "pyproject.toml")
+#: Tracked in a work tree of this project; a tree that merely contains an installed copy tracks neither.
+OWN = ("pyproject.toml", "harness/results/provenance.py")
+#: Set by git for its hooks, they name the tree that the hook is for.
+OF_HOOKS = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR")
 
 
-@cache
+def provenance() -> dict[str, str | bool | None]:
+    """`commit` and `clean` as every row names them."""
+    name, clean = commit()
+    return {"commit": name, "clean": clean}
+
+
 def commit() -> tuple[str, bool | None]:
-    """The commit, 40 digits, and whether the tree has no changes; without a repository the installed
-    version's text and None.
+    """The commit of the code in these packages, and whether the code is as committed.
+
+    In a git work tree of the project, the 40 hexadecimal digits of HEAD, and whether CODE has no changes;
+    an untracked file is one, because plug-ins are found by discovery. If pip installed the packages from
+    a git repository, the commit it recorded (PEP 610), which is clean. Otherwise, or if git is missing,
+    the version and None, not known.
     """
-    try:
-        head = _git("rev-parse", "HEAD")
-        top = Path(_git("rev-parse", "--show-toplevel")).resolve()
-        if top == ROOT.resolve():
-            return head, not _git("status", "--porcelain")
-    except (OSError, subprocess.CalledProcessError):
-        pass
-    try:
-        return version("rivetbench"), None
-    except PackageNotFoundError:
-        return "unknown", None
+    return _of_work_tree() or _of_installation() or (__version__, None)
 
 
-def _git(*words: str) -> str:
-    done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True)
-    return done.stdout.strip()
+def _of_work_tree() -> tuple[str, bool | None] | None:
+    head = _git("rev-parse", "--show-prefix", "HEAD")
+    if head is None or _git("ls-files", "--error-unmatch", "--", *OWN) is None:
+        return None
+    below, digits = head.splitlines()
+    if below:  # the packages lie deeper in a work tree: of another project
+        return None
+    changes = _git("status", "--porcelain", "--untracked-files=all", "--", *CODE)
+    return digits, None if changes is None else not changes
+
+
+def _git(*arguments: str) -> str | None:
+    """What git prints about ROOT; None if it is not installed or fails."""
+    environment = {name: value for name, value in os.environ.items() if name not in OF_HOOKS}
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(ROOT), *arguments],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            env=environment | {"GIT_OPTIONAL_LOCKS": "0"},  # never in the way of a commit
+        )
+    except OSError:
+        return None
+    return done.stdout if done.returncode == 0 else None
+
+
+def _of_installation() -> tuple[str, bool] | None:
+    """The commit that the distribution holding these packages was installed from, if it was recorded."""
+    try:
+        installed = distribution("rivetbench")
+        origin = json.loads(installed.read_text("direct_url.json") or "{}")
+    except (PackageNotFoundError, ValueError):
+        return None
+    here = Path(str(installed.locate_file("harness"))).resolve() == ROOT / "harness"
+    digits = origin.get("vcs_info", {}).get("commit_id")
+    return (digits, True) if here and digits else None

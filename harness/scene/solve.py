@@ -17,9 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 from harness.measurement.answers import Refused
-from harness.measurement.machine import resident_mib
 from harness.measurement.solver_session import SolverSession
 from harness.planning.estimate import refuse_what_cannot_fit
+from harness.results.machine import resident_mib
 from harness.results.records import replace_text, to_line
 from harness.terminal.exit_codes import DONE, FELL_SHORT
 from harness.verification.judge import LIMIT_MM, judge
@@ -30,7 +30,8 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import usual
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.model.effect import PartLoadEffect, TieEffect
+from problems.model.effect import TieEffect
+from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.scene import read_scene
 from solvers.base import Solver

@@ -10,10 +10,11 @@ import scipy.linalg as sla
 from rich.console import Console
 from rich.table import Table
 
-from harness.measurement.machine import physical_memory_mib
 from harness.planning.estimate import estimated, refuse_what_cannot_fit
+from harness.results.machine import physical_memory_mib
 from problems.build import built, prepared
-from problems.model.effect import PartLoadEffect, TieEffect
+from problems.model.effect import TieEffect
+from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 

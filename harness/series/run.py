@@ -14,9 +14,9 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from harness.measurement.machine import installed_version, machine
 from harness.measurement.scheduler import done_as_completed, workers
 from harness.results import records
+from harness.results.machine import installed_version, machine
 from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
 from problems.build import prepared
 from problems.model.scene import JointScene

@@ -15,6 +15,7 @@ import threadpoolctl
 from numpy.typing import NDArray
 
 from harness.measurement.solver_session import SolverSession
+from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.verification.batched.bound import Bound
 from harness.verification.batched.vouch import Vouched, vouch
@@ -75,6 +76,7 @@ class SeriesSession:
     def __init__(self, job: Job) -> None:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
+        self.code = provenance()
         self.data: Prepared = prepared(job.scene)
         self.bound = Bound.of(self.data)
         self.problem = in_form(self.data, job.form)
@@ -184,6 +186,7 @@ class SeriesSession:
             "form_s": vouch_s,
             "verdict": "no_answer",
             "limit_mm": job.limit_mm,
+            **self.code,
         }
         if about is None:
             return Result(row, None)

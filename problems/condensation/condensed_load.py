@@ -13,9 +13,10 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from problems.forms.assembly import Vector
-from problems.model.effect import PartLoadEffect, StiffnessEffect
+from problems.model.effect import StiffnessEffect
 from problems.model.joint import Joint
 from problems.model.part import PartModel
+from problems.model.part_load import PartLoadEffect
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 

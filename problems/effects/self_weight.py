@@ -8,9 +8,9 @@ import numpy as np
 
 from problems.fem.line_loads import line_loads
 from problems.forms.assembly import Vector
-from problems.model.effect import PartLoadEffect
 from problems.model.joint import Finite, Positive
 from problems.model.part import PartModel
+from problems.model.part_load import PartLoadEffect
 
 KG_PER_M3_TIMES_M_PER_S2 = 1e-9  # N/mm³
 

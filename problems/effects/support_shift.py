@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import Field
 
 from problems.forms.assembly import Vector
-from problems.model.effect import Effect, PartLoadEffect
+from problems.model.effect import Effect
 from problems.model.joint import Finite, Joint
 from problems.model.part import PartModel
+from problems.model.part_load import PartLoadEffect
 
 from .supports import Supports
 

@@ -5,7 +5,7 @@ Its module is imported only when a scene names it.
 
     StiffnessEffect   to the stiffness of one part, before condensation
     ForceEffect       forces on the junction nodes
-    PartLoadEffect    a load anywhere on one part, condensed onto its junction nodes
+    PartLoadEffect    (part_load.py) a load anywhere on one part, condensed onto its junction nodes
     GapEffect         to the initial gap; it may add the contact that it acts on
     TieEffect         springs between the junction nodes of two parts, and their installation forces
 """
@@ -16,7 +16,7 @@ import importlib
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,9 +26,6 @@ from problems.fem.plate import Plate
 from problems.forms.assembly import Matrix, Vector
 
 from .joint import TOOL, Joint, Table
-
-if TYPE_CHECKING:
-    from .part import PartModel
 
 Pair = tuple[str, str]
 Range = tuple[float, float]
@@ -121,19 +118,6 @@ class TieEffect(ForceEffect):
     @abstractmethod
     def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
         """T (n, r), one column per spring with its direction, and k (r,) in N/mm."""
-
-
-class PartLoadEffect(Effect):
-    """Adds a load on one part, in the junction or beyond it."""
-
-    part: str
-
-    @abstractmethod
-    def load(self, model: PartModel) -> Vector:
-        """(plate.size,) generalised force on each degree of freedom: N, N·mm, N·mm²."""
-
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_part(self.part, joint)
 
 
 def pairs_of(between: Pair | None, joint: Joint) -> tuple[Pair, ...]:

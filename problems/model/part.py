@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,10 +15,8 @@ from numpy.typing import NDArray
 
 from problems.fem.plate import Plate
 
+from .effect import Range, StiffnessEffect
 from .joint import Joint, Part
-
-if TYPE_CHECKING:
-    from .effect import Range, StiffnessEffect
 
 Unknowns = NDArray[np.intp]
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.active_set.bordered_factor import Set
 
 WINDOW_LINES = 4  # lines of contacts across the joint in a window, before the current one
 DEFAULT_LINE = 16  # contacts per line if coordinates are unknown
@@ -37,7 +36,7 @@ class BandedInverse:
         """M v."""
         return blas.dsbmv(len(self.band) - 1, 1.0, self.band, v, lower=1)
 
-    def factor(self, S: Set) -> BandFactor:
+    def factor(self, S: NDArray[np.bool_]) -> BandFactor:
         """The Cholesky factor of M_SS. Raises LinAlgError if rounding makes it indefinite."""
         rows, width = np.flatnonzero(S), len(self.band) - 1
         nearer = np.arange(len(rows)) - np.searchsorted(rows, rows - width)
@@ -57,7 +56,7 @@ class BandedInverse:
 class BandFactor:
     """M_SS = LLᵀ, rows : the indices in S."""
 
-    S: Set
+    S: NDArray[np.bool_]
     rows: NDArray[np.intp]
     L: Matrix
 

@@ -20,9 +20,9 @@ from solvers.base import Answer, Form, LoadCase, Problem, Solver, failed
 from solvers.interior_point.infeasible_start import stp2
 from solvers.interior_point.newton_system import Direct, NewtonSystem
 from solvers.interior_point.schemes import Newton, Point, mehrotra
+from solvers.interior_point.single_precision import SinglePrecision
 from solvers.interior_point.start import NoStart, algorithm_5
 from solvers.linear_algebra.inverse import inverse_with_factor
-from solvers.linear_algebra.single_precision import SinglePrecision
 
 THETA = 0.995
 LEAST_GAP = 0.01  # mm, at the start

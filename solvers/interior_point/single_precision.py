@@ -11,9 +11,9 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.interior_point.newton_system import Direct, Solved
+from solvers.linear_algebra.product import product
 
-from .product import product
+from .newton_system import Direct, Solved
 
 MAX_DIAGONAL = 1e30  # on the diagonal
 

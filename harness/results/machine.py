@@ -10,6 +10,8 @@ from typing import Any
 
 import psutil
 
+from problems import __version__
+
 PACKAGES = ("rivetbench", "numpy", "scipy", "qpsolvers", "osqp", "clarabel", "proxsuite", "piqp")
 
 
@@ -52,6 +54,9 @@ def resident_mib(name: str) -> float | None:
 
 
 def installed_version(package: str) -> str:
+    """Our own is that of the code that runs, installed or not; "unknown" if a library is not installed."""
+    if package == "rivetbench":
+        return __version__
     try:
         return version(package)
     except PackageNotFoundError:

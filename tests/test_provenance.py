@@ -1,0 +1,169 @@
+"""Which code a row is of: in a work tree, installed, or neither; each asked of a copy in its own process."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import pytest
+import tiny
+from rich.console import Console
+from strip import write_strip
+
+from harness.measurement.run import run as run_suite
+from harness.planning.suite import read_suite
+from harness.results.machine import installed_version
+from harness.results.provenance import OF_HOOKS, ROOT, commit
+from harness.results.records import MEASUREMENTS, read
+from harness.series import store
+from harness.series.run import run as run_series
+from harness.series.session import Job
+from problems import __version__
+from problems.load_cases.random_gaps import random_gaps
+from problems.scene import read_scene
+
+COPIED = (
+    *("problems/__init__.py", "harness/__init__.py", "harness/results/__init__.py"),
+    *("harness/results/provenance.py", "pyproject.toml"),
+)
+ASK = "from harness.results.provenance import commit; import json; print(json.dumps(commit()))"
+NOT_KNOWN = (__version__, None)
+ORIGIN = {"url": "https://example.org/rivetbench.git", "vcs_info": {"vcs": "git", "commit_id": "c" * 40}}
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """A copy of what tells the commit, in no repository."""
+    return copied(tmp_path / "tree")
+
+
+def copied(folder: Path) -> Path:
+    for name in COPIED:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
+    return folder
+
+
+def git(folder: Path, *arguments: str) -> str:
+    who = ["-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false"]
+    alone = {name: value for name, value in os.environ.items() if name not in OF_HOOKS}
+    done = subprocess.run(
+        ["git", *who, *arguments], cwd=folder, env=alone, check=True, capture_output=True, text=True
+    )
+    return done.stdout.strip()
+
+
+def committed(folder: Path) -> str:
+    git(folder, "init", "-q")
+    git(folder, "add", "-A")
+    git(folder, "commit", "-q", "-m", "all")
+    return git(folder, "rev-parse", "HEAD")
+
+
+def asked(folder: Path, **environment: str) -> tuple[str, bool | None]:
+    """What the packages in that folder say."""
+    variables = {**os.environ, "PYTHONPATH": str(folder), **environment}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", ASK], env=variables, check=True, capture_output=True, cwd=folder.parent
+    )
+    name, clean = json.loads(done.stdout)
+    return name, clean
+
+
+def installed(folder: Path, origin: object) -> None:
+    """As pip leaves it beside the packages."""
+    about = folder / f"rivetbench-{__version__}.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text(f"Metadata-Version: 2.4\nName: rivetbench\nVersion: {__version__}\n")
+    (about / "direct_url.json").write_text(json.dumps(origin))
+
+
+def test_a_work_tree_as_committed(tree: Path) -> None:
+    head = committed(tree)
+    assert len(head) == 40
+    (tree / "results").mkdir()
+    (tree / "results/measurements.jsonl").write_text("{}\n")  # written meanwhile
+    (tree / "README.md").write_text("not code\n")
+    assert asked(tree) == (head, True)
+
+
+@pytest.mark.parametrize(
+    "name", ["problems/__init__.py", "pyproject.toml", "solvers/new.py", "report/new.py"]
+)
+def test_a_work_tree_with_changes(tree: Path, name: str) -> None:
+    """A changed file, or one that git does not know yet."""
+    head = committed(tree)
+    (tree / name).parent.mkdir(exist_ok=True)
+    with (tree / name).open("a") as file:
+        file.write("\n# changed\n")
+    assert asked(tree) == (head, False)
+
+
+def test_a_hook_of_another_repository_does_not_lead_astray(tree: Path, tmp_path: Path) -> None:
+    head, other = committed(tree), tmp_path / "other"
+    other.mkdir()
+    (other / "file").write_text("of another project")
+    committed(other)
+    hook = {"GIT_DIR": str(other / ".git"), "GIT_WORK_TREE": str(other), "GIT_INDEX_FILE": "index"}
+    assert asked(tree, **hook) == (head, True)
+
+
+def test_without_git_the_version_is_named(tree: Path, tmp_path: Path) -> None:
+    committed(tree)
+    assert asked(tree, PATH=str(tmp_path)) == NOT_KNOWN
+
+
+def test_without_a_repository_the_version_is_named(tree: Path) -> None:
+    assert asked(tree) == NOT_KNOWN
+
+
+@pytest.mark.parametrize("tracked", [False, True])
+def test_the_repository_of_another_project_is_not_ours(tmp_path: Path, tracked: bool) -> None:
+    """Its environment lies in its work tree, ignored as usual; or it keeps a copy of the packages."""
+    site = copied(tmp_path / "other/.venv/site-packages")
+    installed(site, {"url": "file:///rivetbench.whl", "archive_info": {}})
+    (tmp_path / "other/pyproject.toml").write_text('[project]\nname = "other"\n')
+    if not tracked:
+        (tmp_path / "other/.gitignore").write_text(".venv/\n")
+    committed(tmp_path / "other")
+    assert asked(site) == NOT_KNOWN
+
+
+def test_installed_from_a_repository_the_commit_that_pip_recorded(tree: Path) -> None:
+    installed(tree, ORIGIN)
+    assert asked(tree) == ("c" * 40, True)
+
+
+def test_what_is_installed_elsewhere_says_nothing_of_this_code(tree: Path, tmp_path: Path) -> None:
+    installed(tmp_path / "elsewhere", ORIGIN)
+    paths = os.pathsep.join([str(tree), str(tmp_path / "elsewhere")])
+    assert asked(tree, PYTHONPATH=paths) == NOT_KNOWN
+
+
+def test_a_work_tree_outweighs_what_is_installed(tree: Path) -> None:
+    head = committed(tree)
+    installed(tree, ORIGIN)
+    assert asked(tree) == (head, True)
+
+
+def test_the_version_is_known_wherever_the_code_lies() -> None:
+    assert installed_version("rivetbench") == __version__
+
+
+def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:
+    here = dict(zip(("commit", "clean"), commit(), strict=True))
+    suite = read_suite(str(tiny.write_suite(tmp_path, '[[solver]]\nname = "newton"\n')))
+    run_suite(suite, tmp_path / "suite", Console(file=StringIO()))
+    scene = read_scene(str(write_strip(tmp_path)))
+    cases = random_gaps(scene, 3, 0)
+    job = Job(scene, cases, "newton", "dual", 1e-11, 1e-7, 0, 1)
+    run_series(job, {}, tmp_path / "series", Console(file=StringIO()))
+    rows = [*read(tmp_path / "suite" / MEASUREMENTS), *store.rows(tmp_path / "series")]
+    assert len(rows) == 4
+    for row in rows:
+        assert {name: row[name] for name in here} == here
