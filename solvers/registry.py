@@ -22,6 +22,7 @@ from problems.errors import Fault, InputError
 
 from .base import Solver
 from .plugin import load_plugin, solver_class
+from .scaling import Scaled
 
 METHODS, LIBRARIES = "solvers.methods", "solvers.libraries"
 #: The one file that stands for many solvers: all that qpsolvers finds.
@@ -61,7 +62,8 @@ def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) 
     if faults:
         raise InputError(faults)
     try:
-        return factory(**options)
+        made = factory(**options)
+        return Scaled(made) if in_house(name) else made
     except InputError:
         raise
     except (TypeError, ValueError) as error:

@@ -18,8 +18,9 @@ def package(tmp_path: Path) -> Path:
     return Path(shutil.copytree(ROOT / "solvers", tmp_path / "solvers", ignore=ignored))
 
 
-def hash_of(file: Path, package: Path) -> str:
-    return fingerprint([file], within=["solvers"], root=package.parent)
+def hash_of(file: Path, package: Path, name: str = "") -> str:
+    scaling = [package / "scaling.py"] if in_house(name) else []
+    return fingerprint([file, *scaling], within=["solvers"], root=package.parent)
 
 
 def change(file: Path, old: str, new: str) -> None:
@@ -30,7 +31,7 @@ def change(file: Path, old: str, new: str) -> None:
 
 def hashes(package: Path) -> dict[str, str]:
     files = {name: module.partition(".")[2].replace(".", "/") for name, module in modules().items()}
-    return {name: hash_of(package / f"{file}.py", package) for name, file in files.items()}
+    return {name: hash_of(package / f"{file}.py", package, name) for name, file in files.items()}
 
 
 def changed(package: Path, before: dict[str, str]) -> set[str]:

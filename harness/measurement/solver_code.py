@@ -11,8 +11,10 @@ from pathlib import Path
 
 from problems.storage.fingerprint import fingerprint
 from solvers.base import Solver
+from solvers.scaling import Scaled
 
 
 def code_of(solver: Solver) -> str:
     """The fingerprint of a solver of the package, or of a user's."""
-    return fingerprint([Path(inspect.getfile(type(solver)))], within=["solvers"])
+    made = [solver, solver.solver] if isinstance(solver, Scaled) else [solver]
+    return fingerprint([Path(inspect.getfile(type(each))) for each in made], within=["solvers"])

@@ -10,6 +10,8 @@ referee shares no code with the solvers it judges.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
@@ -17,26 +19,36 @@ from numpy.typing import NDArray
 from problems.forms.assembly import Vector
 from problems.forms.compliance import AnyQ, dense_submatrix, submatrix
 
+from .interior_point import interior_contact_set
+
+Stop = Callable[[], bool]
+
 ROUNDING = 10  # times the observed rounding
 SMALL_PROBLEM = 100  # contacts, up to which the first set is p > 0
+SINGLE_EXCHANGES = 20  # without one, before the interior point takes over
 FULL_EXCHANGES = 3  # without a new smallest count of infeasibilities, before single pivots begin
 
 
-def contact_set(Q: AnyQ, p: Vector, start: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
-    """The closed contacts: (m,) bool, with λ > 0 and y = 0 where True.
+def contact_set(
+    Q: AnyQ, p: Vector, start: NDArray[np.bool_] | None = None, stop: Stop = lambda: False
+) -> NDArray[np.bool_]:
+    """The closed contacts: (m,) bool, with λ > 0 and y = 0 where True; a guess, if `stop` ends the search.
 
     Each pass solves Q_SS λ_S = p_S and exchanges every i in S with λ_i < 0 and outside S with y_i < 0. After
     three passes without a new smallest count of such i, only the last of them is exchanged until there is
-    one: in exact arithmetic this cannot cycle. Values within rounding of zero count as zero; rounding is
-    estimated by the residual of the equations in y_S, and by the change in λ_S that it causes. Should
-    rounding still cause a cycle, the first set visited twice is returned, for the caller to check.
+    one: in exact arithmetic this cannot cycle, but it can take exponentially many passes. So after twenty
+    the interior point takes over, once, and pivoting goes on from its set; what then still makes no progress
+    is returned as it is, for the caller to check, and so is a set visited twice because of rounding. A new
+    smallest count is found at most m times: at most m(20 + 3) passes in all, polynomially many. Values within
+    rounding of zero count as zero; rounding is estimated by the residual of the equations in y_S, and by the
+    change in λ_S that it causes.
 
-    start : the first S, by default from half of the contacts.
+    start : the first S, by default from half of the contacts. stop : asked before each factorisation.
     """
-    return _pivoted(Q, p, _first_set(Q, p) if start is None else start)[0]
+    return _pivoted(Q, p, _first_set(Q, p, stop) if start is None else start, stop)[0]
 
 
-def _first_set(Q: AnyQ, p: Vector) -> NDArray[np.bool_]:
+def _first_set(Q: AnyQ, p: Vector, stop: Stop) -> NDArray[np.bool_]:
     """The contacts closed if every other one is left out, and those that then overlap; p > 0 if m is small.
 
     The forces on the half start from its own half: small factors replace most of the large ones.
@@ -45,28 +57,34 @@ def _first_set(Q: AnyQ, p: Vector) -> NDArray[np.bool_]:
         return p > 0
     half = submatrix(Q, np.arange(0, len(p), 2)), p[::2]
     lam = np.zeros(len(p))
-    lam[::2] = _pivoted(*half, _first_set(*half))[1]
+    lam[::2] = _pivoted(*half, _first_set(*half, stop), stop)[1]
     return (lam > 0) | (Q @ lam < p)
 
 
-def _pivoted(Q: AnyQ, p: Vector, S: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Vector]:
+def _pivoted(Q: AnyQ, p: Vector, S: NDArray[np.bool_], stop: Stop) -> tuple[NDArray[np.bool_], Vector]:
     """The closed contacts and λ, from a first set S."""
     m = len(p)
     fewest, full_exchanges = m + 1, FULL_EXCHANGES
     visited: set[bytes] = set()
+    interior = False  # whether the interior point has had its turn
     while True:
         lam, y, lam_rounding, y_rounding = _solve_for(Q, p, S)
         wrong = np.where(S, lam < -ROUNDING * lam_rounding, y < -ROUNDING * y_rounding)
         count = int(wrong.sum())
-        if count == 0:
+        if count == 0 or stop():
             return S, lam
         if count < fewest:
             fewest, full_exchanges = count, FULL_EXCHANGES
             visited.clear()
         elif full_exchanges:
             full_exchanges -= 1
-        elif S.tobytes() in visited:
-            return S, lam
+        elif S.tobytes() in visited or len(visited) == SINGLE_EXCHANGES:
+            if interior:
+                return S, lam
+            S, interior = interior_contact_set(Q, p, stop), True
+            fewest, full_exchanges = m + 1, FULL_EXCHANGES
+            visited.clear()
+            continue
         else:
             visited.add(S.tobytes())
             last = np.flatnonzero(wrong)[-1]
