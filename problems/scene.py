@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from problems.input.bounded import regular_file
 from problems.input.validation import UNITS, unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, make_rung, rung_names
 from problems.model.effect import Effect, Pair, StiffnessEffect
@@ -33,6 +34,7 @@ HERE = Path(__file__).resolve().parent
 SCENES = HERE / "scenes"
 ASSEMBLIES = HERE / "assemblies"
 KEYS = ("title", "assembly", "joint", "effect", "matrices")
+TOML_MIB = 10
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
 
 
@@ -82,10 +84,12 @@ def _no_such(name: str, known: list[str]) -> InputError:
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a dict; InputError if it cannot be read."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(regular_file(path, "file", TOML_MIB).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError.one(path, "file", str(error.strerror), "a readable file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits
         raise InputError.one(path, "TOML", str(error), "valid TOML") from error
 
 

@@ -21,7 +21,7 @@ def solve(
     solver: Annotated[
         str | None, option("NAME", "A solver by name.  [default: the active-set method of the references]")
     ] = None,
-    tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.", min=0.0)] = 1e-9,
+    tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
 ) -> None:
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
 

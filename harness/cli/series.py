@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,7 +24,8 @@ def series(
     scene: SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
     cases: Annotated[
-        int | None, option("N", "Number of cases.  [default: 100 random ones; all of a table]", min=1)
+        int | None,
+        option("N", "Number of cases.  [default: 100 random ones; all of a table]", min=1, max=10**7),
     ] = None,
     seed: Annotated[int | None, option("SEED", f"Seed of the random gaps.  [default: {SEED}]", min=0)] = None,
     mean: Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")] = None,
@@ -96,8 +98,9 @@ def series(
         taken = form or usual(made.forms)
         if taken not in made.forms:
             faults.append(Fault("--form", "form", taken, f"{solver} takes {' and '.join(made.forms)}"))
-        if tolerance <= 0 or limit <= 0:
-            faults.append(Fault("series", "tolerance, limit", (tolerance, limit), "must be positive"))
+        if not (0 < tolerance < inf and 0 < limit < inf):
+            allowed = "must be positive and finite"
+            faults.append(Fault("series", "tolerance, limit", (tolerance, limit), allowed))
         if faults:
             raise InputError(faults)
         signal.signal(signal.SIGTERM, signal.default_int_handler)

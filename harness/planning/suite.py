@@ -16,9 +16,10 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, PositiveInt, ValidationError
 
 from problems.errors import Fault, InputError
+from problems.input.bounded import Finite, Positive, Seed
 from problems.input.validation import unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, rung_names
 from problems.scene import read_toml, scene_names
@@ -27,6 +28,9 @@ from solvers.registry import modules, solver_names
 
 SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
+FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # what a file may be called
+Repeats = Annotated[int, Field(ge=1, le=1000)]
+Cases = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class SolverEntry(BaseModel):
@@ -40,16 +44,16 @@ class SolverEntry(BaseModel):
 
     name: str
     forms: Annotated[list[Form], NonEmpty] | None = None
-    variant: str = ""
-    options: dict[str, Any] = {}
-    tolerances: Annotated[list[PositiveFloat], NonEmpty] | None = None
+    variant: Annotated[str, Field(max_length=60, pattern=FILE_NAME)] = ""
+    options: dict[str, JsonValue] = {}
+    tolerances: Annotated[list[Positive], NonEmpty] | None = None
     scenes: Annotated[list[str], NonEmpty] | None = None
-    repeats: PositiveInt | None = None
+    repeats: Repeats | None = None
     threads: Annotated[list[PositiveInt], NonEmpty] | None = None
-    cases: PositiveInt | None = None
+    cases: Cases | None = None
     batched: PositiveInt | None = None
     gated: bool = True
-    time_limit_s: PositiveFloat | None = None
+    time_limit_s: Positive | None = None
 
 
 class RandomCases(BaseModel):
@@ -60,11 +64,11 @@ class RandomCases(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    cases: PositiveInt
-    seed: Annotated[int, Field(ge=0)] = 0
-    mean: float | None = None
-    sd: PositiveFloat | None = None
-    correlation_length: PositiveFloat | None = None
+    cases: Cases
+    seed: Seed = 0
+    mean: Finite | None = None
+    sd: Positive | None = None
+    correlation_length: Positive | None = None
 
 
 class Suite(BaseModel):
@@ -76,17 +80,17 @@ class Suite(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: str
+    name: Annotated[str, Field(min_length=1, max_length=60, pattern=FILE_NAME)]
     title: str = ""
     description: str = ""
     scenes: Annotated[list[str], NonEmpty]
-    tolerances: Annotated[list[PositiveFloat], NonEmpty] = [1e-9]
-    repeats: PositiveInt = 1
+    tolerances: Annotated[list[Positive], NonEmpty] = [1e-9]
+    repeats: Repeats = 1
     threads: Annotated[list[PositiveInt], NonEmpty] = [2]
-    time_limit_s: PositiveFloat = 60.0
-    time_limit_by_size_s: dict[PositiveInt, PositiveFloat] = {}
+    time_limit_s: Positive = 60.0
+    time_limit_by_size_s: dict[PositiveInt, Positive] = {}
     memory_limit_mib: PositiveInt = 8192
-    limit_mm: PositiveFloat = 1e-7
+    limit_mm: Positive = 1e-7
     yardstick: bool = False
     plugin: str | None = None
     series: RandomCases | None = None

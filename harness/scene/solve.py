@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,8 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     begun = time.perf_counter()
     steps = Steps(console)
     with steps.step("reading the scene"):
+        if not 0 < tolerance < inf:
+            raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
         scene = read_scene(source)
         refuse_what_cannot_fit(scene, source)
     chosen = _solver(solver) if solver else None

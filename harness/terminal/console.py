@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 WIDTH_OF_A_LOG = 160
+MOST_FAULTS = 100  # shown at once
 
 
 def option(metavar: str, help: str, **limits: Any) -> Any:
@@ -43,10 +44,12 @@ def error_reporting(
 
     errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
     try:
-        yield Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_OF_A_LOG)
+        yield Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH_OF_A_LOG)
     except InputError as error:
-        for fault in error.faults:
+        for fault in error.faults[:MOST_FAULTS]:
             errors.print(str(fault), style="red")
+        if (more := len(error.faults) - MOST_FAULTS) > 0:
+            errors.print(f"… and {more} more", style="red")
         raise typer.Exit(WRONG_USAGE) from None
     except OSError as error:
         errors.print(f"{error}{safe}", style="red")

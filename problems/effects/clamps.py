@@ -8,8 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from problems.forms.assembly import Vector
+from problems.input.bounded import Positive
 from problems.model.effect import Between, ForceEffect, pressing_forces, unknown_pair
-from problems.model.joint import Joint, Positive
+from problems.model.joint import Joint
 from problems.model.positions import Positions
 
 

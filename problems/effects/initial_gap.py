@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from problems.forms.assembly import Matrix, Vector
+from problems.input.bounded import Finite, Positive, Seed
 from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
-from problems.model.joint import Finite, Joint, Positive, Table
+from problems.model.joint import Joint, Table
 
 
 class RandomField(Table):
@@ -19,7 +19,7 @@ class RandomField(Table):
 
     sd: Positive
     correlation_length: Positive
-    seed: Annotated[int, Field(ge=0)]
+    seed: Seed
 
 
 class InitialGap(GapEffect):

@@ -9,8 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
+from problems.input.bounded import Finite, Positive
 from problems.model.effect import Between, Effect, ForceEffect, Pair, TieEffect, pairs_of, unknown_pair
-from problems.model.joint import TOOL, Finite, Joint, Positive
+from problems.model.joint import TOOL, Joint
 from problems.model.positions import Positions
 
 

@@ -10,8 +10,9 @@ import scipy.sparse as sp
 
 from problems.fem.hermite import line_matrices
 from problems.fem.plate import Plate
+from problems.input.bounded import Finite, Positive
 from problems.model.effect import Effect, Range, StiffnessEffect
-from problems.model.joint import Finite, Joint, Positive
+from problems.model.joint import Joint
 
 
 class LocalThickness(StiffnessEffect):

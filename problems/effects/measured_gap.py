@@ -10,9 +10,10 @@ from pydantic import Field, ValidationInfo, model_validator
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from problems.forms.assembly import Vector
+from problems.input.bounded import Finite
 from problems.input.csv_table import rows_from_file
 from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
-from problems.model.joint import Finite, Joint
+from problems.model.joint import Joint
 
 
 class MeasuredGap(GapEffect):

@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 
 from problems.forms.assembly import Vector
+from problems.input.bounded import Finite
 from problems.model.effect import ForceEffect, unknown_part
-from problems.model.joint import Finite, Joint
+from problems.model.joint import Joint
 
 
 class Pressure(ForceEffect):

@@ -9,8 +9,9 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from problems.fem.plate import Plate
+from problems.input.bounded import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
-from problems.model.joint import Finite, Joint, Positive
+from problems.model.joint import Joint
 
 
 class Ribs(StiffnessEffect):
@@ -19,7 +20,7 @@ class Ribs(StiffnessEffect):
     kind: Literal["ribs"]
     lines: Annotated[tuple[Finite, ...], Field(min_length=1)]
     I: Positive  # noqa: E741
-    J: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    J: NotNegative = 0.0
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from super().faults(joint)

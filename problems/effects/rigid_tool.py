@@ -8,8 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from problems.forms.assembly import Vector
+from problems.input.bounded import Finite
 from problems.model.effect import Effect, GapEffect, Pair, contacts_of, unknown_part
-from problems.model.joint import TOOL, Finite, Joint
+from problems.model.joint import TOOL, Joint
 
 
 class RigidTool(GapEffect):

@@ -8,7 +8,7 @@ import numpy as np
 
 from problems.fem.line_loads import line_loads
 from problems.forms.assembly import Vector
-from problems.model.joint import Finite, Positive
+from problems.input.bounded import Finite, Positive
 from problems.model.part import PartModel
 from problems.model.part_load import PartLoadEffect
 

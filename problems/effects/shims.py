@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.forms.assembly import Vector
+from problems.input.bounded import Finite, Positive
 from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
-from problems.model.joint import Finite, Joint, Positive
+from problems.model.joint import Joint
 
 
 class Shims(GapEffect):

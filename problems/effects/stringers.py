@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
-from pydantic import Field
 
 from problems.fem.plate import Plate
+from problems.input.bounded import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
-from problems.model.joint import Finite, Joint, Positive
+from problems.model.joint import Joint
 
 
 class Stringers(StiffnessEffect):
@@ -25,7 +25,7 @@ class Stringers(StiffnessEffect):
     start: Finite
     stop: Finite
     I: Positive  # noqa: E741
-    J: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    J: NotNegative = 0.0
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from super().faults(joint)

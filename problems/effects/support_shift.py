@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from problems.forms.assembly import Vector
+from problems.input.bounded import Finite
 from problems.model.effect import Effect
-from problems.model.joint import Finite, Joint
+from problems.model.joint import Joint
 from problems.model.part import PartModel
 from problems.model.part_load import PartLoadEffect
 

@@ -9,8 +9,9 @@ import scipy.sparse as sp
 from pydantic import Field
 
 from problems.fem.plate import Plate
+from problems.input.bounded import Finite, Positive
 from problems.model.effect import StiffnessEffect
-from problems.model.joint import Finite, Joint, Positive
+from problems.model.joint import Joint
 
 
 class Supports(StiffnessEffect):

@@ -11,7 +11,11 @@ from typing import Any
 
 from pydantic import ValidationInfo
 
-from problems.errors import Fault
+from problems.errors import Fault, InputError
+
+from .bounded import regular_file
+
+CSV_MIB = 100
 
 
 @dataclass(frozen=True)
@@ -34,8 +38,10 @@ def read_columns(path: Path, field: str, names: tuple[str, ...]) -> Rows:
     """The named columns of a file, row by row; other columns are ignored. Bad rows are faults."""
     read = Rows(path, field, [], [], [])
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
             _read(csv.reader(file), names, read)
+    except InputError as error:
+        read.faults.extend(error.faults)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         why = getattr(error, "strerror", None) or str(error)
         read.faults.append(Fault(str(path), "file", why, "a readable comma-separated file"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from .base import LoadCases
 SYNTAX = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
 
 
+MOST, MOST_CASES = 100_000, 10_000_000  # values of a key; combinations
 NOTHING, OTHER = "the scene has no force or gap to sweep", "what changes K would be another assembly"
 
 
@@ -80,7 +82,10 @@ def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
     ]
     if faults:
         raise InputError(faults)
-    return Sweep(scene, steps, int(np.prod([len(step.values) for step in steps])))
+    count = prod(len(step.values) for step in steps)
+    if count > MOST_CASES:
+        raise InputError.one("--sweep", "cases", count, f"at most {MOST_CASES} combinations")
+    return Sweep(scene, steps, count)
 
 
 def effect_name(scene: JointScene, index: int) -> str:
@@ -101,8 +106,9 @@ def _changes_K(scene: JointScene, index: int) -> bool:
 def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
     name, equals, values = text.partition("=")
     numbers = _values(values)
-    if not equals or not numbers:
-        faults.append(Fault("--sweep", "sweep", text, SYNTAX))
+    if not equals or not 0 < len(numbers) <= MOST:
+        allowed = f"at most {MOST} values" if len(numbers) > MOST else SYNTAX
+        faults.append(Fault("--sweep", "sweep", text, allowed))
         return None
     effects = {effect_name(scene, i): i for i in range(len(scene.effects)) if not _changes_K(scene, i)}
     keys = {
@@ -132,7 +138,7 @@ def _values(text: str) -> tuple[float, ...]:
     try:
         if ":" in text:
             first, last, count = text.split(":")
-            values = np.linspace(float(first), float(last), int(count)).tolist()
+            values = np.linspace(float(first), float(last), min(int(count), MOST + 1)).tolist()
         else:
             values = [float(value) for value in text.split(",")]
     except ValueError:

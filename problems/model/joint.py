@@ -22,9 +22,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from problems.fem.plate import Plate
 from problems.forms.assembly import Matrix
+from problems.input.bounded import Name, Positive
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+MOST = 100_000  # grid lines; what fits in memory is another question
+Nodes = Annotated[int, Field(ge=2, le=MOST)]
 TOOL = "tool"  # the second of a contact pair: a rigid surface
 
 
@@ -39,14 +40,14 @@ class Junction(Table):
 
     length: Positive
     width: Positive
-    nodes: tuple[Annotated[int, Field(ge=2)], Annotated[int, Field(ge=2)]]
+    nodes: tuple[Nodes, Nodes]
 
 
 class Extension(Table):
     """The part's plate beyond the junction: its length in mm and its elements across that length."""
 
     length: Positive
-    elements: Annotated[int, Field(ge=1)]
+    elements: Annotated[int, Field(ge=1, le=MOST)]
 
 
 class Part(Table):
@@ -55,7 +56,7 @@ class Part(Table):
     thickness in mm, young in N/mm²; clamped names the far edges where the part is built in.
     """
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     thickness: Positive
     young: Positive = 70e3
     poisson: Annotated[float, Field(ge=0, lt=0.5)] = 0.33
@@ -68,7 +69,7 @@ class Joint(Table):
     """Junction, parts and contacts. A contact (a, b) means x_a − x_b ≤ g at every junction node."""
 
     junction: Junction
-    part: Annotated[tuple[Part, ...], Field(min_length=1)]
+    part: Annotated[tuple[Part, ...], Field(min_length=1, max_length=100)]
     contacts: tuple[tuple[str, str], ...] = ()
 
     @property

@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, model_validator
 
 from problems.forms.assembly import Matrix, Vector
+from problems.input.bounded import Finite, NotNegative
 from problems.input.csv_table import rows_from_file
 
-from .joint import Finite, Joint, Table
+from .joint import Joint, Table
 
 
 class Pattern(Table):
     """columns × rows points, evenly spaced over the junction up to `edge` mm from its border."""
 
-    columns: Annotated[int, Field(ge=1)]
-    rows: Annotated[int, Field(ge=1)]
-    edge: Annotated[float, Field(ge=0)] = 0.0
+    columns: Annotated[int, Field(ge=1, le=10_000)]
+    rows: Annotated[int, Field(ge=1, le=10_000)]
+    edge: NotNegative = 0.0
 
 
 class Positions(Table):

@@ -1,0 +1,177 @@
+"""What a hostile user writes into files and options: one clear message, soon, and no traceback."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from harness.cli.app import app
+from harness.planning.overrides import Overrides, overridden
+from harness.planning.suite import read_suite
+from problems.errors import InputError
+from problems.load_cases.sweep import sweep
+from problems.scene import read_scene
+
+SCENE = """
+title = "TITLE"
+[joint]
+junction = { length = 100.0, width = 50.0, nodes = [4, 3] }
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+[[joint.part]]
+name = "b"
+thickness = 3.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+[[effect]]
+kind = "initial_gap"
+mean = 0.1
+[[effect]]
+kind = "pressure"
+part = "a"
+value = 1e-3
+"""
+
+
+def words_of(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        read_scene(str(path))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("elements = 2", "elements = 1000000000", "less than or equal to 100000"),
+        ("nodes = [4, 3]", "nodes = [4, 99999999]", "less than or equal to 100000"),
+        ("thickness = 2.0", "thickness = 1e200", "less than or equal to 1"),
+        ("thickness = 2.0", "thickness = inf", "part.0.thickness"),
+        ("value = 1e-3", "value = -1e300", "greater than or equal to -1"),
+        ("mean = 0.1", "mean = nan", "initial_gap"),
+        ("mean = 0.1", f"mean = {'1' * 5000}", "TOML"),
+        ("mean = 0.1", f"mean = {'[' * 100_000}", "TOML"),
+        ("mean = 0.1", "mean = 2020-01-01", "initial_gap"),
+        ('name = "a"', f'name = "{"a" * 20_000}"', "at most 60"),
+        ('name = "a"', 'name = "a\\nb"', "pattern"),
+        (
+            'kind = "pressure"\npart = "a"\nvalue = 1e-3',
+            'kind = "fasteners"\npreload = 1.0\npattern = { columns = 100000, rows = 100000 }',
+            "less than or equal to 10000",
+        ),
+    ],
+)
+def test_what_no_structure_has_is_refused_with_the_key(old: str, new: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    assert old in SCENE
+    path.write_text(SCENE.replace(old, new))
+    assert said in words_of(path)
+
+
+def test_a_pipe_a_device_and_a_large_file_are_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    with (tmp_path / "large.toml").open("wb") as file:
+        file.truncate(11 * 2**20)
+    assert words_of(tmp_path / "pipe.toml")
+    assert words_of(tmp_path / "zero.toml")
+    assert "at most 10 MiB" in words_of(tmp_path / "large.toml")
+    os.mkfifo(tmp_path / "points.csv")
+    table = 'kind = "fasteners"\npreload = 1.0\nfile = "points.csv"'
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace('kind = "pressure"\npart = "a"\nvalue = 1e-3', table))
+    assert "no regular file" in words_of(path)
+
+
+@pytest.mark.parametrize("value", ["inf", "nan", "-1", "0"])
+@pytest.mark.parametrize("option", ["--tolerance", "--limit"])
+def test_tolerances_and_limits_are_positive_and_finite(option: str, value: str, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    words = ["series", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), option, value]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 2
+    assert "positive and finite" in done.output
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("value", ["inf", "nan", "0"])
+def test_the_tolerance_of_solve_is_positive_and_finite(value: str, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    words = ["solve", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), "--tolerance", value]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 2
+    assert "positive and finite" in done.output
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("limit_mm = inf", "limit_mm = nan", "tolerances = [nan]", "repeats = 100000000000"),
+        *("time_limit_s = inf", 'name = "../../x"', 'name = "a\\u0000b"'),
+    ],
+)
+def test_a_suite_is_bounded(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f'{line}\nscenes = ["4386/0107"]\n[[solver]]\nname = "newton"\n')
+    with pytest.raises(InputError) as caught:
+        read_suite(str(path))
+    assert line.partition(" ")[0] in str(caught.value)
+
+
+@pytest.mark.parametrize("line", ['variant = "a\\u0000"', "options = { nested = 2020-01-01 }"])
+def test_a_suites_solver_is_bounded(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f'scenes = ["4386/0107"]\n[[solver]]\nname = "newton"\n{line}\n')
+    with pytest.raises(InputError) as caught:
+        read_suite(str(path))
+    assert line.partition(" ")[0] in str(caught.value)
+
+
+def test_repeats_of_the_command_line_are_bounded() -> None:
+    with pytest.raises(InputError, match="repeats"):
+        overridden(read_suite("gate"), Overrides(repeats=10**11))
+
+
+@pytest.mark.parametrize("values", ["0.1:1.0:1000000000", "0:1:100000", "1:2:-3", "1:2:1e9"])
+def test_sweeps_are_bounded(values: str, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    scene = read_scene(str(tmp_path / "scene.toml"))
+    texts = [f"initial_gap.mean={values}", "pressure.value=1:2:1000"]
+    with pytest.raises(InputError, match=r"at most|FIRST:LAST:COUNT"):
+        sweep(scene, texts)
+
+
+def test_cases_of_a_series_are_bounded(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    words = [
+        "series",
+        str(tmp_path / "scene.toml"),
+        "--out",
+        str(tmp_path / "out"),
+        "--cases",
+        "1000000000000",
+    ]
+    assert CliRunner().invoke(app, words).exit_code == 2
+
+
+def test_markup_in_a_title_and_in_a_path_is_text(tmp_path: Path) -> None:
+    (tmp_path / "[red]x.toml").write_text(SCENE.replace("TITLE", "[/b] [link=x]y"))
+    done = CliRunner().invoke(app, ["validate", str(tmp_path / "[red]x.toml")])
+    assert done.exit_code == 0, done.output
+    assert "[/b] [link=x]y" in done.output
+
+
+def test_a_table_with_a_million_bad_rows_shows_the_first(tmp_path: Path) -> None:
+    (tmp_path / "points.csv").write_text("x,y\n" + "a,b\n" * 3000)
+    table = 'kind = "fasteners"\npreload = 1.0\nfile = "points.csv"'
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace('kind = "pressure"\npart = "a"\nvalue = 1e-3', table))
+    done = CliRunner().invoke(app, ["validate", str(path)])
+    assert done.exit_code == 2
+    assert "and 2900 more" in done.output
+    assert done.output.count("line ") == 100
