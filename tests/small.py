@@ -10,7 +10,7 @@ import scipy.linalg as sla
 import scipy.optimize
 import scipy.sparse as sp
 
-from harness.conformance.trials import contact_rows, stiffness
+from harness.conformance.known_problems import contact_rows, stiffness
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 

@@ -11,7 +11,7 @@ import pytest
 from small import make_prepared
 
 from harness.conformance.check import run
-from harness.conformance.trials import known_case, trials
+from harness.conformance.known_problems import known_case, known_problems
 from problems.forms.assembly import LoadCase
 from solvers.base import Answer, Form, Problem, Solver, WarmStart
 from solvers.registry import make_solver
@@ -236,7 +236,7 @@ def test_load_cases_at_once_in_another_order() -> None:
 
 
 def test_known_answers_fulfil_the_optimality_conditions() -> None:
-    for trial in trials():
+    for trial in known_problems():
         prepared, assembly = trial.prepared, trial.prepared.assembly
         for case in trial.cases:
             gap = case.load.g - assembly.A.T @ case.x
@@ -252,4 +252,4 @@ def test_known_answers_fulfil_the_optimality_conditions() -> None:
 def test_trials_have_open_and_closed_contacts() -> None:
     case = known_case(np.random.default_rng(2), make_prepared(2, 20), 0.5, "half")
     assert 0 < np.count_nonzero(case.lam) < 20
-    assert {0, 40} <= {np.count_nonzero(case.lam) for case in trials()[2].cases}
+    assert {0, 40} <= {np.count_nonzero(case.lam) for case in known_problems()[2].cases}

@@ -38,17 +38,17 @@ def test_a_torn_last_line_is_set_aside_by_run_and_stops_the_others(path: Path, t
     path.write_bytes(whole + torn)
     with pytest.raises(InputError, match=r"measurements\.jsonl: line 4"):
         records.read(path)
-    assert records.set_torn_aside(path)
+    assert records.move_torn_line(path)
     assert path.read_bytes() == whole
     assert path.with_name(records.TORN).read_bytes().strip() == torn.strip()
-    assert not records.set_torn_aside(path)
+    assert not records.move_torn_line(path)
     assert [row["value"] for row in records.read(path)] == [0, 1, 2]
 
 
 def test_a_last_line_without_its_end_is_torn_even_if_it_reads(path: Path) -> None:
     """The next row would be glued to it."""
     os.truncate(path, path.stat().st_size - 1)
-    assert records.set_torn_aside(path)
+    assert records.move_torn_line(path)
     assert [row["value"] for row in records.read(path)] == [0, 1]
 
 
@@ -56,7 +56,7 @@ def test_damage_in_the_middle_is_named_and_nothing_is_changed(path: Path) -> Non
     path.write_bytes(b"nonsense\n" + path.read_bytes())
     before = path.read_bytes()
     with pytest.raises(InputError, match="line 1 = 'nonsense'"):
-        records.set_torn_aside(path)
+        records.move_torn_line(path)
     assert path.read_bytes() == before
 
 
@@ -76,12 +76,12 @@ def test_a_full_disk_leaves_the_rows_before(path: Path, monkeypatch: pytest.Monk
 
 def test_a_directory_takes_one_run_at_a_time(tmp_path: Path) -> None:
     def enter_twice() -> None:
-        with records.held(tmp_path / "out"), records.held(tmp_path / "out"):
+        with records.locked(tmp_path / "out"), records.locked(tmp_path / "out"):
             raise AssertionError("held twice")
 
     with pytest.raises(InputError, match="another run is writing here"):
         enter_twice()
-    with records.held(tmp_path / "out"):
+    with records.locked(tmp_path / "out"):
         pass
 
 
@@ -89,4 +89,4 @@ def test_an_unwritable_directory_is_named(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)  # a long path is said shortened
     Path("file").touch()
     with pytest.raises(InputError, match=r"file/out'.*cannot be written"):
-        records.held(Path("file/out")).__enter__()
+        records.locked(Path("file/out")).__enter__()

@@ -8,7 +8,7 @@ import pytest
 
 from harness.measurement.describe import Description
 from harness.measurement.resume import outdated
-from harness.measurement.row import Order, measured
+from harness.measurement.row import Task, run_task
 from harness.planning.plan import expand
 from harness.planning.suite import suite_from
 from harness.planning.timeouts import predicted_timeout
@@ -47,7 +47,7 @@ def test_too_slow_on_every_smaller_scene_is_not_run(large):
 
 
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
-    (told,) = measured(Order([large], ["primal"], "4386/0107"), tmp_path).told
+    (told,) = run_task(Task([large], ["primal"], "4386/0107"), tmp_path).reports
     assert told == {"status": "not_run", "message": "too slow already on 4386/0107"}
     assert not list(tmp_path.iterdir())
     rows = [row("4386/0107", 4386), row("4386/1471", 4386, told["status"])]

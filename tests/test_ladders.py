@@ -11,9 +11,9 @@ import pytest
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from harness.verification.ground_truth import Ground, ground
 from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
+from harness.verification.reference_problem import ReferenceProblem, reference_problem
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
@@ -38,8 +38,8 @@ IN_HOUSE: list[tuple[str, Form, float]] = [
 
 
 @cache
-def opened(name: str) -> Ground:
-    return ground(name)
+def opened(name: str) -> ReferenceProblem:
+    return reference_problem(name)
 
 
 def whole(values: Any) -> Any:

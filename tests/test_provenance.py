@@ -18,7 +18,7 @@ from strip import write_strip
 from harness.measurement.run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results.machine import installed_version
-from harness.results.provenance import OF_HOOKS, ROOT, commit
+from harness.results.provenance import HOOK_VARIABLES, ROOT, commit
 from harness.results.records import MEASUREMENTS, read
 from harness.series import store
 from harness.series.run import run as run_series
@@ -51,7 +51,7 @@ def copied(folder: Path) -> Path:
 
 def git(folder: Path, *arguments: str) -> str:
     who = ["-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false"]
-    alone = {name: value for name, value in os.environ.items() if name not in OF_HOOKS}
+    alone = {name: value for name, value in os.environ.items() if name not in HOOK_VARIABLES}
     done = subprocess.run(
         ["git", *who, *arguments], cwd=folder, env=alone, check=True, capture_output=True, text=True
     )

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from solving import CASES, IN_HOUSE, allowed, solve
 from test_reference import exact_solution
 
-from harness.conformance.trials import contact_rows, stiffness
+from harness.conformance.known_problems import contact_rows, stiffness
 from harness.verification.judge import conditioned_limit
 from harness.verification.principal_pivoting import contact_set
 from harness.verification.reference import refined_active_set

@@ -15,7 +15,7 @@ from joints import make_joint, make_scene
 from numpy.typing import NDArray
 from small import make_load, make_prepared, solve_by_nnls
 
-from harness.conformance.trials import contact_rows
+from harness.conformance.known_problems import contact_rows
 from harness.verification import reference as module
 from harness.verification.principal_pivoting import contact_set
 from harness.verification.reference import reference, refined_active_set

@@ -27,7 +27,13 @@ from strip import write_strip
 
 from harness.measurement import scheduler
 from harness.measurement.run import run as run_suite
-from harness.measurement.scheduler import AHEAD, done_as_completed, other_versions, versions, workers
+from harness.measurement.scheduler import (
+    TASKS_PER_WORKER,
+    done_as_completed,
+    other_versions,
+    versions,
+    workers,
+)
 from harness.planning.suite import read_suite
 from harness.results.records import MEASUREMENTS, read
 from harness.series import store
@@ -110,7 +116,7 @@ def test_every_task_comes_back_once_and_few_are_handed_out() -> None:
         tagged = ((str(k), k) for k in tasks())
         for done, (name, outcome) in enumerate(done_as_completed(executor, 2, double, tagged), start=1):
             k = int(name)
-            assert drawn <= done + 2 * AHEAD + 2
+            assert drawn <= done + 2 * TASKS_PER_WORKER + 2
             assert k not in seen
             seen[k] = outcome
     assert isinstance(seen.pop(13), ValueError)

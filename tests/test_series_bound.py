@@ -14,11 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
-from harness.conformance.trials import known_case, stiffness
+from harness.conformance.known_problems import known_case, stiffness
+from harness.verification.batched.assess import Assessment, assess
 from harness.verification.batched.bound import Bound, gaps, independence
 from harness.verification.batched.compliance import largest_compliance
 from harness.verification.batched.residual import Split, bits, refined, residual, split
-from harness.verification.batched.vouch import Vouched, vouch
 from harness.verification.exact_residual import gamma
 from harness.verification.reference import refined_active_set
 from problems.forms.assembly import Assembly, LoadCase
@@ -140,9 +140,9 @@ def test_the_largest_compliance_is_above_and_close(make: Callable[[], Prepared])
     assert np.isinf(largest_compliance(prepared, 0.0))
 
 
-def answer(prepared: Prepared, case: LoadCase, lam: np.ndarray, x: np.ndarray | None = None) -> Vouched:
+def answer(prepared: Prepared, case: LoadCase, lam: np.ndarray, x: np.ndarray | None = None) -> Assessment:
     load = LoadCase(case.f, case.g, prepared.dual_load(case))
-    return vouch(Bound.of(prepared), [load], [lam], [x])[0]
+    return assess(Bound.of(prepared), [load], [lam], [x])[0]
 
 
 @given(
@@ -206,9 +206,9 @@ def test_a_block_is_its_cases_one_by_one() -> None:
     cases = [make_load(seed, prepared) for seed in range(5)]
     lams = [solve_by_nnls(prepared, case)[1] for case, _ in cases]
     bound = Bound.of(prepared)
-    together = vouch(bound, [load for _, load in cases], lams, [None] * 5)
+    together = assess(bound, [load for _, load in cases], lams, [None] * 5)
     for (case, load), lam, found in zip(cases, lams, together, strict=True):
-        alone = vouch(bound, [load], [lam], [None])[0]
+        alone = assess(bound, [load], [lam], [None])[0]
         np.testing.assert_allclose(found.x, alone.x, rtol=0, atol=1e-13)
         np.testing.assert_allclose(found.bound_mm, alone.bound_mm, rtol=0.5)
         known = refined_active_set(prepared, case)

@@ -274,9 +274,9 @@ def test_what_p_has_lost_in_rounding_is_made_good(monkeypatch: pytest.MonkeyPatc
 def test_memory_does_not_grow_with_the_cases() -> None:
     scene = read_scene("strip.toml")
     job = Job(scene, random_gaps(scene, 10**9, 0), "gi", "dual", 1e-9, 1e-7, 0, 1)
-    desk = SeriesSession(job)
-    for _ in desk.solve(range(10**8, 10**8 + 5 * session_module.STARTS)):
-        assert len(desk.session.solved) <= session_module.STARTS
+    session = SeriesSession(job)
+    for _ in session.solve(range(10**8, 10**8 + 5 * session_module.KEPT_ANSWERS)):
+        assert len(session.session.solved) <= session_module.KEPT_ANSWERS
 
 
 @pytest.mark.parametrize("fault", ["raise RuntimeError", "return answers[:-1]", "return [None] * len(loads)"])

@@ -380,7 +380,7 @@ def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
         assert said in first.output
     assert not built(read_scene(str(path)))
     _ = prepared(read_scene(str(path))).Q
-    assert "stands in the cache" in CliRunner().invoke(app, ["validate", str(path)]).output
+    assert "is in the cache" in CliRunner().invoke(app, ["validate", str(path)]).output
 
 
 def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> None:

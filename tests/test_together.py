@@ -10,7 +10,7 @@ import pytest
 from small import make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
-from harness.conformance.trials import contact_rows
+from harness.conformance.known_problems import contact_rows
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared

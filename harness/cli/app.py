@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from harness.terminal.console import Plugin, Scheduler, error_reporting, option
-from harness.terminal.exit_codes import DONE, FELL_SHORT
+from harness.terminal.exit_codes import DONE, FAILED
 
 from . import scene as scene_commands
 from . import series as series_command
@@ -237,7 +237,7 @@ def check(
             console.print(f"{name}: {len(findings) or 'no'} faults", style="red" if findings else "green")
             for finding in findings:
                 console.print(f"  {finding}", highlight=False, markup=False)
-        raise typer.Exit(FELL_SHORT if faulty else DONE)
+        raise typer.Exit(FAILED if faulty else DONE)
 
 
 def main() -> None:

@@ -80,7 +80,7 @@ def series(
         from harness.series.session import Job
         from harness.series.store import CASES
         from problems.errors import Fault, InputError
-        from problems.forms.names import usual
+        from problems.forms.names import default_form
         from problems.scene import read_scene
         from solvers.registry import make_solver, solver_version
 
@@ -95,7 +95,7 @@ def series(
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         made = make_solver(solver, {}, plugin)
-        taken = form or usual(made.forms)
+        taken = form or default_form(made.forms)
         if taken not in made.forms:
             faults.append(Fault("--form", "form", taken, f"{solver} takes {' and '.join(made.forms)}"))
         if not (0 < tolerance < inf and 0 < limit < inf):

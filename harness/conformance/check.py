@@ -1,9 +1,9 @@
-"""Conformance of a solver: small problems with known answers, and plain words for what is wrong."""
+"""Conformance of a solver: small problems with known answers, findings in plain words."""
 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 
@@ -16,13 +16,13 @@ from problems.forms.problem import in_form
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 
 from .inspection import TOLERANCE, Finding, distance, inspect
-from .trials import Case, Trial, trials
+from .known_problems import KnownCase, KnownProblem, known_problems
 
-LOOSE = 1e-1  # a tolerance at which an iterative solver must stop earlier than at TOLERANCE
+LOOSE = 1e-1  # a tolerance at which an iterative solver stops earlier than at TOLERANCE
 
 
 def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] | None = None) -> list[Finding]:
-    """Everything that is wrong with the solver in these forms (None: all that it takes)."""
+    """All that is wrong with the solver in these forms (None: all that it takes)."""
     try:
         taken = solver_factory().forms
     except Exception as error:
@@ -33,79 +33,82 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] | None = Non
     found: list[Finding] = []
     for form in [form for form in taken if forms is None or form in forms]:
         try:
-            for trial in trials():
-                found += _check_trial(solver_factory, trial, form)
+            for known in known_problems():
+                found += _check_problem(solver_factory, known, form)
         except _Raised as raised:
             found.append(raised.finding)
     return _first_of_each(found)
 
 
-def _check_trial(factory: Callable[[], Solver], trial: Trial, form: Form) -> Iterator[Finding]:
+def _check_problem(factory: Callable[[], Solver], known: KnownProblem, form: Form) -> Iterator[Finding]:
     """The cases one after another on one state, then the first one again, then by a fresh solver."""
-    problem = in_form(trial.prepared, form)
-    before = _fingerprint(trial)
-    first_case, *other_cases = trial.cases
+    problem = in_form(known.prepared, form)
+    before = _fingerprint(known)
+    first_case, *other_cases = known.cases
     steps = _Steps(factory(), problem)
 
     first = steps.answer(first_case)
-    wrong = list(inspect(first, trial, first_case, form))
+    wrong = list(inspect(first, known, first_case, form))
     yield from wrong
-    if wrong and _same(first, steps.answer(first_case, LOOSE), trial):
-        words = f"wrong, and the same at tolerance {LOOSE:g}: if it iterates, it ignores the tolerance"
-        yield Finding(form, trial.name, words, "Hand the argument `tolerance` on to what stops the iteration")
+    if wrong and _same(first, steps.answer(first_case, LOOSE), known):
+        what = f"wrong, and the same at tolerance {LOOSE:g}: if it iterates, it ignores the tolerance"
+        yield Finding(form, known.name, what, "Use the argument `tolerance` in the stopping test")
 
-    spoilt = "Let setup and solve change nothing in the prepared state, and start each load case cold"
+    state_fix = "Let setup and solve not change the prepared state, and start each load case cold"
     for case in other_cases:
-        wrong = list(inspect(steps.answer(case), trial, case, form))
-        if wrong and not list(inspect(_Steps(factory(), problem).answer(case), trial, case, form)):
-            words = f"right on a state of its own, wrong as a second load case ({wrong[0].wrong})"
-            yield Finding(form, f"{trial.name}, {case.name}", words, spoilt)
+        wrong = list(inspect(steps.answer(case), known, case, form))
+        if wrong and not list(inspect(_Steps(factory(), problem).answer(case), known, case, form)):
+            what = f"right on a state of its own, wrong as a second load case ({wrong[0].wrong})"
+            yield Finding(form, f"{known.name}, {case.name}", what, state_fix)
         else:
             yield from wrong
-    if wrong_in_series := _in_series(factory, problem, trial):
-        words = f"right when each is set up, wrong as a series by `update` ({wrong_in_series})"
-        fix = "Let update renew all that depends on the load case; near is a start, not the answer"
-        yield Finding(form, trial.name, words, fix)
-    if wrong_batched := _batched(factory, problem, trial):
-        words = f"right when each is set up, wrong when solved at once by `batched` ({wrong_batched})"
-        fix = "An answer to each load, in the order of the loads"
-        yield Finding(form, trial.name, words, fix)
-    if _differ(first, steps.answer(first_case), trial, first_case):
-        words = "the first load case, solved again after others, has another answer"
-        yield Finding(form, trial.name, words, spoilt)
-    if _differ(first, _Steps(factory(), problem).answer(first_case), trial, first_case):
-        words = "not repeatable: two fresh solvers answer the same problem differently"
-        yield Finding(
-            form, trial.name, words, "Fix the seed of what is random; share nothing between solvers"
-        )
-    if _fingerprint(trial) != before:
+    if wrong_in_series := _wrong_in_series(factory, problem, known):
+        what = f"right when each is set up, wrong as a series by `update` ({wrong_in_series})"
+        fix = "Let update renew all that depends on the load case; the warm start is not the answer"
+        yield Finding(form, known.name, what, fix)
+    if wrong_batched := _wrong_batched(factory, problem, known):
+        what = f"right when each is set up, wrong when solved at once by `batched` ({wrong_batched})"
+        fix = "Return an answer to each load, in the order of the loads"
+        yield Finding(form, known.name, what, fix)
+    if _differ(first, steps.answer(first_case), known, first_case):
+        what = "the first load case, solved again after others, has a different answer"
+        yield Finding(form, known.name, what, state_fix)
+    if _differ(first, _Steps(factory(), problem).answer(first_case), known, first_case):
+        what = "not repeatable: two fresh solvers answer the same problem differently"
+        yield Finding(form, known.name, what, "Fix random seeds; share nothing between solvers")
+    if _fingerprint(known) != before:
         fix = "Copy K, A, Q, f, g and p before writing into them"
-        yield Finding(form, trial.name, "the solver changed the arrays that it was given", fix)
+        yield Finding(form, known.name, "the solver changed the arrays that it was given", fix)
 
 
-def _in_series(factory: Callable[[], Solver], problem: Problem, trial: Trial) -> str:
-    """What is wrong with the cases solved by `update` that are right when each is set up; "" if nothing."""
+def _wrong_in_series(factory: Callable[[], Solver], problem: Problem, known: KnownProblem) -> str:
+    """What is wrong in cases solved by `update` but right when set up each; "" if nothing."""
     steps = _Steps(factory(), problem)
-    steps.answer(trial.cases[0])
-    for before, case in pairwise(trial.cases):
-        wrong = list(inspect(steps.next_answer(case, before), trial, case, problem.form))
-        alone = _Steps(factory(), problem).answer(case)
-        if wrong and not list(inspect(alone, trial, case, problem.form)):
-            return f"{case.name}: {wrong[0].wrong}"
-    return ""
+    steps.answer(known.cases[0])
+    pairs = ((case, steps.next_answer(case, before)) for before, case in pairwise(known.cases))
+    return _first_wrong(pairs, factory, problem, known)
 
 
-def _batched(factory: Callable[[], Solver], problem: Problem, trial: Trial) -> str:
-    """What is wrong with the cases solved by `batched` that are right when each is set up; "" if nothing."""
-    answers = _Steps(factory(), problem).answers(trial.cases)
+def _wrong_batched(factory: Callable[[], Solver], problem: Problem, known: KnownProblem) -> str:
+    """What is wrong in cases solved by `batched` but right when set up each; "" if nothing."""
+    answers = _Steps(factory(), problem).answers(known.cases)
     if answers is None:
         return ""
-    if len(answers) != len(trial.cases):
-        return f"{len(answers)} answers to {len(trial.cases)} load cases"
-    for case, answer in zip(trial.cases, answers, strict=True):
-        wrong = list(inspect(answer, trial, case, problem.form))
-        alone = _Steps(factory(), problem).answer(case)
-        if wrong and not list(inspect(alone, trial, case, problem.form)):
+    if len(answers) != len(known.cases):
+        return f"{len(answers)} answers to {len(known.cases)} load cases"
+    return _first_wrong(zip(known.cases, answers, strict=True), factory, problem, known)
+
+
+def _first_wrong(
+    answers: Iterable[tuple[KnownCase, Answer]],
+    factory: Callable[[], Solver],
+    problem: Problem,
+    known: KnownProblem,
+) -> str:
+    """The first answer that is wrong although a fresh solver's is right; "" if there is none."""
+    for case, answer in answers:
+        wrong = list(inspect(answer, known, case, problem.form))
+        if wrong and not list(inspect(_Steps(factory(), problem).answer(case), known, case, problem.form)):
             return f"{case.name}: {wrong[0].wrong}"
     return ""
 
@@ -118,7 +121,7 @@ class _Raised(Exception):
 
 
 class _Steps:
-    """A solver taken through its steps as a measurement does; what it raises becomes a finding."""
+    """A solver taken through its steps as in a measurement; an exception becomes a finding."""
 
     def __init__(self, solver: Solver, problem: Problem) -> None:
         self.problem = problem
@@ -132,17 +135,17 @@ class _Steps:
         except Exception as error:
             raise _Raised(_raised(self.problem.form, name.removesuffix("_s"), error)) from error
 
-    def answer(self, case: Case, tolerance: float = TOLERANCE) -> Answer:
+    def answer(self, case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
         return self.session.cold(case.load, tolerance)
 
-    def next_answer(self, case: Case, before: Case) -> Answer:
-        """As a series does, from the answer of the case before."""
+    def next_answer(self, case: KnownCase, before: KnownCase) -> Answer:
+        """From the answer of the case before, as in a series."""
         x = before.x if "x" in self.problem.needs else None
         gap = before.load.g - self.problem.assembly.A.T @ before.x
         return self.session.warm(case.load, WarmStart(before.load, before.lam, gap, x))
 
-    def answers(self, cases: Sequence[Case]) -> list[Answer] | None:
-        """Those of all cases at once; None where the solver has no such way."""
+    def answers(self, cases: Sequence[KnownCase]) -> list[Answer] | None:
+        """The answers to all cases at once; None if the solver cannot."""
         if self.session.batch is None:
             return None
         with self._lap("batched"):
@@ -151,43 +154,43 @@ class _Steps:
 
 def _raised(form: str, step: str, error: Exception) -> Finding:
     last = traceback.extract_tb(error.__traceback__)[-1]
-    words = f"raised {type(error).__name__}: {error} ({last.filename}, line {last.lineno})"
+    what = f"raised {type(error).__name__}: {error} ({last.filename}, line {last.lineno})"
     if "read-only" in str(error):
-        return Finding(form, step, words, "The problem's arrays are shared and read-only: copy, then write")
-    return Finding(form, step, words, "A solver that cannot go on returns Answer('failed', None)")
+        return Finding(form, step, what, "The problem's arrays are shared and read-only: copy, then write")
+    return Finding(form, step, what, "A solver that cannot go on returns Answer('failed', None)")
 
 
-def _lam(answer: object, trial: Trial) -> Vector | None:
-    """λ if there is one that can be compared; anything else has been reported as what it is."""
+def _lam(answer: object, known: KnownProblem) -> Vector | None:
+    """λ if it can be compared; anything else has been reported already."""
     lam = getattr(answer, "lam", None)
-    if not isinstance(lam, np.ndarray) or lam.shape != (trial.prepared.assembly.m,):
+    if not isinstance(lam, np.ndarray) or lam.shape != (known.prepared.assembly.m,):
         return None
     return lam if np.isfinite(lam).all() else None
 
 
-def _same(one: Answer, two: Answer, trial: Trial) -> bool:
-    a, b = _lam(one, trial), _lam(two, trial)
+def _same(one: Answer, two: Answer, known: KnownProblem) -> bool:
+    a, b = _lam(one, known), _lam(two, known)
     return a is not None and b is not None and np.array_equal(a, b)
 
 
-def _differ(one: Answer, two: Answer, trial: Trial, case: Case) -> bool:
+def _differ(one: Answer, two: Answer, known: KnownProblem, case: KnownCase) -> bool:
     """Whether the displacements of two answers differ by more than a hundredth of the limit."""
-    a, b = _lam(one, trial), _lam(two, trial)
+    a, b = _lam(one, known), _lam(two, known)
     if a is None or b is None:
         return False
-    recover = trial.prepared.recover
+    recover = known.prepared.recover
     return distance(recover(a, case.load), recover(b, case.load)) > LIMIT_MM / 100
 
 
-def _fingerprint(trial: Trial) -> list[bytes]:
-    assembly = trial.prepared.assembly
-    loads = [array for case in trial.cases for array in (case.load.f, case.load.g, case.load.p)]
-    matrices = [*assembly.blocks, *trial.prepared.factors, trial.prepared.Q]
+def _fingerprint(known: KnownProblem) -> list[bytes]:
+    assembly = known.prepared.assembly
+    loads = [array for case in known.cases for array in (case.load.f, case.load.g, case.load.p)]
+    matrices = [*assembly.blocks, *known.prepared.factors, known.prepared.Q]
     return [a.tobytes() for a in (*matrices, assembly.A.data, assembly.A.indices, *loads)]
 
 
 def _first_of_each(found: list[Finding]) -> list[Finding]:
-    """The first finding of each kind in each form, for one fault shows in many cases."""
+    """The first finding of each kind in each form: one fault shows in many cases."""
     kinds: dict[tuple[str, str], Finding] = {}
     for finding in found:
         kinds.setdefault((finding.form, finding.fix), finding)

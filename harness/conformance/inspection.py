@@ -15,14 +15,14 @@ from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
 from solvers.base import Answer, Form, Status
 
-from .trials import Case, Trial
+from .known_problems import KnownCase, KnownProblem
 
 TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with a solver, where it showed, and what would put it right."""
+    """One thing that is wrong with a solver, where it showed, and how to fix it."""
 
     form: str
     where: str
@@ -33,9 +33,9 @@ class Finding:
         return f"[{self.form}] {self.where}: {self.wrong}. {self.fix}."
 
 
-def inspect(answer: Answer, trial: Trial, case: Case, form: Form) -> Iterator[Finding]:
-    """What is wrong with one answer to a case that was asked for at TOLERANCE."""
-    where = f"{trial.name}, {case.name}"
+def inspect(answer: Answer, known: KnownProblem, case: KnownCase, form: Form) -> Iterator[Finding]:
+    """What is wrong with the answer to a case at TOLERANCE."""
+    where = f"{known.name}, {case.name}"
 
     def finding(wrong: str, fix: str) -> Finding:
         return Finding(form, where, wrong, fix)
@@ -46,20 +46,20 @@ def inspect(answer: Answer, trial: Trial, case: Case, form: Form) -> Iterator[Fi
     if answer.status not in get_args(Status):
         yield finding(f"status is {answer.status!r}", f"Use one of {', '.join(get_args(Status))}")
     yield from _wrong_facts(answer, finding)
-    yield from (shape_faults := list(_wrong_arrays(answer, trial, form, finding)))
+    yield from (shape_faults := list(_wrong_arrays(answer, known, form, finding)))
     if shape_faults or answer.lam is None:
         return
-    wrong = list(_wrong_values(answer, answer.lam, trial, case, finding))
+    wrong = list(_wrong_values(answer, answer.lam, known, case, finding))
     yield from wrong
     smallest = float(answer.lam.min())
     if not wrong and smallest < -10 * TOLERANCE:
         yield finding(f"λ is as low as {smallest:.3g} N", "Contacts only push: λ ≥ 0 in both forms")
 
 
-Report = Callable[[str, str], Finding]
+NewFinding = Callable[[str, str], Finding]
 
 
-def _wrong_facts(answer: Answer, finding: Report) -> Iterator[Finding]:
+def _wrong_facts(answer: Answer, finding: NewFinding) -> Iterator[Finding]:
     for name in ("iterations", "inner_iterations"):
         value = getattr(answer, name)
         if value is not None and (not isinstance(value, Integral) or value < 0):
@@ -72,8 +72,8 @@ def _wrong_facts(answer: Answer, finding: Report) -> Iterator[Finding]:
         yield finding(f"details is not JSON ({error})", "Put only numbers, text, lists and dicts there")
 
 
-def _wrong_arrays(answer: Answer, trial: Trial, form: Form, finding: Report) -> Iterator[Finding]:
-    n, m = trial.prepared.assembly.n, trial.prepared.assembly.m
+def _wrong_arrays(answer: Answer, known: KnownProblem, form: Form, finding: NewFinding) -> Iterator[Finding]:
+    n, m = known.prepared.assembly.n, known.prepared.assembly.m
     if answer.lam is None:
         if answer.status == "solved":
             yield finding('status is "solved" but lam is None', "Return λ, or a status that says it failed")
@@ -81,7 +81,7 @@ def _wrong_arrays(answer: Answer, trial: Trial, form: Form, finding: Report) -> 
             yield finding(f'no answer, status "{answer.status}"', "The problem is small and easy: solve it")
         return
     arrays = [("lam", answer.lam, m)]
-    if "x" in in_form(trial.prepared, form).needs and answer.x is None:
+    if "x" in in_form(known.prepared, form).needs and answer.x is None:
         yield finding("x is None", "Return the displacements; only the dual form may leave them out")
     elif answer.x is not None:
         arrays.append(("x", answer.x, n))
@@ -90,36 +90,38 @@ def _wrong_arrays(answer: Answer, trial: Trial, form: Form, finding: Report) -> 
             kind = getattr(array, "dtype", type(array).__name__)
             yield finding(f"{name} is {kind}", "Return a numpy array of float64")
         elif array.shape != (size,):
-            yield finding(f"{name} has the shape {array.shape}", f"It must be ({size},): one a {_UNIT[name]}")
+            yield finding(
+                f"{name} has the shape {array.shape}", f"It must be ({size},): one per {_UNIT[name]}"
+            )
         elif not np.isfinite(array).all():
-            lies = ', and yet status is "solved"' if answer.status == "solved" else ""
-            yield finding(f"{name} has NaN or infinite values{lies}", "Return lam=None and failed instead")
+            claim = ', and yet status is "solved"' if answer.status == "solved" else ""
+            yield finding(f"{name} has NaN or infinite values{claim}", "Return lam=None and failed instead")
 
 
 _UNIT = {"lam": "contact (m)", "x": "unknown (n)"}
 
 
 def _wrong_values(
-    answer: Answer, lam: Vector, trial: Trial, case: Case, finding: Report
+    answer: Answer, lam: Vector, known: KnownProblem, case: KnownCase, finding: NewFinding
 ) -> Iterator[Finding]:
-    """x against the known displacements, and λ by the displacements K⁻¹(f − Aλ) that follow from it."""
-    load, prepared = case.load, trial.prepared
+    """Compare x with the known displacements, and so K⁻¹(f − Aλ), which follows from λ."""
+    load, prepared = case.load, known.prepared
     x_error = 0.0 if answer.x is None else distance(answer.x, case.x)
     lam_error = distance(prepared.recover(lam, load), case.x)
     if x_error > LIMIT_MM:
-        yield finding(*_off("x", answer, x_error))
+        yield finding(*_wrong_value("x", answer, x_error))
     if lam_error > LIMIT_MM:
         if distance(prepared.recover(-lam, load), case.x) <= LIMIT_MM:
             fix = "λ ≥ 0 are the multipliers of Aᵀx ≤ g, so Kx − f + Aλ = 0: return −lam"
             yield finding("lam has the wrong sign", fix)
         else:
-            yield finding(*_off("x = K⁻¹(f − A lam)", answer, lam_error))
+            yield finding(*_wrong_value("x = K⁻¹(f − A lam)", answer, lam_error))
     if max(x_error, lam_error) <= LIMIT_MM and answer.status in ("failed", "iteration_limit"):
         words = f'status is "{answer.status}" beside a right answer'
         yield finding(words, "Say solved when the tolerance is met")
 
 
-def _off(what: str, answer: Answer, error: float) -> tuple[str, str]:
+def _wrong_value(what: str, answer: Answer, error: float) -> tuple[str, str]:
     """The words for a wrong value: what is wrong, and how to fix it."""
     wrong = f"{what} is {error:.2g} mm off (limit {LIMIT_MM:g} mm at tolerance {TOLERANCE:g})"
     meaning = "x solves min ½xᵀKx − fᵀx, Aᵀx ≤ g, in mm; λ solves min ½λᵀQλ − pᵀλ, λ ≥ 0, in N"

@@ -1,1 +1,1 @@
-"""One process per measurement: started, watched, ended, recorded."""
+"""One process per measurement: started, limited, ended, recorded."""

@@ -1,4 +1,4 @@
-"""What a solver hands over: whether it can be taken for an answer, its figures, and its file."""
+"""A solver's answer: whether it is valid, its figures for the row, and its file."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from solvers.base import Answer, Status
 
 
 class Refused(Exception):
-    """The answer cannot be taken; the text says why."""
+    """The answer is invalid; the text says why."""
 
 
-def checked(answer: Answer, problem: Problem) -> Answer:
-    """The answer; Refused where what the solver returned is none."""
+def validated(answer: Answer, problem: Problem) -> Answer:
+    """The answer. Raises Refused if it is not one: type, status, shapes or values are wrong."""
     if not isinstance(answer, Answer):
         raise Refused(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
     if answer.status not in get_args(Status):
@@ -39,7 +39,7 @@ def checked(answer: Answer, problem: Problem) -> Answer:
 
 
 def figures(answer: Answer) -> Row:
-    """What the solver says of it, for the row."""
+    """What the solver reports, for the row."""
     return {
         "iterations": answer.iterations,
         "inner_iterations": answer.inner_iterations,
@@ -49,7 +49,7 @@ def figures(answer: Answer) -> Row:
 
 
 def save(path: Path, x: Vector, lam: Vector | None, m: int) -> None:
-    """x (n,) in mm and lam (m,) in N, NaN where the solver gives none; the file appears whole."""
+    """x (n,) in mm and lam (m,) in N, NaN if the solver gives none; written atomically."""
     new = path.with_name(path.name + ".new")
     with new.open("wb") as file:
         np.savez(file, x=x, lam=np.full(m, np.nan) if lam is None else lam)

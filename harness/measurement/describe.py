@@ -1,6 +1,6 @@
-"""Asks, in a process of its own, about a suite's solvers: forms, version, faults of their options.
+"""The forms, versions and faulty options of a suite's solvers, found in a separate process.
 
-A library that prints or crashes while it is imported then harms no run, and the driver stays light.
+A library that prints or crashes while it is imported then does no harm, and the driver imports none.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from harness.planning.suite import Suite
 from problems.errors import Fault, InputError
-from problems.forms.names import usual
+from problems.forms.names import default_form
 from solvers.base import Form
 
 from .solver_code import code_of
@@ -21,7 +21,7 @@ from .solver_code import code_of
 
 @dataclass(frozen=True)
 class Description:
-    """The forms a solver takes, the version of what solves, and a hash of the code here that calls it."""
+    """The forms that a solver takes, the version of its library, and a hash of this project's code for it."""
 
     forms: list[Form]
     version: str
@@ -29,8 +29,8 @@ class Description:
     in_house: bool = False
 
     @property
-    def usual_form(self) -> Form:
-        return usual(self.forms)
+    def default_form(self) -> Form:
+        return default_form(self.forms)
 
 
 #: By name and variant.
@@ -38,7 +38,7 @@ Solvers = dict[tuple[str, str], Description]
 
 
 def describe(suite: Suite) -> list[Description]:
-    """A description for each of the suite's solver entries. Raises InputError, all faults at once."""
+    """A description of each of the suite's solver entries. Raises InputError, all faults at once."""
     from .process import environment
 
     question = json.dumps({"solvers": [[e.name, e.options] for e in suite.solver], "plugin": suite.plugin})
@@ -55,10 +55,10 @@ def describe(suite: Suite) -> list[Description]:
         last = (done.stderr.strip().splitlines() or [""])[-1]
         why = f"importing one of these ended with exit code {done.returncode} {last}".strip()
         raise InputError.one(suite.plugin or f"suite {suite.name}", "solver", names, why)
-    said = json.loads(done.stdout.splitlines()[-1])
-    if said["faults"]:
-        raise InputError([Fault(**fault) for fault in said["faults"]])
-    return [Description(**found) for found in said["found"]]
+    reply = json.loads(done.stdout.splitlines()[-1])
+    if reply["faults"]:
+        raise InputError([Fault(**fault) for fault in reply["faults"]])
+    return [Description(**found) for found in reply["found"]]
 
 
 def main() -> None:

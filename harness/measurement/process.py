@@ -1,7 +1,7 @@
 """The driver's side of one measurement: start a worker, watch its limits from outside, end it.
 
-Whatever the worker does (hang, crash, eat memory, fork, print without end), the outcome is a dict
-with a `status`, and no process of it is left.
+Whatever the worker does (hang, crash, exhaust memory, fork, print without end), the outcome is a dict
+with a `status`, and none of its processes survives.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from .process_tree import end_children
 
 ROOT = Path(__file__).parents[2]
 POLL_S = 0.05
-#: The seconds that each phase may take: imports and opening the data; the solver, as long as the
-#: measurement says; saving the answer.
+#: The limit on each phase, s: imports and opening the data; the solver, whose limit is the measurement's;
+#: saving the answer.
 PHASES = {"start": 300.0, "solve": None, "save": 60.0}
 STDERR_TAIL = 2000  # bytes
 CHUNK = 2**16  # bytes
-LAST_WORDS = 64  # chunks read of what a dead worker wrote
-FAMILY_S = 0.5  # between two looks for processes that the worker forked
+FINAL_READS = 64  # chunks of what a dead worker had written
+SCAN_S = 0.5  # between two searches for processes that the worker forked
 
 JOB = ("source", "solver", "options", "plugin", "form", "tolerance", "yardstick", "batched")
-#: What a worker says once, for all the load cases of a series.
+#: What a worker reports once for all the load cases of a series.
 SHARED = ("load_s", "convert_s", "prepare_s", "data_mib")
 THREAD_VARIABLES = (
     *("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"),
@@ -45,7 +45,7 @@ THREAD_VARIABLES = (
 
 
 def environment(threads: int) -> dict[str, str]:
-    """What a worker starts with: the thread counts, and where these packages are."""
+    """The environment variables of a worker: the thread counts, and where these packages are."""
     paths = [os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else []
     if str(ROOT) not in (*site.getsitepackages(), site.getusersitepackages()):
         paths.insert(0, str(ROOT))
@@ -54,10 +54,10 @@ def environment(threads: int) -> dict[str, str]:
 
 
 def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Row]:
-    """Run measurements in one process: one, or some load cases of a series. Each answer is saved.
+    """Run measurements in one process: one, or load cases of a series. Each answer is saved.
 
-    Returns the worker's part of each row: status, message, times, peak memory, … Where a case ends the
-    process, those that follow have its status.
+    Returns the worker's part of each row: status, message, times, peak memory, … If a case ends the process,
+    those that follow have its status.
     """
     with Worker(measurements, answers) as worker:
         while not worker.over():
@@ -70,23 +70,23 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
 
 
 class Worker:
-    """A running measurement, as a context: on leaving it, every process of it is dead."""
+    """A running measurement, as a context: on leaving it, all its processes are dead."""
 
     def __init__(self, measurements: Sequence[Measurement], answers: Sequence[Path]) -> None:
         measurement = measurements[0]
         self.limits = measurement
         self.count = len(measurements)
         self.finished: list[Row] = []  # all but the last
-        self.said: Row = {}
-        self.verdict: Row = {}  # what the driver decided: a limit passed
+        self.row: Row = {}  # of the case being solved, so far
+        self.exceeded: Row = {}  # the status and message of a limit that was exceeded
         self.stderr = b""
         self.peak_mib = 0.0
-        self.family: set[psutil.Process] = set()
+        self.descendants: set[psutil.Process] = set()
         self.phase = "start"
-        self.phase_started = self.looked = self.counted = time.monotonic()
-        events, theirs = os.pipe()
+        self.phase_started = self.checked_at = self.scanned_at = time.monotonic()
+        events, events_of_worker = os.pipe()
         job = {
-            "events": theirs,
+            "events": events_of_worker,
             "answers": list(map(str, answers)),
             "cases": [each.case for each in measurements],
             "series": measurement.series.model_dump() if measurement.series else None,
@@ -99,11 +99,11 @@ class Worker:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,
                 env=environment(measurement.threads),
-                pass_fds=(theirs,),
+                pass_fds=(events_of_worker,),
                 start_new_session=True,
             )
         finally:
-            os.close(theirs)
+            os.close(events_of_worker)
         self.root = psutil.Process(self.process.pid)
         self.events = open(events, "rb", buffering=0)  # noqa: SIM115
         assert self.process.stdin is not None
@@ -124,7 +124,7 @@ class Worker:
         self.end()
 
     def listen(self, seconds: float) -> None:
-        """Take in what the worker says, for at most `seconds`."""
+        """Receive what the worker reports, for at most `seconds`."""
         for key, _ in self.selector.select(seconds):
             chunk = os.read(key.fd, CHUNK)
             if chunk:
@@ -139,7 +139,7 @@ class Worker:
         for line in lines:
             try:
                 event = json.loads(line)
-            except ValueError:  # not the worker's: its solver wrote to every file it found open
+            except ValueError:  # the solver wrote to this descriptor
                 continue
             if isinstance(event, dict):
                 self._take_event(event)
@@ -147,71 +147,71 @@ class Worker:
     def _take_event(self, event: Row) -> None:
         if event.get("phase") in PHASES:
             self.phase, self.phase_started = event.pop("phase"), time.monotonic()
-        self.said |= event
+        self.row |= event
         if "status" in event and not event.get("ended") and len(self.finished) < self.count - 1:
-            self.finished.append({"stderr": None, **self.said})
-            self.said = {name: self.said[name] for name in SHARED if name in self.said}
+            self.finished.append({"stderr": None, **self.row})
+            self.row = {name: self.row[name] for name in SHARED if name in self.row}
 
     def _take_stderr(self, chunk: bytes) -> None:
         self.stderr = (self.stderr + chunk)[-STDERR_TAIL:]
 
     def over(self) -> bool:
-        """Whether it has ended, or must be: by its own word, its own death, or a limit."""
-        if "status" in self.said:
+        """Whether it has reported its end, died, or exceeded a limit."""
+        if "status" in self.row:
             return True
         now = time.monotonic()
-        if now - self.looked < POLL_S:
+        if now - self.checked_at < POLL_S:
             return False
-        self.looked = now
+        self.checked_at = now
         if self.process.poll() is not None:
-            for _ in range(LAST_WORDS):
+            for _ in range(FINAL_READS):
                 self.listen(0)
             return True
-        self._look_at_memory()
-        self._look_at_the_clock(now - self.phase_started)
-        return bool(self.verdict)
+        self._check_memory()
+        self._check_time(now - self.phase_started)
+        return bool(self.exceeded)
 
-    def _look_at_memory(self) -> None:
+    def _check_memory(self) -> None:
         used, limit = self.memory_mib(), self.limits.memory_limit_mib
         if self.phase != "save":  # then the solver is done
             self.peak_mib = max(self.peak_mib, used)
         if used > limit:
-            self.verdict = {"status": "memory_limit", "message": f"{used:.0f} MiB, more than {limit} MiB"}
+            self.exceeded = {"status": "memory_limit", "message": f"{used:.0f} MiB, more than {limit} MiB"}
 
-    def _look_at_the_clock(self, seconds: float) -> None:
+    def _check_time(self, seconds: float) -> None:
         limit = PHASES[self.phase] or self.limits.time_limit_s * (self.limits.batched or 1)
         if seconds > limit:
             status = "time_limit" if self.phase == "solve" else "failed"
-            self.verdict = {"status": status, "message": f"{self.phase} took more than {limit:g} s"}
+            self.exceeded = {"status": status, "message": f"{self.phase} took more than {limit:g} s"}
 
     def memory_mib(self) -> float:
         """Resident memory of the process tree; pages that a fork shares are counted once."""
-        if time.monotonic() - self.counted > FAMILY_S:
-            self._count_the_family()
+        if time.monotonic() - self.scanned_at > SCAN_S:
+            self._find_descendants()
         total = 0
-        alone = not self.family
-        for process in (self.root, *self.family):
+        alone = not self.descendants
+        for process in (self.root, *self.descendants):
             with contextlib.suppress(psutil.NoSuchProcess, psutil.AccessDenied):
                 total += process.memory_info().rss if alone else process.memory_full_info().pss
         return total / 2**20
 
-    def _count_the_family(self) -> None:
+    def _find_descendants(self) -> None:
         with contextlib.suppress(psutil.NoSuchProcess):
-            self.family |= set(self.root.children(recursive=True))
-        self.counted = time.monotonic()
+            self.descendants |= set(self.root.children(recursive=True))
+        self.scanned_at = time.monotonic()
 
     def outcome(self) -> Row:
         """What is known: the worker's events, or else why there is no answer."""
         self.end()
-        peak = max(self.said.get("peak_rss_mib") or 0.0, self.peak_mib) or None
+        peak = max(self.row.get("peak_rss_mib") or 0.0, self.peak_mib) or None
         stderr = self.stderr.decode(errors="replace").strip() or None
-        said = self.said if "status" in self.said else {**self.said, **(self.verdict or self._death())}
-        return {**said, "peak_rss_mib": peak, "stderr": stderr}
+        end = {} if "status" in self.row else self.exceeded or self._exit()
+        return {**self.row, **end, "peak_rss_mib": peak, "stderr": stderr}
 
-    def _death(self) -> Row:
+    def _exit(self) -> Row:
         code = self.process.returncode
         if code < 0:
-            hint = ", perhaps by the system for want of memory" if code == -signal.SIGKILL else ""
+            hint = ", perhaps by the system because memory ran out" if code == -signal.SIGKILL else ""
             return {"status": "crashed", "message": f"killed by {signal.Signals(-code).name}{hint}"}
         return {"status": "crashed", "message": f"ended with exit code {code} before its answer"}
 
@@ -219,18 +219,18 @@ class Worker:
         """Kill every process of the worker, those that left its process group too."""
         if self.events.closed:
             return
-        self._count_the_family()
+        self._find_descendants()
         if self.process.poll() is None:
             os.kill(self.process.pid, signal.SIGSTOP)
             end_children(self.process.pid)
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self.process.pid, signal.SIGKILL)
-        for process in self.family:
+        for process in self.descendants:
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
         self.process.wait()
         self.selector.close()
         for stream in (self.events, self.process.stdin, self.process.stderr):
             if stream is not None:
-                with contextlib.suppress(BrokenPipeError):  # a job that the worker did not live to read
+                with contextlib.suppress(BrokenPipeError):  # the worker died before it read its job
                     stream.close()

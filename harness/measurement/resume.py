@@ -1,4 +1,4 @@
-"""Which rows of an earlier run still stand: of the same scene, solver, code and accuracy."""
+"""Which rows of an earlier run are still valid: of the same scene, solver, code and accuracy."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .describe import Description, Solvers
 
 
 def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
-    """The rows that DIRECTORY holds; what a new run of the plan would not repeat is set aside."""
+    """The valid rows of DIRECTORY; outdated ones are moved to a file of their own."""
     path = directory / records.MEASUREMENTS
-    if records.set_torn_aside(path):
-        console.print(f"{path}: the last line was torn; it now stands in {records.TORN}", style="yellow")
+    if records.move_torn_line(path):
+        console.print(f"{path}: the last line was torn; it is now in {records.TORN}", style="yellow")
     rows = records.read(path)
     planned = {m.key: m for m in plan}
     sources = {m.scene: m.source for m in plan}
@@ -41,12 +41,10 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
 
 
 def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> bool:
-    """Whether a row is of another scene, random field, solver or accuracy, or was ended by a limit that is
-    wider now.
-    """
+    """Whether a row is of another scene, series, solver or accuracy, or hit a limit that is wider now."""
     law = m.series.model_dump(exclude={"cases"}) if m.series else {}
     now = (scene_key, solver.version, solver.code, m.limit_mm, m.gated, law)
-    asked = row.get("limit_asked_mm", row.get("limit_mm"))  # rows once had the one limit alone
+    asked = row.get("limit_asked_mm", row.get("limit_mm"))  # older rows have one limit only
     drawn = {key: value for key, value in (row.get("series") or {}).items() if key != "cases"}
     solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
     before = (*solved, asked, row.get("gated"), drawn)

@@ -1,8 +1,7 @@
 """Work on Dask workers: `local:N`, or the address of a scheduler. Dask is imported here, when asked for.
 
-Each worker takes one task at a time, so that a measurement has its worker to itself. A worker that is lost
-has its tasks done by others; one that keeps killing workers fails by itself. Results come back to the
-driver, which alone writes them.
+Each worker takes one task at a time, so that a measurement has its worker to itself. The tasks of a lost
+worker are done by others; a task that keeps killing workers fails alone. Only the driver writes results.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ S = TypeVar("S")
 T = TypeVar("T")
 R = TypeVar("R")
 
-ANSWERS_WITHIN = "20s"
+CONNECT_TIMEOUT = "20s"
 RETRIES = 2  # of a task that raises
 CODE = ("problems", "solvers", "harness")
-AHEAD = 2  # tasks handed out for each worker: one being done, one that waits
+TASKS_PER_WORKER = 2  # one running, one waiting
 
 
 @contextmanager
 def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
     """An executor on the workers and how many there are.
 
-    Raises InputError where Dask is not installed, the scheduler does not answer, it has no worker, a worker
-    has more than one thread, or other versions than this process.
+    Raises InputError if Dask is not installed, the scheduler does not answer or has no worker, or a worker
+    has more than one thread or other versions than this process.
     """
     try:
         from distributed import Client, LocalCluster
@@ -47,17 +46,17 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
             n_workers=int(count), threads_per_worker=1, memory_limit=None, dashboard_address=":0"
         )
         with cluster, Client(cluster) as client:
-            yield _checked(client, scheduler)
+            yield _connected(client, scheduler)
         return
     try:
-        client = Client(scheduler, timeout=ANSWERS_WITHIN)
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError.one("--scheduler", "scheduler", scheduler, f"does not answer: {error}") from error
     with client:
-        yield _checked(client, scheduler)
+        yield _connected(client, scheduler)
 
 
-def _checked(client: Any, scheduler: str) -> tuple[Executor, int]:
+def _connected(client: Any, scheduler: str) -> tuple[Executor, int]:
     threads = client.nthreads()
     faults = [
         Fault(f"worker {address}", "nthreads", n, "start it with --nthreads 1: a measurement needs it alone")
@@ -75,17 +74,17 @@ def _checked(client: Any, scheduler: str) -> tuple[Executor, int]:
 
 
 def _versions_of(client: Any) -> dict[str, dict[str, str]]:
-    """What the scheduler and each worker have. Raises InputError where one cannot find these packages."""
+    """The versions of the scheduler and of each worker. Raises InputError if one lacks these packages."""
     try:
         scheduler = {"scheduler": client.run_on_scheduler(versions)}
         return scheduler | {f"worker {name}": found for name, found in client.run(versions).items()}
-    except Exception as error:  # of an import, over there
+    except Exception as error:  # an import failed there
         allowed = "install rivetbench for the scheduler and its workers, or start them with PYTHONPATH"
         raise InputError.one("--scheduler", "import", str(error), allowed) from error
 
 
 def versions() -> dict[str, str]:
-    """Of Python and of the packages that an answer can depend on; the fingerprint of this project's code."""
+    """The versions of Python and of what an answer can depend on, and the fingerprint of this code."""
     code = fingerprint(file for folder in CODE for file in (ROOT / folder).rglob("*.py"))
     packages = {name: installed_version(name) for name in PACKAGES}
     return {"python": platform.python_version(), **packages, "code": code}
@@ -103,16 +102,16 @@ def other_versions(who: str, here: dict[str, str], there: dict[str, str]) -> lis
 def done_as_completed(
     executor: Executor, count: int, work: Callable[[S], R], tasks: Iterable[tuple[T, S]]
 ) -> Iterator[tuple[T, R | BaseException]]:
-    """Each task with its result, or with what it raised, as they end; only a few are handed out ahead.
+    """Each task with its result, or with what it raised, as they end; only a few are submitted at a time.
 
-    tasks : what the task is here, and what of it is sent.
+    tasks : pairs of what identifies a task here and the argument of `work`.
     """
-    todo = iter(tasks)
+    remaining = iter(tasks)
     running: dict[Future[R], T] = {}
     while True:
-        for task, sent in todo:
+        for task, sent in remaining:
             running[executor.submit(work, sent)] = task
-            if len(running) >= AHEAD * count:
+            if len(running) >= TASKS_PER_WORKER * count:
                 break
         if not running:
             return
@@ -122,5 +121,5 @@ def done_as_completed(
             task = running.pop(future)
             raised = CancelledError() if future.cancelled() else future.exception()
             outcome = future.result() if raised is None else raised
-            del future  # what is still held is computed again when the worker that did it is lost
+            del future  # a future that is kept is computed again if its worker is lost
             yield task, outcome

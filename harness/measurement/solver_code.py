@@ -1,7 +1,7 @@
-"""The fingerprint of the code that can change a solver's answer or its time: a row names it.
+"""The fingerprint in each row of the code that can change a solver's answer or its time.
 
-The code is the solver's own file and what it imports from the package `solvers`, and that in turn: never
-another solver's. What solves in a library is told by the version of the library, beside this.
+The code is the solver's own file and what it imports from the package `solvers`, directly or indirectly,
+never another solver's. The version of the library is a field of its own.
 """
 
 from __future__ import annotations
@@ -15,6 +15,6 @@ from solvers.scaling import Scaled
 
 
 def code_of(solver: Solver) -> str:
-    """The fingerprint of a solver of the package, or of a user's."""
+    """The fingerprint of a solver of the package, or of a plug-in."""
     made = [solver, solver.solver] if isinstance(solver, Scaled) else [solver]
     return fingerprint([Path(inspect.getfile(type(each))) for each in made], within=["solvers"])

@@ -1,4 +1,4 @@
-"""A solver on one problem, taken through the steps of solvers.base: the only code that does so."""
+"""A solver on one problem: the only code that calls the steps of solvers.base."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.problem import Problem
 from solvers.base import Answer, Batch, Solver, WarmStart
 
-from .answers import Refused, checked
+from .answers import Refused, validated
 
-#: Wraps a step of the solver, by the name of its seconds: to time it, or to say which one failed.
+#: A context around a step of the solver, given the row field of its seconds: times it, or names what failed.
 Lap = Callable[[str], AbstractContextManager[None]]
 
 
 @dataclass(frozen=True)
 class Solved:
-    """A load case whose answer the next one may begin from. case : its number in a series."""
+    """A solved load case, from which the next one may start. case : its number in a series."""
 
     case: int | None
     load: LoadCase
@@ -31,14 +31,14 @@ class Solved:
 
 
 class SolverSession:
-    """Convert and prepare once, then load case after load case; what may be a warm start is kept.
+    """Convert and prepare once, then solve load cases one by one; answers are kept for warm starts.
 
     Parameters
     ----------
     lap : entered around each step, with convert_s, prepare_s, setup_s or solve_s.
     most : answers kept for warm starts; all by default.
 
-    Raises what the solver raises, and Refused where what it returns is no answer.
+    Raises what the solver raises, and Refused if an answer is invalid.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class SolverSession:
         self.batch: Batch | None = None
 
     def open(self, batched: bool = False) -> None:
-        """Convert and prepare. batched : ask for what takes several load cases at once, if there is one."""
+        """Convert and prepare. batched : also ask for the solver's way to solve several at once."""
         with self.lap("convert_s"):
             converted = self.solver.convert(self.problem)
         with self.lap("prepare_s"):
@@ -67,7 +67,7 @@ class SolverSession:
         self.opened = True
 
     def nearest(self, load: LoadCase) -> Solved | None:
-        """The solved case to start from; None before the first, and after a failure."""
+        """The solved case to start from; None before the first case and after a failure."""
         if self.ready is None:
             return None
         return min(self.solved, key=lambda other: self.problem.distance(other.load, load), default=None)
@@ -80,35 +80,35 @@ class SolverSession:
         return self._solve(load, tolerance)
 
     def warm(self, load: LoadCase, start: WarmStart) -> Answer:
-        """The library's own way to the next load case."""
+        """Update for the next load case, and solve."""
         with self.lap("setup_s"):
             self.ready = self.solver.update(self.state, self.ready, load, self.tolerance, start)
         return self._solve(load, self.tolerance)
 
     def next(self, load: LoadCase, near: Solved | None, case: int | None = None) -> Answer:
-        """Solve from the nearest answer if there is one; the answer is checked and kept for the next case."""
+        """Solve, from the nearest answer if there is one; the answer is validated and kept."""
         if near is None:
             found = self.cold(load)
         else:
             gap = self.problem.gap(near.load, near.lam, near.x)
             found = self.warm(load, WarmStart(near.load, near.lam, gap, near.x))
-        answer = checked(found, self.problem)
+        answer = validated(found, self.problem)
         if answer.lam is not None:
             x = answer.x if "x" in self.problem.needs else None
             self.solved.append(Solved(case, load, np.asarray(answer.lam, dtype=float), x))
         return answer
 
     def solve_batch(self, loads: Sequence[LoadCase]) -> list[Answer]:
-        """An answer to each load case, checked."""
+        """An answer to each load case, validated."""
         if self.batch is None:
             raise Refused("takes one load case at a time")
         answers = list(self.batch(loads, self.tolerance))
         if len(answers) != len(loads):
             raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
-        return [checked(answer, self.problem) for answer in answers]
+        return [validated(answer, self.problem) for answer in answers]
 
     def forget(self) -> None:
-        """Set the next case up anew, after a failure."""
+        """After a failure: set up the next case from the start."""
         self.ready = None
 
     def _solve(self, load: LoadCase, tolerance: float) -> Answer:

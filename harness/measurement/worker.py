@@ -1,10 +1,10 @@
-"""The process that measures: one solver on one load case, or on those of a series; nothing else in it.
+"""The measuring process: one solver on one load case, or on those of a series, and nothing else.
 
 `python -m harness.measurement.worker`, with a job as the first line of stdin; events go back as JSON lines
-on the file descriptor that the job names. Every event is a piece of the row: the driver merges them, so that
-what is known of a killed worker is kept. An event with `phase` (start, solve, save) starts the clock of
-another limit, the one with `status` ends the measurement, or the case of a series that is due, and with
-`ended` those after it too; then the worker waits to be ended.
+on the file descriptor that the job names. Each event is part of the row: the driver merges them, so that
+what a killed worker has reported is kept. An event with `phase` (start, solve, save) starts the clock of
+another limit; one with `status` ends the measurement, or the current case of a series, and with `ended`
+all cases after it too. Then the worker waits to be killed.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ PAGE = 4096
 
 
 class Unsupported(Exception):
-    """The solver does not take the job; the text says what it takes."""
+    """The solver does not take this form or way of solving; the text says what it takes."""
 
 
 def main() -> None:
     job = json.loads(sys.stdin.readline())
-    end_with_the_driver()
+    die_with_driver()
     faulthandler.enable()
     run = Run(job)
     try:
-        for end in run.ends():
-            run.tell(**end)
+        for outcome in run.outcomes():
+            run.report(**outcome)
         end = {}
     except MemoryError as error:
         end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
@@ -63,13 +63,13 @@ def main() -> None:
     except BaseException as error:
         end = {"status": "failed", "message": f"{type(error).__name__}: {error}"[:2000]}
     if end:
-        run.tell(**end, answer=None, ended=True)
+        run.report(**end, answer=None, ended=True)
     sys.stdin.read()
     os._exit(0)
 
 
-def end_with_the_driver() -> None:
-    """Linux: die when the driver dies, and keep hold of grandchildren whose parent is gone."""
+def die_with_driver() -> None:
+    """Linux: die when the driver dies, and adopt the orphans of child processes."""
     if sys.platform == "linux":
         set_death_signal, set_child_subreaper = 1, 36
         prctl = ctypes.CDLL(None).prctl
@@ -78,14 +78,14 @@ def end_with_the_driver() -> None:
 
 
 class Run:
-    """One measurement in the making."""
+    """The measurements of one job."""
 
     def __init__(self, job: Row) -> None:
         self.job = job
         self.process = os.getpid()
 
-    def tell(self, **event: Any) -> None:
-        if os.getpid() != self.process:  # a child that the solver forked and let run on
+    def report(self, **event: Any) -> None:
+        if os.getpid() != self.process:  # a child that the solver forked and that returned here
             os._exit(0)
         line = to_line(event)
         if len(line) > LARGEST_EVENT:
@@ -96,10 +96,10 @@ class Run:
     def lap(self, name: str, before: float = 0.0) -> Iterator[None]:
         start = time.perf_counter()
         yield
-        self.tell(**{name: before + time.perf_counter() - start})
+        self.report(**{name: before + time.perf_counter() - start})
 
-    def ends(self) -> Iterator[Row]:
-        """Solve the job's load cases; how each ended."""
+    def outcomes(self) -> Iterator[Row]:
+        """Solve the job's load cases: the last event of each."""
         job = self.job
         solver = make_solver(job["solver"], job["options"], Path(job["plugin"]) if job["plugin"] else None)
         if job["form"] not in solver.forms:
@@ -108,7 +108,7 @@ class Run:
             scene = read_scene(job["source"])
             problem = in_form(prepared(scene), job["form"])
             cases = list(load_cases(scene, job))
-            touch(problem.arrays)
+            read_all_pages(problem.arrays)
         session = SolverSession(solver, problem, job["tolerance"], self.lap)
         files, size = list(map(Path, job["answers"])), job["batched"]
         if size is None:
@@ -120,7 +120,7 @@ class Run:
             yield from self.solved_batch(session, cases[some], files[some])
 
     def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Row:
-        """Solve one load case and save its answer; how that ended."""
+        """Solve one load case and save its answer: the last event."""
         problem = session.problem
         start = time.perf_counter()
         (load,) = problem.loads([case])
@@ -137,7 +137,7 @@ class Run:
     def solved_batch(
         self, session: SolverSession, cases: Sequence[LoadCase], answer_files: Sequence[Path]
     ) -> Iterator[Row]:
-        """The same for load cases solved at once; each has an equal share of the seconds."""
+        """The same for load cases solved at once; each has an equal share of the time."""
         problem = session.problem
         start = time.perf_counter()
         loads = problem.loads(cases)
@@ -160,18 +160,18 @@ class Run:
             yield self.saved(answer, x, file, problem, figures(answer) | shares)
 
     def begin(self, session: SolverSession) -> None:
-        """The clock of the solver starts; before the first load case it converts and prepares."""
+        """Start the clock of the solver; before the first load case, convert and prepare."""
         if session.opened:
-            self.tell(phase="solve")
+            self.report(phase="solve")
             return
-        self.tell(phase="solve", data_mib=resident_mib("VmRSS"))
+        self.report(phase="solve", data_mib=resident_mib("VmRSS"))
         session.open(batched=self.job["batched"] is not None)
 
-    def saved(self, answer: Answer, x: Vector | None, file: Path, problem: Problem, said: Row) -> Row:
-        """Tell what the solver said, and save its answer; how the case ended."""
-        self.tell(phase="save", **said, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
+    def saved(self, answer: Answer, x: Vector | None, file: Path, problem: Problem, solved: Row) -> Row:
+        """Report what the solver returned, and save its answer: the last event."""
+        self.report(phase="save", **solved, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
         if self.job["yardstick"] and problem.yardstick is not None:
-            self.tell(**yardstick(problem.yardstick))
+            self.report(**yardstick(problem.yardstick))
         if x is None:
             return {"status": answer.status, "answer": None}
         try:
@@ -193,14 +193,14 @@ def load_cases(scene: Scene, job: Row) -> Iterator[LoadCase]:
         yield cases.load(case)
 
 
-def touch(arrays: Sequence[Matrix]) -> None:
-    """Read a byte of every page of the matrices, so that no solver pays for a cold file cache."""
+def read_all_pages(arrays: Sequence[Matrix]) -> None:
+    """Read every page of the matrices, so that no solver's time includes a cold file cache."""
     for array in arrays:
         array.ravel(order="K")[:: PAGE // array.itemsize].sum()
 
 
 def threads_in_effect() -> Row:
-    """BLAS kernels and thread count of the libraries that are loaded by now."""
+    """BLAS kernels and thread count of the libraries loaded so far."""
     pools = threadpoolctl.threadpool_info()
     blas = [pool for pool in pools if pool["user_api"] == "blas"]
     names = ("internal_api", "version", "architecture")

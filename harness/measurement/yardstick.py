@@ -1,4 +1,4 @@
-"""What the machine can do at best, beside each solve: a Cholesky factorisation of Q and a product Qv."""
+"""The speed of the machine beside each solve: a Cholesky factorisation of Q and a product Qv."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ REPEATS = 3
 
 
 def yardstick(Q: Matrix) -> dict[str, float]:
-    """Seconds of each, the median of three; m³/3 operations and one pass over 8m² bytes."""
+    """Seconds of each, median of three: m³/3 operations, and one pass over 8m² bytes."""
     v = np.ones(len(Q))
     factor, product = [], []
     for _ in range(REPEATS):

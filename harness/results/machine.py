@@ -1,4 +1,4 @@
-"""What the measurements were made on, with which versions, and the memory of this process."""
+"""The machine and the versions of a measurement, and the memory of this process."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def resident_mib(name: str) -> float | None:
 
 
 def installed_version(package: str) -> str:
-    """Our own is that of the code that runs, installed or not; "unknown" if a library is not installed."""
+    """The version of a package or "unknown"; rivetbench's is that of the running code."""
     if package == "rivetbench":
         return __version__
     try:

@@ -1,4 +1,4 @@
-"""Which code made a row: its commit and whether that was changed since, or else its version."""
+"""The code that made a row: its commit and whether it had changes, or else its version."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from problems import __version__
 
 #: The folder that holds the project's packages.
 ROOT = Path(__file__).resolve().parents[2]
-#: What can change a number; results that are written meanwhile do not count.
+#: What can change a number; results that are written meanwhile are not part of it.
 CODE = ("problems", "solvers", "harness", "report", "pyproject.toml")
 #: Tracked in a work tree of this project; a tree that merely contains an installed copy tracks neither.
-OWN = ("pyproject.toml", "harness/results/provenance.py")
-#: Set by git for its hooks, they name the tree that the hook is for.
-OF_HOOKS = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR")
+OWN_FILES = ("pyproject.toml", "harness/results/provenance.py")
+#: Set by git for its hooks, to the tree that the hook is for.
+HOOK_VARIABLES = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR")
 
 
 def provenance() -> dict[str, str | bool | None]:
@@ -39,10 +39,10 @@ def commit() -> tuple[str, bool | None]:
 
 def _of_work_tree() -> tuple[str, bool | None] | None:
     head = _git("rev-parse", "--show-prefix", "HEAD")
-    if head is None or _git("ls-files", "--error-unmatch", "--", *OWN) is None:
+    if head is None or _git("ls-files", "--error-unmatch", "--", *OWN_FILES) is None:
         return None
-    below, digits = head.splitlines()
-    if below:  # the packages lie deeper in a work tree: of another project
+    prefix, digits = head.splitlines()
+    if prefix:  # the packages lie in a subfolder: the work tree is another project's
         return None
     changes = _git("status", "--porcelain", "--untracked-files=all", "--", *CODE)
     return digits, None if changes is None else not changes
@@ -50,7 +50,7 @@ def _of_work_tree() -> tuple[str, bool | None] | None:
 
 def _git(*arguments: str) -> str | None:
     """What git prints about ROOT; None if it is not installed or fails."""
-    environment = {name: value for name, value in os.environ.items() if name not in OF_HOOKS}
+    environment = {name: value for name, value in os.environ.items() if name not in HOOK_VARIABLES}
     try:
         done = subprocess.run(
             ["git", "-C", str(ROOT), *arguments],
@@ -58,7 +58,7 @@ def _git(*arguments: str) -> str | None:
             capture_output=True,
             text=True,
             errors="replace",
-            env=environment | {"GIT_OPTIONAL_LOCKS": "0"},  # never in the way of a commit
+            env=environment | {"GIT_OPTIONAL_LOCKS": "0"},  # never blocks a commit
         )
     except OSError:
         return None
@@ -72,6 +72,6 @@ def _of_installation() -> tuple[str, bool] | None:
         origin = json.loads(installed.read_text("direct_url.json") or "{}")
     except (PackageNotFoundError, ValueError):
         return None
-    here = Path(str(installed.locate_file("harness"))).resolve() == ROOT / "harness"
+    installed_here = Path(str(installed.locate_file("harness"))).resolve() == ROOT / "harness"
     digits = origin.get("vcs_info", {}).get("commit_id")
-    return (digits, True) if here and digits else None
+    return (digits, True) if installed_here and digits else None

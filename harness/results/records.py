@@ -1,7 +1,7 @@
-"""The files of a results directory: rows that survive any end of the run.
+"""The files of a results directory: rows that survive however the run ends.
 
-A row is one JSON line in measurements.jsonl, appended, flushed and synced before the next
-measurement starts. The only damage that an abrupt end can do is a torn last line; it is set aside.
+A row is one JSON line in measurements.jsonl, appended and synced before the next measurement starts. An
+abrupt end can only leave a torn last line, which is moved to a file of its own.
 """
 
 from __future__ import annotations
@@ -75,12 +75,12 @@ def read(path: Path) -> list[Row]:
     return rows
 
 
-def read_whole(path: Path) -> list[Row]:
+def read_complete_rows(path: Path) -> list[Row]:
     """The complete rows, for a file that is rewritten as rows are added."""
     return _split(path)[0]
 
 
-def set_torn_aside(path: Path) -> bool:
+def move_torn_line(path: Path) -> bool:
     """Move a torn last line into measurements.torn; returns whether there was one."""
     _, torn = _split(path)
     if torn:
@@ -129,7 +129,7 @@ def replace_text(path: Path, text: str) -> None:
 
 
 @contextmanager
-def held(directory: Path, folders: Sequence[str] = ("answers", "scenes")) -> Iterator[None]:
+def locked(directory: Path, folders: Sequence[str] = ("answers", "scenes")) -> Iterator[None]:
     """Create the directory and lock it against a second run. Raises InputError if that fails."""
     try:
         for folder in ("", *folders):

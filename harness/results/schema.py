@@ -11,10 +11,10 @@ from typing import Literal, get_args
 #: An object is a JSON object whose names depend on the solver or the series.
 Kind = Literal["number", "text", "flag", "object"]
 
-#: What ended a measurement. The first four are what a solver says of its answer.
+#: How a measurement ended. The first four are a solver's report on its answer.
 Status = Literal[
     "solved",  # to its tolerance
-    "inaccurate",  # an answer that misses it
+    "inaccurate",  # an answer that misses the tolerance
     "iteration_limit",
     "failed",
     "time_limit",
@@ -25,7 +25,7 @@ Status = Literal[
 ]
 STATUSES: tuple[Status, ...] = get_args(Status)
 
-#: What the judge says of an answer, from best to worst.
+#: The judge's verdict on an answer, from best to worst.
 Verdict = Literal["within", "outside", "cannot_be_judged", "no_answer"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 ANSWERED = VERDICTS[:-1]
@@ -44,7 +44,7 @@ def _fields(kind: Kind, names: str) -> dict[str, Kind]:
     return dict.fromkeys(names.split(), kind)
 
 
-#: What was asked for.
+#: What was requested.
 ASKED: dict[str, Kind] = {
     **_fields("text", "key suite scene source solver form variant"),
     **_fields("number", "tolerance threads_asked repeat case time_limit_s memory_limit_mib"),
@@ -62,7 +62,7 @@ MEASURED: dict[str, Kind] = {
     **_fields("number", "load_s solver_reported_s data_mib peak_rss_mib threads cholesky_s product_s"),
     **_fields("object", "details"),
 }
-#: The same of a case of a series: how many were solved at once, and whether others were before.
+#: The same for a case of a series: how many were solved at once, and whether others were solved before.
 MEASURED_OF_CASES: dict[str, Kind] = {**_fields("number", "batched"), **_fields("flag", "warm")}
 #: What the judge finds.
 JUDGED: dict[str, Kind] = {

@@ -1,4 +1,4 @@
-"""Matrices in and out: any scene as files of other programs, and their files as a scene's .npz."""
+"""Exchange of matrices: any scene as files for other programs, and their files as a scene's .npz."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from problems.forms.prepared import Prepared
 from problems.input.user_matrices import read_matrices
 from problems.scene import read_scene
 
-from .few_digits import said_of_digits
+from .few_digits import digits_sentence
 
 
-def export(source: str, form: str, out: Path, console: Console) -> None:
+def export(source: str, format: str, out: Path, console: Console) -> None:
     """Write K, A, f, g of a scene in a format of problems.formats. Raises InputError."""
-    if form not in formats.WRITERS:
-        raise InputError.one("--format", "format", form, f"one of {', '.join(formats.WRITERS)}")
+    if format not in formats.WRITERS:
+        raise InputError.one("--format", "format", format, f"one of {', '.join(formats.WRITERS)}")
     scene = read_scene(source)
     data = prepared(scene)
     load = load_case(scene)
     out.parent.mkdir(parents=True, exist_ok=True)
-    formats.write(form, out, matrices(data, load))
-    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.WRITERS[form]}.")
+    formats.write(format, out, matrices(data, load))
+    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.WRITERS[format]}.")
 
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:
-    """K, A, f, g of a problem, and its nodes where they are known."""
+    """K, A, f, g of a problem, and its nodes if they are known."""
     assembly = data.assembly
     K = sp.block_diag(assembly.blocks, format="csr")
     found = {"K": sp.csr_array(K), "A": sp.csc_array(assembly.A), "f": load.f, "g": load.g}
@@ -41,16 +41,16 @@ def matrices(data: Prepared, load: LoadCase) -> formats.Data:
 
 
 def import_(files: list[str], out: Path, console: Console) -> None:
-    """Read K, A, f, g from files, check them, and write them as one .npz that a scene can be.
+    """Read K, A, f, g from files, check them, and write them as one .npz, which is a scene.
 
-    files : paths, or NAME=PATH where the file of one matrix is not named by it. Raises InputError.
+    files : paths, or NAME=PATH if the matrix has another name in its file. Raises InputError.
     """
     data: formats.Data = {}
     for file in files:
         name, _, path = file.rpartition("=")
         found = formats.read(Path(path))
         if name:
-            found = {name: _meant(found, name, path)}
+            found = {name: _named(found, name, path)}
         if strange := [key for key in found if key not in formats.NAMES]:
             allowed = "K, A, f, g or nodes; say K=FILE where the file has another name"
             raise InputError([Fault(path, "matrix", key, allowed) for key in strange])
@@ -66,18 +66,18 @@ def import_(files: list[str], out: Path, console: Console) -> None:
         work.replace(out)
     finally:
         work.unlink(missing_ok=True)
-    _checked(out, console)
+    _print_facts(out, console)
 
 
-def _meant(found: formats.Data, name: str, path: str) -> object:
-    """The matrix that NAME=PATH asks for: the one of this name, or the only one that the file has."""
+def _named(found: formats.Data, name: str, path: str) -> object:
+    """The matrix meant by NAME=PATH: the one of this name, or the only one in the file."""
     if name not in found and len(found) != 1:
         raise InputError.one(path, "matrices", list(found), f"a matrix {name}, or one matrix alone")
     return found.get(name, next(iter(found.values())))
 
 
-def _checked(out: Path, console: Console) -> None:
-    """Definiteness, condition and digits of what was read, on the console."""
+def _print_facts(out: Path, console: Console) -> None:
+    """Print size, definiteness, condition and digits of what was read."""
     scene = read_scene(str(out))
     try:
         data = prepared(scene)
@@ -90,5 +90,5 @@ def _checked(out: Path, console: Console) -> None:
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
     console.print(f"K is symmetric and positive definite, cond(K) = {data.facts['cond_K']:.2e}.")
     known = reference(data, load)
-    said, few = said_of_digits(data, known.x, known.lam)
-    console.print(f"{said}.", style="yellow" if few else None)
+    sentence, few = digits_sentence(data, known.x, known.lam)
+    console.print(f"{sentence}.", style="yellow" if few else None)

@@ -1,4 +1,4 @@
-"""What is said of the digits that a user's stiffness matrix seems to have."""
+"""How many digits a user's stiffness matrix seems to have, and the error if it was rounded to these."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def digits_of(assembly: Assembly) -> int:
     return min(apparent_digits(K[np.nonzero(K)]) for K in assembly.blocks)
 
 
-def said_of_digits(data: Prepared, x: Vector, lam: Vector) -> tuple[str, bool]:
-    """A sentence on K's digits for an answer x, λ, and whether they are too few for 1e-7 mm."""
+def digits_sentence(data: Prepared, x: Vector, lam: Vector) -> tuple[str, bool]:
+    """A sentence on the digits of K, and whether they are too few for 1e-7 mm at the answer x, λ."""
     digits = digits_of(data.assembly)
     if digits == DOUBLE:
         return "The entries of K have all digits of double precision", False

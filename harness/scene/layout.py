@@ -1,4 +1,4 @@
-"""Where parts and contacts stand in x and λ, and what a picture of a scene marks."""
+"""The places of parts and contacts in x and λ, and what a picture of a scene marks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from problems.model.scene import JointScene, Scene
 
 
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
-    """Where parts and pairs stand in x and λ, and what a picture marks."""
+    """The ranges of parts in x and of pairs in λ, and what a picture marks."""
     if not isinstance(scene, JointScene):
         spans = zip(assembly.parts, assembly.slices, strict=True)
         nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))

@@ -1,4 +1,4 @@
-"""What each effect of a scene added, measured alone: stiffness, load, gap or constraints, time and memory."""
+"""What each effect of a scene adds, measured one by one: stiffness, load, gap or contacts, time, memory."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect,
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 
-BALANCE = 1e-9  # a sum so small beside its terms is rounding
+BALANCE = 1e-9  # a sum smaller than this, relative to its terms, is rounding
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One effect and one thing that it added; seconds and MiB at its peak, None if nothing was computed."""
+    """One effect and one thing that it adds; seconds and peak MiB, None if nothing was computed."""
 
     effect: str
     adds: str
@@ -38,7 +38,7 @@ class Cost:
 
 @contextmanager
 def measured() -> Iterator[Cost]:
-    """The time of a `with` block and the most memory that it had allocated at once."""
+    """The time of a `with` block and the peak of its allocated memory."""
     cost = Cost()
     tracemalloc.start()
     start = time.perf_counter()
@@ -104,7 +104,7 @@ def _forces(f: Vector, joint: Joint) -> str:
 
 
 def _sum(f: Vector) -> str:
-    """The sum of forces; of those in balance, how large they are."""
+    """The sum of forces; their largest if they are in balance."""
     if abs(f.sum()) < BALANCE * abs(f).sum():
         return f"±{abs(f).max():.4g} N in balance"
     return f"{f.sum():+.4g} N"

@@ -1,7 +1,7 @@
 """One scene from its file to an answer on disk; the report draws it from there.
 
 DIR/solution.npz holds the arrays, DIR/solution.json what was done: the steps and their time, the ledger of
-the effects, what was skipped, and how well the answer is known.
+the effects, what was skipped, and the error bound of the answer.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from harness.measurement.solver_session import SolverSession
 from harness.planning.estimate import refuse_what_cannot_fit
 from harness.results.machine import resident_mib
 from harness.results.records import replace_text, to_line
-from harness.terminal.exit_codes import DONE, FELL_SHORT
+from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import Reference, reference_of
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.names import usual
+from problems.forms.names import default_form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.model.effect import TieEffect
@@ -37,7 +37,7 @@ from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.scene import read_scene
 from solvers.base import Solver
 
-from .few_digits import said_of_digits
+from .few_digits import digits_sentence
 from .layout import layout
 from .ledger import Entry, ledger, not_called_for
 
@@ -46,7 +46,7 @@ LINEAR = "linear solve with the Cholesky factors of K"
 
 
 class Steps:
-    """The seconds of each step, and what building the matrices took that could not come from the cache."""
+    """The seconds of each step, and the matrices that were built because the cache did not hold them."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
@@ -71,11 +71,11 @@ class Steps:
 
 
 def solve(source: str, solver: str | None, tolerance: float, out: Path, console: Console) -> int:
-    """Solve a scene, write DIR, show the outcome. Returns 0 where the answer is known to 1e-7 mm, else 1.
+    """Solve a scene, write DIR, show the outcome. Returns 0 if the answer is within 1e-7 mm, else 1.
 
     Raises InputError.
     """
-    begun = time.perf_counter()
+    started = time.perf_counter()
     steps = Steps(console)
     with steps.step("reading the scene"):
         if not 0 < tolerance < inf:
@@ -91,39 +91,41 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     with steps.step("loads and gaps"):
         load = load_case(scene)
         p = data.dual_load(load)
-    meets = bool((p > 0).any())
+    has_contact = bool((p > 0).any())
     with steps.step("answer with a proven bound"):
         known = reference_of(scene, data, load)
-    if solver and chosen and meets:
+    if solver and chosen and has_contact:
         with steps.step(f"solving with {solver}"):
-            x, lam, said = _answer(solver, chosen, data, load, tolerance)
+            x, lam, outcome = _answer(solver, chosen, data, load, tolerance)
         verdict = judge(data, load, known, x, lam, LIMIT_MM)
-        said |= {"verdict": verdict.verdict, "judged_error_mm": verdict.displacement_error_mm}
+        outcome |= {"verdict": verdict.verdict, "judged_error_mm": verdict.displacement_error_mm}
     else:
         x, lam = known.x, known.lam
-        within = known.bound_mm <= LIMIT_MM
-        verdict_here = "within" if within else "cannot_be_judged"
-        method = ACTIVE_SET if meets else LINEAR
-        said = {"method": method, "status": "solved", "verdict": verdict_here, "judged_error_mm": None}
+        outcome = {
+            "method": ACTIVE_SET if has_contact else LINEAR,
+            "status": "solved",
+            "verdict": "within" if known.bound_mm <= LIMIT_MM else "cannot_be_judged",
+            "judged_error_mm": None,
+        }
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError.one("--out", "directory", str(out), f"cannot be written: {error}") from error
-    record = said | {
+    record = outcome | {
         "scene": scene.name,
         "title": scene.title,
         "scene_key": scene.key,
         "n": data.assembly.n,
         "m": data.assembly.m,
         "cond_K": data.facts.get("cond_K"),
-        "qp": meets,
+        "qp": has_contact,
         "closest_mm": float(-p.max()) if p.size else None,
         "error_bound_mm": known.bound_mm,
         "route": known.route,
         **layout(scene, data.assembly),
         "ledger": [vars(entry) for entry in entries],
-        "digits": said_of_digits(data, known.x, known.lam)[0] if isinstance(scene, MatricesScene) else None,
-        "skipped": list(_skipped(scene, steps, meets, solver, p)),
+        "digits": digits_sentence(data, known.x, known.lam)[0] if isinstance(scene, MatricesScene) else None,
+        "skipped": list(_skipped(scene, steps, has_contact, solver, p)),
         "steps": steps.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
     }
@@ -133,8 +135,8 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
 
         written = write(out)
     _show(record, entries, known, console)
-    console.print(f"{time.perf_counter() - begun:.1f} s in all. Answer: {written}")
-    return DONE if record["verdict"] == "within" else FELL_SHORT
+    console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
+    return DONE if record["verdict"] == "within" else FAILED
 
 
 def _solver(name: str) -> Solver:
@@ -146,8 +148,8 @@ def _solver(name: str) -> Solver:
 def _answer(
     name: str, solver: Solver, data: Prepared, case: LoadCase, tolerance: float
 ) -> tuple[Vector, Vector, dict[str, Any]]:
-    """x (n,), λ (m,) or NaN where there is none, and what the solver says. Raises InputError without an x."""
-    session = SolverSession(solver, in_form(data, usual(solver.forms)), tolerance)
+    """x (n,), λ (m,) or NaN if there is none, and the solver's report. Raises InputError without an x."""
+    session = SolverSession(solver, in_form(data, default_form(solver.forms)), tolerance)
     problem = session.problem
     session.open()
     (load,) = problem.loads([case])
@@ -159,12 +161,15 @@ def _answer(
     if x is None:
         raise InputError.one("--solver", name, answer.status, "gave no answer; try another solver")
     lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
-    said = {"method": f"{name}, {problem.form} form, tolerance {tolerance:g}", "status": answer.status}
-    return np.asarray(x, dtype=float), lam, said | {"iterations": answer.iterations}
+    outcome = {
+        "method": f"{name}, {problem.form} form, tolerance {tolerance:g}",
+        "status": answer.status,
+    }
+    return np.asarray(x, dtype=float), lam, outcome | {"iterations": answer.iterations}
 
 
-def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vector) -> Iterator[str]:
-    if not meets:
+def _skipped(scene: Scene, steps: Steps, has_contact: bool, solver: str | None, p: Vector) -> Iterator[str]:
+    if not has_contact:
         instead = f"; {solver} was not run" if solver else ""
         why = "The scene has no contact"
         if p.size:
@@ -179,7 +184,7 @@ def _skipped(scene: Scene, steps: Steps, meets: bool, solver: str | None, p: Vec
         if not any(scene.effects_of(TieEffect)):
             yield "springs between parts: K stays block diagonal"
         if not any(scene.effects_of(PartLoadEffect)):
-            yield "condensing loads: none stands beyond the junction"
+            yield "condensing loads: none acts beyond the junction"
         if others := not_called_for(scene):
             yield f"effects that the scene does not name, not imported: {', '.join(others)}"
 

@@ -20,7 +20,7 @@ from problems.scene import read_scene
 
 from .few_digits import digits_of
 
-TRIAL = 700  # unknowns of the Cholesky factorisation that the machine's speed is taken from
+SAMPLE_SIZE = 700  # unknowns of the Cholesky factorisation that measures the machine's speed
 
 
 def validate(source: str, console: Console) -> None:
@@ -39,7 +39,7 @@ def validate(source: str, console: Console) -> None:
         f"{estimate.stored_mib:.0f} MiB in the cache, the process up to {estimate.peak_mib:.0f} MiB of "
         f"{physical_memory_mib()}."
     )
-    build = "stands in the cache" if cached else f"has to be built, about {_time(estimate.build_s)}"
+    build = "is in the cache" if cached else f"has to be built, about {_time(estimate.build_s)}"
     console.print(
         f"The assembly {build}; an answer with its bound takes about {_time(estimate.answer_s)} more."
     )
@@ -53,7 +53,7 @@ def validate(source: str, console: Console) -> None:
 
 
 def _matrices(scene: Scene, console: Console) -> None:
-    """Say what given matrices are. Raises InputError where K is not positive definite."""
+    """Print the sizes and digits of given matrices. Raises InputError if K is not positive definite."""
     data = prepared(scene)
     _ = data.Q
     assembly = data.assembly
@@ -64,14 +64,14 @@ def _matrices(scene: Scene, console: Console) -> None:
 
 
 def speed() -> float:
-    """Operations a second of this machine's Cholesky factorisation, from a small one."""
-    A = np.eye(TRIAL) * 2 + 1.0 / TRIAL
+    """Operations per second of a small Cholesky factorisation on this machine."""
+    A = np.eye(SAMPLE_SIZE) * 2 + 1.0 / SAMPLE_SIZE
     best = np.inf
     for _ in range(3):
         start = time.perf_counter()
         sla.cholesky(A, check_finite=False)
         best = min(best, time.perf_counter() - start)
-    return TRIAL**3 / 3 / best
+    return SAMPLE_SIZE**3 / 3 / best
 
 
 def _contents(scene: JointScene) -> Table:

@@ -1,1 +1,1 @@
-"""Many load cases on one assembly: opened once, prepared once, solved one after another, each vouched for."""
+"""Many load cases on one assembly, opened and prepared once; each answer has a proven error bound."""

@@ -1,4 +1,4 @@
-"""Runs a series: the cases that DIRECTORY does not hold yet, rows and gaps as they come in."""
+"""Runs a series: solves the cases that DIRECTORY lacks, writes rows and gaps as they come in."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from harness.measurement.scheduler import done_as_completed, workers
 from harness.results import records
 from harness.results.machine import installed_version, machine
-from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
+from harness.results.schema import VERDICTS
+from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from problems.build import prepared
 from problems.model.scene import JointScene
 
@@ -25,43 +26,43 @@ from . import store
 from .on_worker import solve_on_worker
 from .session import BLOCK, Job, Result, SeriesSession
 
-VERDICTS = ("within", "outside", "cannot_be_judged", "no_answer")
-
 
 @dataclass
 class Tally:
-    """What has been seen so far; of the errors the largest."""
+    """Counts of verdicts, the largest error bound and the largest error of the cases compared."""
 
     counts: dict[str, int]
     worst_bound_mm: float = 0.0
     worst_error_mm: float | None = None
-    checked: int = 0
+    compared: int = 0
 
     def add(self, row: dict[str, Any]) -> None:
         self.counts[row["verdict"]] += 1
         self.worst_bound_mm = max(self.worst_bound_mm, row.get("bound_mm") or 0.0)
         error = row.get("displacement_error_mm")
         if error is not None:
-            self.checked += 1
+            self.compared += 1
             self.worst_error_mm = max(self.worst_error_mm or 0.0, error)
 
 
 def run(
     job: Job, facts: dict[str, Any], directory: Path, console: Console, scheduler: str | None = None
 ) -> int:
-    """Solve what is left of a series. `facts` of the solver (version, code) are part of what it is.
+    """Solve the remaining cases of a series. `facts`: of the solver; part of its identity.
 
-    Returns 0, 1 where an answer was found outside the limit or is missing, 3 where none could be judged.
-    Raises InputError where DIRECTORY holds another series; KeyboardInterrupt leaves one that resumes.
+    Returns 0, 1 if an answer is outside the limit or missing, 3 if none could be judged. Raises InputError
+    if DIRECTORY holds another series; after KeyboardInterrupt the same command resumes.
     """
-    with records.held(directory, ()):
-        store.claim(directory, identity(job) | facts, about(job))
+    with records.locked(directory, ()):
+        store.open_series(directory, identity(job) | facts, metadata(job))
         done = store.solved(directory, job.cases)
-        left = np.flatnonzero(~done).tolist()
-        console.print(f"{job.scene.name}: {len(done)} cases, {len(done) - len(left)} already in {directory}")
-        if left:
-            with at_work(job, left, scheduler, console) as results:
-                solve_left(job, len(left), results, directory, console)
+        remaining = np.flatnonzero(~done).tolist()
+        console.print(
+            f"{job.scene.name}: {len(done)} cases, {len(done) - len(remaining)} already in {directory}"
+        )
+        if remaining:
+            with results_of(job, remaining, scheduler, console) as results:
+                solve_remaining(job, len(remaining), results, directory, console)
         tally = Tally(dict.fromkeys(VERDICTS, 0))
         for row in store.rows(directory):
             if row["case"] < job.cases.count:
@@ -70,26 +71,26 @@ def run(
 
 
 @contextmanager
-def at_work(
-    job: Job, left: list[int], scheduler: str | None, console: Console
+def results_of(
+    job: Job, remaining: list[int], scheduler: str | None, console: Console
 ) -> Iterator[Iterator[list[Result]]]:
-    """The results as they come, of this process or of the workers of a scheduler."""
+    """The results as they come, from this process or from the workers of a scheduler."""
     if scheduler is None:
         with console.status("opening the assembly, preparing the solver"):
-            desk = SeriesSession(job)
-        yield desk.solve(left)
+            session = SeriesSession(job)
+        yield session.solve(remaining)
         return
     with workers(scheduler) as (executor, count):
         console.print(f"{count} workers at {scheduler}")
-        yield on_workers(job, left, executor, count, console)
+        yield on_workers(job, remaining, executor, count, console)
 
 
 def on_workers(
-    job: Job, left: list[int], executor: Executor, count: int, console: Console
+    job: Job, remaining: list[int], executor: Executor, count: int, console: Console
 ) -> Iterator[list[Result]]:
     """Blocks of cases, small enough that the workers end together. What fails is left for another run."""
-    size = min(max(len(left) // (4 * count), 1), BLOCK)
-    blocks = [left[start : start + size] for start in range(0, len(left), size)]
+    size = min(max(len(remaining) // (4 * count), 1), BLOCK)
+    blocks = [remaining[start : start + size] for start in range(0, len(remaining), size)]
     tasks = ((block, (replace(job, cases=job.cases.only(block)), block)) for block in blocks)
     for block, outcome in done_as_completed(executor, count, solve_on_worker, tasks):
         if isinstance(outcome, BaseException):
@@ -99,11 +100,11 @@ def on_workers(
             yield outcome
 
 
-def solve_left(
+def solve_remaining(
     job: Job, count: int, results: Iterator[list[Result]], directory: Path, console: Console
 ) -> None:
-    """Write what comes; this process alone does."""
-    m = remember_contacts(job, directory)
+    """Write the results; only this process does."""
+    m = record_contacts(job, directory)
     begun, made = time.monotonic(), 0
     with display(console) as progress:
         task = progress.add_task(job.scene.name, total=count, rate="")
@@ -112,7 +113,7 @@ def solve_left(
             made += len(some)
             rate = f"{made / (time.monotonic() - begun):.3g} cases/s"
             progress.update(task, completed=made, rate=rate)
-            complain(some, console)
+            print_failures(some, console)
     console.print(f"{made} cases in {time.monotonic() - begun:.1f} s")
 
 
@@ -129,8 +130,8 @@ def display(console: Console) -> Progress:
     )
 
 
-def complain(results: list[Result], console: Console) -> None:
-    """A line for each case without an answer or outside the limit."""
+def print_failures(results: list[Result], console: Console) -> None:
+    """Print a line for each case without an answer or outside the limit."""
     for result in results:
         row = result.row
         if row["verdict"] in ("outside", "no_answer"):
@@ -139,7 +140,7 @@ def complain(results: list[Result], console: Console) -> None:
 
 
 def identity(job: Job) -> dict[str, Any]:
-    """What must be the same for rows to stand in one table."""
+    """What must be the same for rows to belong to one series."""
     return {
         "scene_key": job.scene.key,
         "cases_key": job.cases.key,
@@ -152,7 +153,7 @@ def identity(job: Job) -> dict[str, Any]:
     }
 
 
-def about(job: Job) -> dict[str, Any]:
+def metadata(job: Job) -> dict[str, Any]:
     size = job.scene.expected_size
     return {
         "scene": job.scene.name,
@@ -166,7 +167,7 @@ def about(job: Job) -> dict[str, Any]:
     }
 
 
-def remember_contacts(job: Job, directory: Path) -> int:
+def record_contacts(job: Job, directory: Path) -> int:
     """DIRECTORY/contacts.npz: where the contacts and the fasteners are, for the pictures. Returns m."""
     assembly = prepared(job.scene).assembly
     arrays = {"m": np.array(assembly.m)}
@@ -180,12 +181,12 @@ def remember_contacts(job: Job, directory: Path) -> int:
 
 def summary(tally: Tally, asked: int, console: Console) -> int:
     seen = [f"{count} {verdict.replace('_', ' ')}" for verdict, count in tally.counts.items() if count]
-    error = f", largest of {tally.checked} checked {tally.worst_error_mm:.1e} mm" if tally.checked else ""
+    error = f", largest of {tally.compared} checked {tally.worst_error_mm:.1e} mm" if tally.compared else ""
     console.print(f"{', '.join(seen)}; largest proven error bound {tally.worst_bound_mm:.1e} mm{error}")
     missing = asked - sum(tally.counts.values())
     if missing:
         console.print(f"Not solved: {missing}. Run the same command again.", style="red")
-        return FELL_SHORT
+        return FAILED
     if not tally.counts["within"] + tally.counts["outside"]:
         return NOTHING_JUDGED
-    return FELL_SHORT if tally.counts["outside"] + tally.counts["no_answer"] else DONE
+    return FAILED if tally.counts["outside"] + tally.counts["no_answer"] else DONE

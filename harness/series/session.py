@@ -1,4 +1,4 @@
-"""Where load cases are solved: the assembly open, the solver prepared, the last answers for warm starts."""
+"""A series in one process: the assembly open, the solver prepared, answers kept for warm starts."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from harness.measurement.solver_session import SolverSession
 from harness.results.provenance import provenance
 from harness.results.records import Row
+from harness.verification.batched.assess import Assessment, assess
 from harness.verification.batched.bound import Bound
-from harness.verification.batched.vouch import Vouched, vouch
 from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
 from problems.build import prepared
@@ -33,13 +33,13 @@ from solvers.registry import make_solver
 Gaps = NDArray[np.float32]
 
 BLOCK = 64  # cases that share a pass over K and Q
-AT_ONCE_S = 5.0  # a block is closed after so long, so that slow cases are not lost with it
-STARTS = 32  # answers kept for warm starts: memory does not grow with the number of cases
+BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases are lost
+KEPT_ANSWERS = 32  # for warm starts: memory does not grow with the number of cases
 
 
 @dataclass(frozen=True)
 class Job:
-    """What a series solves, and how. check : every so many cases are compared with the reference; 0: none."""
+    """What a series solves, and how. check : every check-th case is compared with the reference; 0: none."""
 
     scene: Scene
     cases: LoadCases
@@ -56,14 +56,14 @@ class Job:
 
 @dataclass(frozen=True)
 class Result:
-    """The row of a case and the gap that is left, (m,) mm; None where there is no answer."""
+    """The row of a case and its final gap, (m,) mm; None if there is no answer."""
 
     row: Row
     gap: Gaps | None
 
 
 @dataclass(frozen=True)
-class _Tried:
+class _Attempt:
     case: int
     load: LoadCase
     row: Row
@@ -71,7 +71,7 @@ class _Tried:
 
 
 class SeriesSession:
-    """A job being done in this process."""
+    """A job in this process."""
 
     def __init__(self, job: Job) -> None:
         threadpoolctl.threadpool_limits(job.threads)
@@ -82,7 +82,7 @@ class SeriesSession:
         self.problem = in_form(self.data, job.form)
         solver = make_solver(job.solver, job.options, job.plugin)
         self.row: Row = {}  # of the case being solved
-        self.session = SolverSession(solver, self.problem, job.tolerance, self._lap, STARTS)
+        self.session = SolverSession(solver, self.problem, job.tolerance, self._lap, KEPT_ANSWERS)
         self.session.open(batched=True)
 
     @contextmanager
@@ -92,24 +92,24 @@ class SeriesSession:
         self.row[name] = time.perf_counter() - start
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
-        """The cases, some at a time, each list as soon as it is done."""
+        """The results of the cases with these numbers, a block at a time."""
         for start in range(0, len(numbers), BLOCK):
-            some = numbers[start : start + BLOCK]
-            loads = list(zip(some, self.problem.loads([self.job.cases.load(k) for k in some]), strict=True))
+            block = numbers[start : start + BLOCK]
+            loads = list(zip(block, self.problem.loads([self.job.cases.load(k) for k in block]), strict=True))
             if self.session.batch is not None:
-                yield self._finished(self._try_batch(loads))
+                yield self._results(self._try_batch(loads))
                 continue
-            begun, tried = time.monotonic(), []
+            started, attempts = time.monotonic(), []
             for case, load in loads:
-                tried.append(self._try(case, load))
-                if time.monotonic() - begun > AT_ONCE_S:
-                    yield self._finished(tried)
-                    begun, tried = time.monotonic(), []
-            if tried:
-                yield self._finished(tried)
+                attempts.append(self._try(case, load))
+                if time.monotonic() - started > BLOCK_TIME_S:
+                    yield self._results(attempts)
+                    started, attempts = time.monotonic(), []
+            if attempts:
+                yield self._results(attempts)
 
-    def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[_Tried]:
-        """Solve them all at once; where that raises, one after another, so that it is known which does."""
+    def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[_Attempt]:
+        """Solve them all at once; if that raises, one after another, to find out which one does."""
         start = time.perf_counter()
         try:
             answers = self.session.solve_batch([load for _, load in loads])
@@ -117,16 +117,16 @@ class SeriesSession:
             return [self._try(case, load) for case, load in loads]
         share = (time.perf_counter() - start) / len(loads)
         return [
-            _Tried(case, load, self._begun(case) | {"solve_s": share}, answer)
+            _Attempt(case, load, self._new_row(case) | {"solve_s": share}, answer)
             for (case, load), answer in zip(loads, answers, strict=True)
         ]
 
-    def _begun(self, case: int) -> Row:
+    def _new_row(self, case: int) -> Row:
         return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
 
-    def _try(self, case: int, load: LoadCase) -> _Tried:
-        """Solve one; what the solver raises becomes its status."""
-        self.row = self._begun(case)
+    def _try(self, case: int, load: LoadCase) -> _Attempt:
+        """Solve one; if the solver raises, its status is `failed`."""
+        self.row = self._new_row(case)
         near = self.session.nearest(load)
         if near is not None:
             self.row["warm_from"] = near.case
@@ -135,79 +135,84 @@ class SeriesSession:
         except Exception as error:
             self.session.forget()
             answer = failed(f"{type(error).__name__}: {error}"[:500])
-        return _Tried(case, load, self.row, answer)
+        return _Attempt(case, load, self.row, answer)
 
-    def _finished(self, tried: list[_Tried]) -> list[Result]:
-        """Rows, with what is known of the answers."""
+    def _results(self, attempts: list[_Attempt]) -> list[Result]:
+        """The rows and gaps, with a proven error bound for each answer."""
         start = time.perf_counter()
-        known = self._vouched(tried)
+        known = self._assessed(attempts)
         if self.session.batch is not None:
-            self._try_again(tried, known)
-        share = (time.perf_counter() - start) / len(tried)
-        return [self._result(each, known.get(each.case), share) for each in tried]
+            self._retry(attempts, known)
+        share = (time.perf_counter() - start) / len(attempts)
+        return [self._result(each, known.get(each.case), share) for each in attempts]
 
-    def _try_again(self, tried: list[_Tried], known: dict[int, Vouched]) -> None:
-        """What is not proven to be within the limit, with the p for which Qλ − p is the gap that was found.
+    def _retry(self, attempts: list[_Attempt], known: dict[int, Assessment]) -> None:
+        """Solve again what is not proven to be within the limit, with p := Qλ − y for the gap y found.
 
-        So the answers lose what Q and p have lost in rounding. The better of the two stays.
+        This removes the rounding errors of Q and p. The better of the two answers is kept.
         """
-        places = {each.case: k for k, each in enumerate(tried)}
-        far = [tried[places[case]] for case, about in known.items() if about.bound_mm > self.job.limit_mm]
-        if not far:
+        index = {each.case: k for k, each in enumerate(attempts)}
+        limit_mm = self.job.limit_mm
+        unproven = [each for each in attempts if each.case in known and known[each.case].bound_mm > limit_mm]
+        if not unproven:
             return
-        lams = np.column_stack([each.answer.lam for each in far if each.answer.lam is not None])
-        p = self.data.Q @ lams - np.column_stack([known[each.case].gap for each in far])
-        loads = [(each.case, replace(each.load, p=column)) for each, column in zip(far, p.T, strict=True)]
-        new = self._try_batch(loads)
-        for case, about in self._vouched(new).items():
-            if about.bound_mm < known[case].bound_mm:
-                known[case] = about
-                old, better = tried[places[case]], next(each for each in new if each.case == case)
+        lams = np.column_stack([each.answer.lam for each in unproven if each.answer.lam is not None])
+        p = self.data.Q @ lams - np.column_stack([known[each.case].gap for each in unproven])
+        pairs = zip(unproven, p.T, strict=True)
+        new = self._try_batch([(each.case, replace(each.load, p=column)) for each, column in pairs])
+        improved = self._assessed(new)
+        for old, better in zip(unproven, new, strict=True):
+            case = old.case
+            if case in improved and improved[case].bound_mm < known[case].bound_mm:
+                known[case] = improved[case]
                 count = (old.answer.iterations or 0) + (better.answer.iterations or 0)
-                tried[places[case]] = replace(old, answer=replace(better.answer, iterations=count))
+                attempts[index[case]] = replace(old, answer=replace(better.answer, iterations=count))
 
-    def _vouched(self, tried: list[_Tried]) -> dict[int, Vouched]:
+    def _assessed(self, attempts: list[_Attempt]) -> dict[int, Assessment]:
         needs = self.problem.needs
-        answered = [each for each in tried if all(getattr(each.answer, v) is not None for v in needs)]
+        answered = [each for each in attempts if all(getattr(each.answer, v) is not None for v in needs)]
         if not answered:
             return {}
         lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
         own = [each.answer.x if "x" in needs else None for each in answered]
-        found = vouch(self.bound, [each.load for each in answered], lams, own)
-        return {each.case: about for each, about in zip(answered, found, strict=True)}
+        found = assess(self.bound, [each.load for each in answered], lams, own)
+        return {each.case: assessment for each, assessment in zip(answered, found, strict=True)}
 
-    def _result(self, tried: _Tried, about: Vouched | None, vouch_s: float) -> Result:
-        answer, job = tried.answer, self.job
-        row = tried.row | {
+    def _result(self, attempt: _Attempt, assessment: Assessment | None, assess_s: float) -> Result:
+        answer, job = attempt.answer, self.job
+        row = attempt.row | {
             "status": answer.status,
             "message": answer.details.get("cause"),
             "iterations": answer.iterations,
             "inner_iterations": answer.inner_iterations,
-            "form_s": vouch_s,
+            "form_s": assess_s,
             "verdict": "no_answer",
             "limit_mm": job.limit_mm,
             **self.code,
         }
-        if about is None:
+        if assessment is None:
             return Result(row, None)
         row |= {
-            "active": about.active,
-            "bound_mm": about.bound_mm,
-            **{name: getattr(about, name) for name in ("primal_residual", "dual_residual", "duality_gap")},
-            "min_gap_mm": float(about.gap.min()),
-            "mean_gap_mm": float(about.gap.mean()),
-            "max_gap_mm": float(about.gap.max()),
-            "verdict": "within" if about.bound_mm <= job.limit_mm else "cannot_be_judged",
+            "active": assessment.active,
+            "bound_mm": assessment.bound_mm,
+            **{
+                name: getattr(assessment, name)
+                for name in ("primal_residual", "dual_residual", "duality_gap")
+            },
+            "min_gap_mm": float(assessment.gap.min()),
+            "mean_gap_mm": float(assessment.gap.mean()),
+            "max_gap_mm": float(assessment.gap.max()),
+            "verdict": "within" if assessment.bound_mm <= job.limit_mm else "cannot_be_judged",
         }
-        if job.check and tried.case % job.check == 0:
-            row |= self._compared(tried, about.x)
-        return Result(row, about.gap.astype(np.float32))
+        if job.check and attempt.case % job.check == 0:
+            row |= self._against_reference(attempt, assessment.x)
+        return Result(row, assessment.gap.astype(np.float32))
 
-    def _compared(self, tried: _Tried, x: Vector) -> Row:
-        """The distance to the certified reference, which outweighs the bound."""
-        known = refined_active_set(self.data, tried.load)
-        lam = np.asarray(tried.answer.lam, dtype=float)
-        judged = judge(self.data, tried.load, known, x, lam, self.job.limit_mm)
+    def _against_reference(self, attempt: _Attempt, x: Vector) -> Row:
+        """The distance to the certified reference, which replaces the bound in the verdict."""
+        known = refined_active_set(self.data, attempt.load)
+        lam = np.asarray(attempt.answer.lam, dtype=float)
+        judged = judge(self.data, attempt.load, known, x, lam, self.job.limit_mm)
         names = ("displacement_error_mm", "reference_bound_mm", "contact_mismatch")
         found: Row = {name: getattr(judged, name) for name in names}
         return found if judged.verdict == "cannot_be_judged" else found | {"verdict": judged.verdict}

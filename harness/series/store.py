@@ -1,9 +1,9 @@
-"""The files of a series: rows and gaps that survive whatever ends it, and what the series is.
+"""The files of a series: rows and gaps that survive an abrupt end, and the identity of the series.
 
-cases.jsonl   a row a case, in the order in which they were done
-gaps.f4       the gaps that are left, float32, case k at the bytes 4km … 4(k + 1)m: rounded by at most
-              6e-8 of their size. A case's gaps are written and synced before its row.
-series.json   what makes the series: the same command goes on with it, another one is refused.
+cases.jsonl   one row per case, in the order of completion
+gaps.f4       the final gaps, float32 (relative rounding error at most 6e-8), case k at the bytes
+              4km … 4(k + 1)m. A case's gaps are written and synced before its row.
+series.json   the identity of the series: the same command resumes it, another one is refused.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from .session import Result
 
 CASES, GAPS, SERIES = "cases.jsonl", "gaps.f4", "series.json"
 CHUNK = 2**20  # bytes
-FAULTS = 10  # named at once
+MAX_FAULTS = 10  # named at once
 BYTES = np.dtype(np.float32).itemsize
 
 
-def claim(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> None:
-    """Write series.json. Raises InputError where DIRECTORY holds another series, naming each difference."""
+def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> None:
+    """Write series.json. Raises InputError if DIRECTORY holds another series, naming each difference."""
     path = directory / SERIES
     if path.is_file():
         before = json.loads(path.read_text("utf-8"))["identity"]
@@ -48,12 +48,12 @@ def claim(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> N
 def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
     """(count,) which cases have a row. A torn last line is cut off.
 
-    Raises InputError where a row is of a case with other parameters, as in a table that has changed.
+    Raises InputError if a row has other parameters than its case now, as after a change of a table.
     """
     done, faults = np.zeros(cases.count, dtype=bool), []
     path = directory / CASES
     if path.exists():
-        _mend(path)
+        _cut_torn_line(path)
         for row in rows(directory):
             if row["case"] >= cases.count:
                 continue
@@ -63,12 +63,12 @@ def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
                     allowed = f"is now {value!r}: name another directory with --out"
                     faults.append(Fault(str(path), f"case {row['case']}, {key}", row[key], allowed))
     if faults:
-        raise InputError(faults[:FAULTS])
+        raise InputError(faults[:MAX_FAULTS])
     return done
 
 
 def rows(directory: Path) -> Iterator[dict[str, Any]]:
-    """The rows one by one; no file is no rows. Raises InputError at a line that is none."""
+    """The rows one by one; none if there is no file. Raises InputError at a line that is not JSON."""
     path = directory / CASES
     if not path.exists():
         return
@@ -96,8 +96,8 @@ def append(directory: Path, results: Sequence[Result], m: int) -> None:
     records.append(directory / CASES, *(result.row for result in results))
 
 
-def _mend(path: Path) -> None:
-    """Cut off what follows the last newline: a case whose row is torn is solved again."""
+def _cut_torn_line(path: Path) -> None:
+    """Cut off what follows the last newline: the case of a torn row is solved again."""
     size = path.stat().st_size
     with path.open("rb") as file:
         end = size

@@ -1,6 +1,6 @@
 """The exit codes of the commands, as README and help texts state them.
 
-FELL_SHORT: the command ran, but accuracy was lost, a solver has faults, or measurements are missing.
+FAILED: the command ran, but accuracy was lost, a solver has faults, or measurements are missing.
 """
 
-DONE, FELL_SHORT, WRONG_USAGE, NOTHING_JUDGED, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, FAILED, WRONG_USAGE, NOTHING_JUDGED, INTERRUPTED = 0, 1, 2, 3, 130

@@ -1,1 +1,1 @@
-"""The referee: references with proven error bounds, verdicts, the accuracy gate."""
+"""References with proven error bounds, verdicts, the accuracy gate."""

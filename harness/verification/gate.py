@@ -1,7 +1,7 @@
-"""The accuracy gate: judges the saved answers anew, and says so by an exit code.
+"""The accuracy gate: judges the saved answers anew; its exit code says whether all are accurate enough.
 
-The figures in the rows are not looked at. A row only says which answer belongs to which scene; the
-problem's data and the reference are made from the scene.
+The figures in the rows are not used. A row only says which answer belongs to which scene; the problem's
+data and the reference are made from the scene.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from harness.planning.plan import expand
 from harness.planning.suite import validated
 from harness.results import records
 from harness.results.records import Row
-from harness.terminal.exit_codes import DONE, FELL_SHORT, NOTHING_JUDGED
+from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
 from problems.errors import Fault, InputError
 from problems.scene import read_toml
 
-from .ground_truth import Ground, ground
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
+from .reference_problem import ReferenceProblem, reference_problem
 
 #: What the gate reads of a row: which answer belongs to which scene.
 NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", "limit_mm")
@@ -31,7 +31,7 @@ NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", 
 
 @dataclass(frozen=True)
 class Finding:
-    """One gated measurement, judged anew; row is None where it was never made."""
+    """One gated measurement, judged anew. why : it is not within the limit."""
 
     key: str
     judgement: Judgement
@@ -42,14 +42,14 @@ class Finding:
 def gate(directory: Path, console: Console) -> int:
     """Judge every gated row of DIRECTORY.
 
-    Returns 0 where all that the suite gates is within 1e-7 mm (on a rung of a ladder, what conditioning
-    allows), 1 where it is not (a row outside, without an answer, missing, or not to be judged), 3 where no
-    answer at all could be judged. Raises InputError.
+    Returns 0 if all gated rows are within 1e-7 mm (on a rung of a ladder, what conditioning allows), 1 if
+    not (a row is outside, has no answer, is missing or cannot be judged), 3 if no answer at all could be
+    judged. Raises InputError.
     """
     if not directory.is_dir():
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
     rows = gated_rows(directory / records.MEASUREMENTS)
-    findings = [*judged(rows, directory), *never_made(rows, directory)]
+    findings = [*judged(rows, directory), *never_measured(rows, directory)]
     console.print(table(findings))
     verdicts = [finding.judgement.verdict for finding in findings]
     fine = verdicts.count("within")
@@ -58,7 +58,7 @@ def gate(directory: Path, console: Console) -> int:
         return NOTHING_JUDGED
     if fine < len(findings):
         console.print(f"Accuracy lost: {len(findings) - fine} of {len(findings)} gated rows.", style="red")
-        return FELL_SHORT
+        return FAILED
     wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
     console.print(f"Passed: all {fine} gated rows are within {limits}.", style="green")
@@ -66,7 +66,7 @@ def gate(directory: Path, console: Console) -> int:
 
 
 def gated_rows(path: Path) -> dict[str, Row]:
-    """The gated rows by their keys. Raises InputError where one does not say what it belongs to."""
+    """The gated rows by their keys. Raises InputError if a row lacks a field that is needed."""
     rows = records.read(path)
     faults = [
         Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
@@ -80,25 +80,25 @@ def gated_rows(path: Path) -> dict[str, Row]:
 
 
 def judged(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
-    """The rows' answers, judged; scene by scene, so that each is opened once."""
-    base: Ground | None = None
+    """The rows' answers, judged scene by scene, so that each scene is opened once."""
+    problem: ReferenceProblem | None = None
     source = None
     for row in sorted(rows.values(), key=lambda row: str(row["source"])):
-        if base is None or row["source"] != source:
-            base, source = ground(row["source"]), row["source"]
-        yield judged_row(row, base.of_case(row.get("series"), row.get("case")), directory)
+        if problem is None or row["source"] != source:
+            problem, source = reference_problem(row["source"]), row["source"]
+        yield judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
 
 
-def judged_row(row: Row, base: Ground, directory: Path) -> Finding:
-    limit = base.limit_mm(min(row["limit_mm"], LIMIT_MM))
-    bound = base.reference.bound_mm
+def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
+    limit = problem.limit_mm(min(row["limit_mm"], LIMIT_MM))
+    bound = problem.reference.bound_mm
     if not row["answer"]:
         why = f"{row['status']}: {row['message'] or 'no answer'}".splitlines()[0]
         return Finding(row["key"], Judgement("no_answer", bound), limit, why)
-    if row["scene_key"] != base.scene.key:
+    if row["scene_key"] != problem.scene.key:
         why = "the scene has changed since it was measured: run again"
         return Finding(row["key"], Judgement("cannot_be_judged", bound), limit, why)
-    judgement = base.judge_file(directory / row["answer"], limit)
+    judgement = problem.judge_file(directory / row["answer"], limit)
     match judgement.verdict:
         case "no_answer":
             why = f"{row['answer']} is missing, damaged or not finite"
@@ -111,8 +111,8 @@ def judged_row(row: Row, base: Ground, directory: Path) -> Finding:
     return Finding(row["key"], judgement, limit, why)
 
 
-def never_made(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
-    """What the suite that was run gates, and no row is there for."""
+def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
+    """The gated measurements of the suite that was run without a row."""
     path = directory / "suite.toml"
     if path.is_file():
         for measurement in expand(validated(read_toml(path), path)):

@@ -1,6 +1,6 @@
 """Judges an answer from the problem's own data and the reference.
 
-With x, λ the answer, x* the reference and y = g − Aᵀx the gaps that are left:
+With x, λ the answer, x* the reference and y = g − Aᵀx the final gaps:
 
     displacement_error_mm = max|x − x*|
     backward_error        = max(‖Kx − f + Aλ‖ / F, max|min(λ‖A‖ / F, y / G)|)     max-norms
@@ -10,11 +10,11 @@ With x, λ the answer, x* the reference and y = g − Aᵀx the gaps that are le
     duality_gap           = |xᵀKx − fᵀx + gᵀλ|                            N·mm
     contact_mismatch      = closed in x* and y > limit, or open in x* and y ≤ limit
 
-The backward error is what is left of the optimality conditions (equilibrium; λ ≥ 0, y ≥ 0, λᵀy = 0) as a
-share of the terms in them, F = ‖K‖‖x‖ + ‖f‖ + ‖A‖‖λ‖ and G = ‖Aᵀ‖‖x‖ + ‖g‖: a stable algorithm reaches
-some 2⁻⁵³, however ill-conditioned K is. The duality gap is the primal objective ½xᵀKx − fᵀx minus the
-dual one −½xᵀKx − gᵀλ. A contact counts as open in x* when its gap there is above 2·limit: closer than
-that, an answer within the limit may have it either way.
+The backward error is the residual of the optimality conditions (equilibrium; λ ≥ 0, y ≥ 0, λᵀy = 0) relative
+to their terms, F = ‖K‖‖x‖ + ‖f‖ + ‖A‖‖λ‖ and G = ‖Aᵀ‖‖x‖ + ‖g‖: a stable algorithm reaches about 2⁻⁵³,
+however ill-conditioned K is. The duality gap is the primal objective ½xᵀKx − fᵀx minus the
+dual one −½xᵀKx − gᵀλ. A contact counts as open in x* if its gap there is above 2·limit: with a smaller
+gap, it may be open or closed in an answer within the limit.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from problems.forms.prepared import Prepared
 
 from .reference import Reference
 
-#: The accuracy asked for, max-norm of the displacement difference, mm.
+#: The required accuracy: max-norm of the displacement error, mm.
 LIMIT_MM = 1e-7
 
-#: A reference may use up to this share of the limit for its own error.
+#: The reference's error bound may be at most this share of the limit.
 REFERENCE_SHARE = 0.1
 
 
@@ -52,16 +52,16 @@ class Judgement:
 
 
 def conditioned_limit(limit_mm: float, cond_K: float, largest_mm: float) -> float:
-    """max(limit, 100 cond(K) 2⁻⁵³ max|x*|): what can be asked of a solver that works in float64."""
+    """max(limit, 100 cond(K) 2⁻⁵³ max|x*|): the accuracy that a solver in float64 can reach."""
     return max(limit_mm, 100 * cond_K * 2.0**-53 * largest_mm)
 
 
 def judge(
     prepared: Prepared, load: LoadCase, reference: Reference, x: Vector, lam: Vector, limit_mm: float
 ) -> Judgement:
-    """Judge x (n,) in mm and lam (m,) in N; lam all NaN where the solver gives no forces.
+    """Judge x (n,) in mm and lam (m,) in N; lam all NaN if the solver gives no forces.
 
-    The verdict is `within` when max|x − x*| ≤ limit_mm, and `cannot_be_judged` when the error bound
+    The verdict is `within` if max|x − x*| ≤ limit_mm, and `cannot_be_judged` if the error bound
     of x* is above a tenth of the limit.
     """
     A = prepared.assembly.A
@@ -70,8 +70,8 @@ def judge(
     error = float(np.max(np.abs(x - reference.x) * reference.unit_mm))
     y = load.g - A.T @ x
     gap, reference_gap = y * reference.gap_unit_mm, (load.g - A.T @ reference.x) * reference.gap_unit_mm
-    kept_open = reference.active & (gap > limit_mm)
-    kept_closed = ~reference.active & (reference_gap > 2 * limit_mm) & (gap <= limit_mm)
+    wrongly_open = reference.active & (gap > limit_mm)
+    wrongly_closed = ~reference.active & (reference_gap > 2 * limit_mm) & (gap <= limit_mm)
     dual_residual = duality_gap = backward_error = None
     if lam.shape == (A.shape[1],) and np.isfinite(lam).all():
         Kx = prepared.assembly.multiply_K(x)
@@ -87,7 +87,7 @@ def judge(
         verdict=verdict,
         reference_bound_mm=reference.bound_mm,
         displacement_error_mm=error,
-        contact_mismatch=int(np.sum(kept_open | kept_closed)),
+        contact_mismatch=int(np.sum(wrongly_open | wrongly_closed)),
         min_gap_mm=float(np.min(gap, initial=np.inf)),
         primal_residual=float(np.max(-gap, initial=0.0)),
         dual_residual=dual_residual,

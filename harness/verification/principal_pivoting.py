@@ -51,7 +51,7 @@ def contact_set(
 def _first_set(Q: AnyQ, p: Vector, stop: Stop) -> NDArray[np.bool_]:
     """The contacts closed if every other one is left out, and those that then overlap; p > 0 if m is small.
 
-    The forces on the half start from its own half: small factors replace most of the large ones.
+    The half is solved in the same way, from its own half: small factors replace most of the large ones.
     """
     if len(p) <= SMALL_PROBLEM or not (p > 0).any():
         return p > 0

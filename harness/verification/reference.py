@@ -1,4 +1,4 @@
-"""The answer that every other is measured against: an active-set solution, refined, with a proven bound.
+"""The reference that answers are compared with: an active-set solution, refined, with a proven bound.
 
 For the contact set C found by block principal pivoting, the optimality conditions are linear,
 
@@ -36,14 +36,14 @@ from .principal_pivoting import contact_set
 
 MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
-ENOUGH = 1e-20  # a correction so small, relative to x, was the last
+ENOUGH = 1e-20  # relative to x: a smaller correction is the last
 
 
 @dataclass(frozen=True)
 class Reference:
     """x (n,) in mm, λ (m,) in N, the closed contacts, and a bound on max|x − x*| in mm.
 
-    unit_mm, gap_unit_mm : the lengths that 1 stands for in x and in the gaps, where those are not in mm.
+    unit_mm, gap_unit_mm : the length of one unit of x and of the gaps, mm.
     """
 
     x: Vector
@@ -56,7 +56,7 @@ class Reference:
 
 
 def reference_of(scene: Scene, prepared: Prepared, load: LoadCase) -> Reference:
-    """The reference of a scene: the answer that it was made from, else the refined one."""
+    """The reference of a scene: the answer that it was made from, if any, else the refined one."""
     if isinstance(scene, MadeScene):
         made = scene.made
         if made.x is None or made.lam is None:
@@ -103,12 +103,12 @@ def _dense(K: Any) -> Matrix:
 
 
 def _code() -> str:
-    """The referee's own code: references of other code are computed anew."""
+    """The fingerprint of the code for references: those of other code are computed anew."""
     return fingerprint([Path(__file__)], within=["harness/verification"])
 
 
 def refined_active_set(prepared: Prepared, load: LoadCase) -> Reference:
-    """Active set, refinement, certificate."""
+    """The active set, refined and certified."""
     p = prepared.dual_load(load)
     meets = bool((p > 0).any())  # else Q is not needed
     active = contact_set(prepared.compliance, p) if meets else np.zeros(len(p), dtype=bool)

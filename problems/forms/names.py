@@ -12,6 +12,6 @@ Form = Literal["primal", "dual"]
 FORMS: tuple[Form, ...] = get_args(Form)
 
 
-def usual(forms: Sequence[Form]) -> Form:
-    """Of the forms that a solver takes, the one it is run in unless another is asked for: the dual."""
+def default_form(forms: Sequence[Form]) -> Form:
+    """The form that a solver is run in unless another is asked for: the dual, if it takes that."""
     return "dual" if "dual" in forms else forms[0]

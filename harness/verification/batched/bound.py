@@ -1,18 +1,18 @@
-"""A proven bound on the displacement error of a block of answers, in float64 but for one cut in `residual`.
+"""A proven bound on the displacement errors of a block of answers, in float64 but for `residual`'s split.
 
 x and λ ≥ 0 with C = {λ > 0} are the exact answer of another problem, f̃ = f − r and g̃ = g + δ, where
 
     r = f − Kx − Aλ,    s = g − Aᵀx,    δ_i = −s_i for i in C,    δ_i = max(−s_i, 0) else.
 
-The answer is P(K⁻¹f), P the projection on {Aᵀx ≤ g} in the norm of K. It moves by at most ‖r‖_{K⁻¹} from f
-to f̃. From g to g̃ the set is translated by any d with Aᵀd = δ, and P then moves by at most ‖d‖_K, because
-I − P does not expand. For any z such a d is z + A(AᵀA)⁻¹(δ − Aᵀz), and z ≈ K⁻¹AQ⁻¹δ the shortest, so that,
+The answer is P(K⁻¹f), P the projection onto {Aᵀx ≤ g} in the norm of K. From f to f̃ it moves by at most
+‖r‖_{K⁻¹}. From g to g̃ the set is translated by any d with Aᵀd = δ, and P then moves by at most ‖d‖_K, because
+I − P is nonexpansive. For any z such a d is z + A(AᵀA)⁻¹(δ − Aᵀz), the shortest for z = K⁻¹AQ⁻¹δ, so that,
 with κ ≤ λmin(K), σ² ≤ λmin(AᵀA), λmax(K) ≤ ‖K‖_∞ and the largest compliance D ≥ max (K⁻¹)_ii,
 
     max|x − x*| ≤ √D ‖x − x*‖_K ≤ √D ( ‖r‖₂/√κ + ‖z‖_K + ‖δ − Aᵀz‖₂ √(‖K‖_∞/σ²) ).
 
-So the bound grows with the residual itself, where that of `certificate` grows with its square root, and
-plain float64 for λ and s will do. Weakly active contacts are as good as others.
+So the bound is proportional to the residual, where that of `certificate` is to its square root, and plain
+float64 suffices for λ and s. Weakly active contacts need no special treatment.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Bound:
 
     @classmethod
     def of(cls, prepared: Prepared) -> Bound:
-        """Once an assembly; κ comes from the cache where it stands there."""
+        """Computed once per assembly; κ comes from the cache if it is there."""
         stiffest = SAFE * max(float(abs(K).sum(axis=0).max()) for K in prepared.assembly.blocks)
         sigma2, kappa = independence(prepared.assembly), proven_lambda_min(prepared)
         D = largest_compliance(prepared, kappa)
@@ -60,12 +60,12 @@ class Bound:
         force = np.linalg.norm(abs(r) + error, axis=0)
         closed = lam > 0
         delta = np.where(closed, -s, np.maximum(-s, 0.0))
-        doubt = np.where(closed | (s < s_error), s_error, 0.0)
-        distance = self._translation(delta, np.linalg.norm(doubt, axis=0))
+        uncertainty = np.where(closed | (s < s_error), s_error, 0.0)
+        distance = self._translation(delta, np.linalg.norm(uncertainty, axis=0))
         return SAFE * np.sqrt(self.compliance) * (force / np.sqrt(self.kappa) + distance)
 
-    def _translation(self, delta: Matrix, doubt: Vector) -> Vector:
-        """(k,) ‖d‖_K of a d with Aᵀd = δ (m, k), itself in doubt by that much in its 2-norm."""
+    def _translation(self, delta: Matrix, uncertainty: Vector) -> Vector:
+        """(k,) ‖d‖_K of a d with Aᵀd = δ (m, k), δ uncertain by that much in its 2-norm."""
         assembly = self.prepared.assembly
         A, n = assembly.A, assembly.n
         z = self.prepared.solve_K(A @ sla.cho_solve((self.factor, False), delta, check_finite=False))
@@ -77,8 +77,8 @@ class Bound:
         )
         left = delta - A.T @ z
         depth = int(np.diff(A.indptr).max(initial=0)) + 2
-        lost = np.linalg.norm(gamma(depth) * (abs(delta) + abs(A).T @ abs(z)), axis=0)
-        return np.sqrt(energy) + (np.linalg.norm(left, axis=0) + lost + doubt) * np.sqrt(
+        rounding = np.linalg.norm(gamma(depth) * (abs(delta) + abs(A).T @ abs(z)), axis=0)
+        return np.sqrt(energy) + (np.linalg.norm(left, axis=0) + rounding + uncertainty) * np.sqrt(
             self.stiffest / self.sigma2
         )
 
@@ -93,7 +93,7 @@ def gaps(assembly: Assembly, g: Matrix, x: Split) -> tuple[Matrix, Matrix]:
 
 
 def independence(assembly: Assembly) -> float:
-    """A proven σ² ≤ λmin(AᵀA); 0 where none was found. AᵀA falls apart into the contacts of a node each."""
+    """A proven σ² ≤ λmin(AᵀA); 0 if none was found. AᵀA is block diagonal, a block per node."""
     G = sp.csr_array(assembly.A.T @ assembly.A)
     count, label = connected_components(G, directed=False)
     sizes = np.bincount(label, minlength=count)
@@ -103,6 +103,6 @@ def independence(assembly: Assembly) -> float:
         if len(group) > 1:
             block = np.asfortranarray(G[group][:, group].toarray())
             least = min(least, smallest_eigenvalue(block, float(np.linalg.eigvalsh(block)[0])))
-    # The entries of AᵀA are rounded themselves.
-    doubt = SAFE * gamma(assembly.n) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
-    return max(least - doubt, 0.0)
+    # The entries of AᵀA are themselves rounded.
+    uncertainty = SAFE * gamma(assembly.n) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
+    return max(least - uncertainty, 0.0)

@@ -1,4 +1,4 @@
-"""A proven upper bound on max (K⁻¹)_ii: how far a force of 1 N moves its own node at most, mm/N.
+"""A proven upper bound on max (K⁻¹)_ii: the largest displacement of a node under 1 N on it, mm/N.
 
 It turns a bound on ‖e‖_K into one on each entry, |e_i| ≤ √(K⁻¹)_ii ‖e‖_K, and is far below 1/λmin(K).
 
@@ -23,7 +23,7 @@ from .residual import SAFE
 
 
 def largest_compliance(prepared: Prepared, kappa: float) -> float:
-    """max (K⁻¹)_ii in mm/N; infinite where it cannot be proven."""
+    """max (K⁻¹)_ii in mm/N; infinite if no bound can be proven."""
     pairs = zip(prepared.assembly.blocks, prepared.factors, strict=True)
     return max(_of_block(K, U, kappa) for K, U in pairs)
 

@@ -1,8 +1,9 @@
-"""r = f − Kx − Aλ of a block of load cases, a column each, with one pass over K and a bound on its error.
+"""r = f − Kx − Aλ of a block of load cases, one column each, by one pass over K, with an error bound.
 
-K and x are cut in two, K = K₁ + K₂ and x = x₁ + x₂ with so few bits in K₁ and x₁ that BLAS multiplies them
-exactly (see `exact_residual`). K₂ and x₂ are 2⁻ᵇ times smaller, b ≈ 20, and so is what the products with
-them lose, in whatever order: |fl(K₂x₁) − K₂x₁| ≤ γ_n |K₂||x₁| ≤ γ_n (Σ_j |K₂|_ij) max|x₁|, and Kx₂ likewise.
+K and x are split in two, K = K₁ + K₂ and x = x₁ + x₂ with so few bits in K₁ and x₁ that BLAS multiplies them
+exactly (see `exact_residual`). K₂ and x₂ are 2⁻ᵇ times smaller, b ≈ 20, and so are the rounding errors of
+their products, in any order of summation: |fl(K₂x₁) − K₂x₁| ≤ γ_n |K₂||x₁| ≤ γ_n (Σ_j |K₂|_ij) max|x₁|;
+likewise for Kx₂.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def bits(n: int) -> int:
 
 
 def split(assembly: Assembly, x: Matrix) -> Split:
-    """x (n, k) cut, block by block of K."""
+    """x (n, k) split, block by block of K."""
     head = np.empty_like(x)
     for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
         head[rows] = cut(x[rows], exponent(abs(x[rows]).max(axis=0)), bits(len(K)))[0]
@@ -65,19 +66,19 @@ def refined(
 ) -> tuple[Split, Matrix, Matrix]:
     """x + d, and its residual r − Kd with a bound on its error. stiffest ≥ ‖K‖_∞, N/mm.
 
-    d is small, so that a plain product with it will do: |fl(Kd) − Kd| ≤ γ_n ‖K‖_∞ max|d|.
+    d is small, so a plain product suffices: |fl(Kd) − Kd| ≤ γ_n ‖K‖_∞ max|d|.
     """
-    there, n = x.plus(d), assembly.n
+    moved, n = x.plus(d), assembly.n
     Kd = assembly.multiply_K(d)
-    moved = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(there.tail).max(axis=0)
-    return there, r - Kd, SAFE * (error + stiffest * moved + gamma(1) * (abs(r) + abs(Kd)))
+    error_of_d = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(moved.tail).max(axis=0)
+    return moved, r - Kd, SAFE * (error + stiffest * error_of_d + gamma(1) * (abs(r) + abs(Kd)))
 
 
 def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matrix]:
-    """K₁x₁, K₂x₁ and Kx₂, and what they are in doubt by together."""
+    """K₁x₁, K₂x₁ and Kx₂, and a bound on the sum of their errors."""
     n, b = len(K), bits(len(K))
     products = [np.empty_like(head) for _ in range(3)]
-    lost = np.empty_like(head)
+    rounding = np.empty_like(head)
     head_size, tail_size = abs(head).max(axis=0), abs(tail).max(axis=0)
     for start in range(0, n, ROWS_AT_A_TIME):
         chunk = slice(start, min(start + ROWS_AT_A_TIME, n))
@@ -87,5 +88,5 @@ def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matr
         for product, left, right in zip(products, (K1, K2, whole), (head, head, tail), strict=True):
             product[chunk] = left @ right
         sums = [abs(each).sum(axis=1, keepdims=True) for each in (K2, whole)]
-        lost[chunk] = SAFE * gamma(n) * (sums[0] * head_size + sums[1] * tail_size)
-    return products, lost
+        rounding[chunk] = SAFE * gamma(n) * (sums[0] * head_size + sums[1] * tail_size)
+    return products, rounding

@@ -1,6 +1,6 @@
 """From the forces of a block of load cases to displacements, gaps, residuals and proven error bounds.
 
-Everything here is done for all cases of the block at once, matrix by matrix.
+All cases of the block are treated at once, by matrix–matrix products.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from .residual import refined, residual, split
 
 
 @dataclass(frozen=True)
-class Vouched:
-    """One answer, looked at: x (n,) mm, gap = g − Aᵀx (m,) mm, and max|x − x*| ≤ bound_mm for certain.
+class Assessment:
+    """One answer: x (n,) mm, gap = g − Aᵀx (m,) mm, and the proven bound max|x − x*| ≤ bound_mm.
 
-    active : the closed contacts, those with q_ii λ_i > (Qλ − p)_i.
-
-    primal_residual, dual_residual, duality_gap as the judge has them: mm, N, N·mm.
+    active : the number of closed contacts, those with q_ii λ_i > (Qλ − p)_i.
+    primal_residual, dual_residual, duality_gap : as in `judge`, mm, N, N·mm.
     """
 
     x: Vector
@@ -35,22 +34,22 @@ class Vouched:
     duality_gap: float
 
 
-def vouch(
+def assess(
     bound: Bound,
     loads: Sequence[LoadCase],
     lams: Sequence[Vector],
-    own: Sequence[Vector | None],
-) -> list[Vouched]:
-    """One for each load with its finite λ (m,) and, in the primal form, the solver's own x (n,).
+    xs: Sequence[Vector | None],
+) -> list[Assessment]:
+    """An assessment per load of its finite λ (m,) and, in the primal form, the solver's own x (n,).
 
-    In the dual form the answer is x = K⁻¹(f − Aλ). The bound is that of a point near by, whose λ is zero
+    In the dual form the answer is x = K⁻¹(f − Aλ). The bound is that of a nearby point, whose λ is zero
     where q_ii λ_i ≤ (Qλ − p)_i, plus the distance to it.
     """
     prepared, assembly = bound.prepared, bound.prepared.assembly
     A = assembly.A
     f, g = (np.column_stack([getattr(load, name) for load in loads]) for name in "fg")
-    formed = all(load.p.size for load in loads)  # by the dual form
-    p = np.column_stack([load.p for load in loads]) if formed else prepared.dual_load(side_by_side(loads))
+    has_p = all(load.p.size for load in loads)
+    p = np.column_stack([load.p for load in loads]) if has_p else prepared.dual_load(side_by_side(loads))
     lam = np.column_stack(lams)
     compliance = np.diag(prepared.Q)[:, None]
     clean = np.where(compliance * lam > prepared.Q @ lam - p, np.maximum(lam, 0.0), 0.0)
@@ -61,19 +60,19 @@ def vouch(
     bounds = bound.bound(r, r_error, *gaps(assembly, g, x), clean)
 
     given = x.rounded
-    shed = A @ (lam - clean)
-    if own[0] is not None:
-        answer = np.column_stack([each for each in own if each is not None])
+    removed = A @ (lam - clean)
+    if xs[0] is not None:
+        answer = np.column_stack([each for each in xs if each is not None])
     else:
-        answer = given - prepared.solve_K(shed) if shed.any() else given
+        answer = given - prepared.solve_K(removed) if removed.any() else given
     moved = answer - given
     rounding = np.finfo(float).eps * abs(given).max(axis=0)
     bounds = bounds + abs(moved).max(axis=0) + rounding
     if moved.any():
-        r = r - assembly.multiply_K(moved) - shed
+        r = r - assembly.multiply_K(moved) - removed
     gap = g - A.T @ answer
     return [
-        Vouched(
+        Assessment(
             x=answer[:, k],
             gap=gap[:, k],
             active=int((clean[:, k] > 0).sum()),

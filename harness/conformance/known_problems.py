@@ -1,7 +1,7 @@
 """Small contact problems whose answers are known without a solver.
 
 Choose x, λ ≥ 0 and gaps y ≥ 0 with λᵢyᵢ = 0, put f = Kx + Aλ and g = Aᵀx + y: the optimality conditions
-then hold by construction, and since K is positive definite the answer is the only one.
+then hold by construction, and the answer is unique because K is positive definite.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from problems.forms.prepared import Prepared
 
 Random = np.random.Generator
 
-#: The cases of a trial: the probability that a contact is closed.
+#: The cases of a problem: the probability that a contact is closed.
 CLOSED = {"some contacts closed": 0.4, "others closed": 0.6, "all open": 0.0, "all closed": 1.0}
 
 
 @dataclass(frozen=True)
-class Case:
+class KnownCase:
     """A load case with its answer: x (n,) in mm, lam (m,) in N."""
 
     name: str
@@ -31,10 +31,12 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Trial:
+class KnownProblem:
+    """Matrices, and load cases with their answers."""
+
     name: str
     prepared: Prepared
-    cases: tuple[Case, ...]
+    cases: tuple[KnownCase, ...]
 
 
 def contact_rows(pairs: int, tools: int) -> sp.csc_array:
@@ -51,7 +53,7 @@ def stiffness(random: Random, size: int) -> Matrix:
     return (K + K.T) / 2
 
 
-def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> Case:
+def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> KnownCase:
     """A load case in which each contact is closed with the probability `closed`."""
     n, m = prepared.assembly.n, prepared.assembly.m
     A = prepared.assembly.A
@@ -64,10 +66,10 @@ def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> 
     p = prepared.dual_load(LoadCase(f, g))
     for array in (f, g, p):
         array.flags.writeable = False
-    return Case(name, LoadCase(f, g, p), x, lam)
+    return KnownCase(name, LoadCase(f, g, p), x, lam)
 
 
-def trials(seed: int = 0) -> list[Trial]:
+def known_problems(seed: int = 0) -> list[KnownProblem]:
     """One contact; two parts; two parts and a rigid tool. Arrays are read-only as in a measurement."""
     random = np.random.default_rng(seed)
     made = []
@@ -77,5 +79,5 @@ def trials(seed: int = 0) -> list[Trial]:
         for array in (*blocks, *prepared.factors, prepared.Q, prepared.assembly.A.data):
             array.flags.writeable = False
         cases = tuple(known_case(random, prepared, closed, title) for title, closed in CLOSED.items())
-        made.append(Trial(name, prepared, cases))
+        made.append(KnownProblem(name, prepared, cases))
     return made

@@ -1,4 +1,4 @@
-"""What an answer is judged on: a scene's data and its reference; and what the report needs of them."""
+"""A scene with its matrices and its reference: what answers are judged on, and what is recorded of it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from .reference import Reference, reference, reference_of
 
 
 @dataclass(frozen=True)
-class Ground:
-    """A scene that is ready to be measured and judged on. reference_s : what its reference took."""
+class ReferenceProblem:
+    """A scene whose answers can be measured and judged. reference_s : seconds that its reference took."""
 
     scene: Scene
     prepared: Prepared
@@ -41,8 +41,8 @@ class Ground:
         largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
         return conditioned_limit(asked, cond_K, largest)
 
-    def of_case(self, series: dict[str, Any] | None, case: int | None) -> Ground:
-        """That of a load case of a series on the scene, with a reference of its own."""
+    def of_case(self, series: dict[str, Any] | None, case: int | None) -> ReferenceProblem:
+        """The same for a load case of a series, with its own reference."""
         if series is None or case is None:
             return self
         load = random_gaps(self.scene, **series).load(case)
@@ -58,7 +58,7 @@ class Ground:
         return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
 
 
-def ground(source: str, progress: Progress = lambda text, fraction: None) -> Ground:
+def reference_problem(source: str, progress: Progress = lambda text, fraction: None) -> ReferenceProblem:
     """Open or build a scene, by name or path, and its reference. Raises InputError."""
     scene = read_scene(source)
     data = prepared(scene, progress)
@@ -69,51 +69,51 @@ def ground(source: str, progress: Progress = lambda text, fraction: None) -> Gro
     progress("reference", 0.0)
     start = time.perf_counter()
     known = reference_of(scene, data, load)
-    return Ground(scene, data, load, known, time.perf_counter() - start)
+    return ReferenceProblem(scene, data, load, known, time.perf_counter() - start)
 
 
-def record(ground: Ground, directory: Path) -> None:
+def record(problem: ReferenceProblem, directory: Path) -> None:
     """Put the scene into DIRECTORY/problems.jsonl and its contacts into DIRECTORY/scenes/NAME.npz."""
-    scene, facts, known = ground.scene, ground.prepared.facts, ground.reference
+    scene, facts, known = problem.scene, problem.prepared.facts, problem.reference
+    assembly = problem.prepared.assembly
     row = {
         "scene": scene.name,
         "title": scene.title,
         "scene_key": scene.key,
-        "n": ground.prepared.assembly.n,
-        "m": ground.prepared.assembly.m,
+        "n": assembly.n,
+        "m": assembly.m,
         "active": int(known.active.sum()),
         **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},
         "build_s": facts.get("seconds"),
-        "reference_s": ground.reference_s,
+        "reference_s": problem.reference_s,
         "reference_bound_mm": known.bound_mm,
         "reference_route": known.route,
     }
     _put(row, directory)
     arrays = {
-        "gap_before": ground.load.g,
-        "gap_after": ground.load.g - ground.prepared.assembly.A.T @ known.x,
+        "gap_before": problem.load.g,
+        "gap_after": problem.load.g - assembly.A.T @ known.x,
         "lam": known.lam,
     }
-    nodes = ground.prepared.assembly.contact_nodes
-    if nodes is not None:
-        arrays["contact_nodes"] = nodes
+    if assembly.contact_nodes is not None:
+        arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(scene, JointScene):
         arrays["fasteners"] = scene.marks()
     np.savez(directory / "scenes" / (scene.name.replace("/", "_") + ".npz"), **arrays)
 
 
 def record_refusal(scene: Scene, directory: Path) -> None:
-    """Put into DIRECTORY/problems.jsonl by which words the model refuses a rung, "" where it does not."""
+    """Put into DIRECTORY/problems.jsonl the message that refuses a rung; "" if the rung is accepted."""
     try:
         _ = prepared(scene).Q
-        words = ""
+        message = ""
     except InputError as error:
-        words = str(error)
+        message = str(error)
     n, m = scene.expected_size or (None, None)
-    _put({"scene": scene.name, "title": scene.title, "n": n, "m": m, "refused": words}, directory)
+    _put({"scene": scene.name, "title": scene.title, "n": n, "m": m, "refused": message}, directory)
 
 
 def _put(row: dict[str, Any], directory: Path) -> None:
     path = directory / "problems.jsonl"
-    others = [other for other in records.read_whole(path) if other["scene"] != row["scene"]]
+    others = [other for other in records.read_complete_rows(path) if other["scene"] != row["scene"]]
     records.rewrite(path, [*others, row])
