@@ -4,9 +4,9 @@
     z⁺ = λ⁺ + ((t − 1)/t⁺) (λ⁺ − λ),   t⁺ = (1 + √(1 + 4t²))/2
 
 (Beck and Teboulle, SIAM J. Imaging Sci. 2, 2009); t is reset to 1 whenever the momentum points uphill,
-(z − λ⁺)ᵀ(λ⁺ − λ) > 0 (O'Donoghue and Candès, Found. Comput. Math. 15, 2015). It needs of the order of √cond(Q)
-products with Q, the projected gradient method cond(Q). It stops when max L|z − λ⁺|, a length in mm, is at most
-the tolerance.
+(z − λ⁺)ᵀ(λ⁺ − λ) > 0 (O'Donoghue and Candès, Found. Comput. Math. 15, 2015). It needs of the order of
+√cond(Q) products with Q, the projected gradient method cond(Q), and stops when max L|z − λ⁺|, a length in mm,
+is at most the tolerance.
 
 As a plug-in:  python -m harness check --plugin examples/fista.py
                python -m harness run --plugin examples/fista.py --size 4386 --out results/fista

@@ -22,14 +22,14 @@ from .few_digits import said_of_digits
 
 def export(source: str, form: str, out: Path, console: Console) -> None:
     """Write K, A, f, g of a scene in a format of problems.formats. Raises InputError."""
-    if form not in formats.WRITERS:
-        raise InputError.one("--format", "format", form, f"one of {', '.join(formats.WRITERS)}")
+    if form not in formats.names():
+        raise InputError.one("--format", "format", form, f"one of {', '.join(formats.names())}")
     scene = read_scene(source)
     data = prepared(scene)
     load = load_case(scene)
     out.parent.mkdir(parents=True, exist_ok=True)
     formats.write(form, out, matrices(data, load))
-    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.WRITERS[form]}.")
+    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.description(form)}.")
 
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:
