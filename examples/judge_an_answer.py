@@ -25,9 +25,10 @@ def joint(n: int = 40) -> tuple[np.ndarray, ...]:
 
 def penalty(K: np.ndarray, A: np.ndarray, f: np.ndarray, g: np.ndarray, rho: float) -> np.ndarray:
     """x (n,), mm."""
-    x, before = np.linalg.solve(K, f), None
-    while not np.array_equal(closed := A.T @ x > g, before):
-        A_C, before = A[:, closed], closed
+    closed, x = np.zeros(len(g), dtype=bool), np.linalg.solve(K, f)
+    while not np.array_equal(A.T @ x > g, closed):
+        closed = A.T @ x > g
+        A_C = A[:, closed]
         x = np.linalg.solve(K + rho * A_C @ A_C.T, f + rho * A_C @ g[closed])
     return x
 

@@ -28,8 +28,9 @@ def main() -> float:
     answer = solve(own_matrices(K, A, f, g), "piqp", tolerance=1e-10)
 
     Q, p = A.T @ np.linalg.solve(K, A), A.T @ np.linalg.solve(K, f) - g
-    lam = solve_dual((Q + Q.T) / 2, p, "gi").lam
-    x = np.linalg.solve(K, f - A @ lam)
+    dual = solve_dual((Q + Q.T) / 2, p, "gi")
+    assert dual.lam is not None
+    x = np.linalg.solve(K, f - A @ dual.lam)
     assert abs(x - answer.x).max() < 1e-7
     return float(answer.lam.sum())
 

@@ -16,7 +16,7 @@ InputError. Matrices are cached as by the command line.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -179,7 +179,7 @@ def solve_dual(
         raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
     name, chosen = _solver(solver, options)
     form = form_of(name, chosen.forms, "dual")
-    return answer_of(name, chosen, DualAlone(Q), form, load_of(p), tolerance)
+    return replace(answer_of(name, chosen, DualAlone(Q), form, load_of(p), tolerance), x=None)
 
 
 def solve_series(

@@ -117,7 +117,9 @@ def test_an_x_from_elsewhere_is_judged() -> None:
 @pytest.mark.parametrize("solver", modules())
 def test_a_solver_on_plain_arrays(solver: str) -> None:
     Q, p, lam = dual()
-    np.testing.assert_allclose(solve_dual(Q, p, solver, tolerance=1e-11).lam, lam, atol=1e-5)
+    found = solve_dual(Q, p, solver, tolerance=1e-11)
+    np.testing.assert_allclose(found.lam, lam, atol=1e-5)
+    assert found.x is None
 
 
 def test_plain_arrays_are_copied_and_checked() -> None:
