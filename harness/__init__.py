@@ -1,8 +1,56 @@
-"""Runs solvers on problems, one process a measurement, and judges what they answer."""
+"""Runs solvers on problems, one process per measurement, and judges what they answer.
 
+From Python: the functions of harness/api.py, imported when the first of them is asked for.
+"""
+
+import importlib
 import os
+from typing import TYPE_CHECKING, Any
 
 # NumPy and SciPy bring an OpenBLAS each. Idle threads of the one spin on the processors that the other
 # needs: with two threads on two cores Goldfarb–Idnani takes up to four times as long. 2⁴ cycles is the
 # shortest wait before they sleep. Read when the library is loaded, so it has to stand here.
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
+
+if TYPE_CHECKING:
+    from harness.api import (
+        Answer,
+        InputError,
+        Judgement,
+        LoadCase,
+        Scene,
+        Solution,
+        Solver,
+        check_solver,
+        judge,
+        load_scene,
+        own_matrices,
+        random_gaps,
+        solve,
+        solve_dual,
+        solve_series,
+    )
+
+__all__ = [
+    "Answer",
+    "InputError",
+    "Judgement",
+    "LoadCase",
+    "Scene",
+    "Solution",
+    "Solver",
+    "check_solver",
+    "judge",
+    "load_scene",
+    "own_matrices",
+    "random_gaps",
+    "solve",
+    "solve_dual",
+    "solve_series",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        return getattr(importlib.import_module("harness.api"), name)
+    raise AttributeError(f"module 'harness' has no attribute {name!r}")

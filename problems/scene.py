@@ -12,7 +12,7 @@ or, for a user's own matrices, `[matrices]` with K, A, f, g (Matrix Market) or p
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from problems.input.validation import UNITS, unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, make_rung, rung_names
 from problems.model.effect import Effect, Pair, StiffnessEffect
 from problems.model.effect_tables import EffectTable
-from problems.model.joint import Joint
+from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 
 from .errors import Fault, InputError
@@ -63,6 +63,26 @@ def read_scene(name_or_path: str) -> Scene:
     own = not path.resolve().is_relative_to(SCENES)
     name = path.stem if own else path.resolve().relative_to(SCENES).with_suffix("").as_posix()
     return _scene(name, path, read_toml(path))
+
+
+def scene_of(table: Mapping[str, Any], name: str = "scene") -> Scene:
+    """A checked scene from the table that its file would hold.
+
+    The tables in it may be dicts, or a Joint and Effects; paths are relative to the working directory.
+    Raises InputError as `read_scene` does.
+    """
+    return _scene(name, Path(name), _as_toml(table))
+
+
+def _as_toml(value: Any) -> Any:
+    """What tomllib would have made of it: dicts, lists and scalars."""
+    if isinstance(value, Table):
+        return value.model_dump(exclude_unset=True)
+    if isinstance(value, Mapping):
+        return {key: _as_toml(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_toml(inner) for inner in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _rung_scene(name: str) -> Scene:

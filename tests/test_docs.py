@@ -1,4 +1,4 @@
-"""docs/effects.md: its effect works as written, and its table is that of the code."""
+"""The documents: what they show works as written, their tables are those of the code, their paths exist."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from harness.scene.solve import solve
 from problems import effects
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.formats import WRITERS
+from problems.formats import names
 from problems.model.effect import Effect, effect_class, effect_kinds
 from problems.scene import SCENES, read_scene
 
-DOCS = Path(__file__).parents[1] / "docs"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
 PAGE = (DOCS / "effects.md").read_text("utf-8")
 JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
@@ -103,4 +105,52 @@ def test_every_scene_of_the_gallery_is_shown_with_its_command_and_pictures() -> 
 
 def test_the_formats_of_the_page_are_those_of_the_code() -> None:
     stated = re.findall(r"^\| `(\w+)` \|", PAGE[PAGE.index("## Matrices") :], re.MULTILINE)
-    assert stated == list(WRITERS)
+    assert stated == names()
+
+
+def anchors(page: Path) -> set[str]:
+    """The headings of a page as GitHub links to them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text("utf-8")):
+        if "://" in target:
+            continue
+        path, _, anchor = target.partition("#")
+        linked = page.parent / path if path else page
+        assert linked.exists(), target
+        assert not anchor or anchor in anchors(linked), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_paths_of_code_exist(page: Path) -> None:
+    """`harness/….py`, `problems/effects/`; not those with a <name> to fill in."""
+    folders = "harness|problems|solvers|report|tests|examples"
+    pattern = rf"`((?:{folders})/[\w./-]*(?:\.py|\.toml|/))`"
+    for path in re.findall(pattern, page.read_text("utf-8")):
+        assert (ROOT / path).exists(), path
+
+
+def test_the_folders_and_files_of_the_architecture_are_those_of_the_code() -> None:
+    page = (DOCS / "architecture.md").read_text("utf-8")
+    tree = page[page.index("## The tree") : page.index("## Where do I find")]
+    for package in ("problems", "solvers", "harness", "report"):
+        part = re.split(r"\n(?=\w)", tree[tree.index(f"\n{package}/") + 1 :])[0]
+        for path in re.findall(rf"\b{package}/[\w/]+\.py", page):
+            assert (ROOT / path).is_file(), path
+        for folder in (ROOT / package).iterdir():
+            if folder.is_dir() and folder.name != "__pycache__" and any(folder.iterdir()):
+                assert f"{folder.name}/" in part, f"{package}/{folder.name}"
+
+
+def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    code = re.search(r"```python\n(.*?)```", text[text.index("## From Python") :], re.DOTALL)
+    assert code is not None
+    exec(code[1], {})
+    first, second = capsys.readouterr().out.splitlines()
+    assert float(first.split()[1]) < 1e-10
+    assert second == "outside"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -30,6 +32,7 @@ from problems.input.digits import apparent_digits, expected_error
 from problems.model.scene import JointScene
 from problems.scene import read_scene
 
+ROOT = Path(__file__).parents[1]
 QUIET = Console(file=StringIO())
 SCENE = "gallery/installed-fasteners"  # springs join both parts into one block of K
 FOLDERS = ("mtx", "abaqus")
@@ -50,7 +53,7 @@ def there_and_back(form: str, folder: Path) -> tuple[dict[str, Any], dict[str, A
     return wanted, dict(np.load(folder / "back.npz"))
 
 
-@pytest.mark.parametrize("form", [form for form in formats.WRITERS if form != "dmig"])
+@pytest.mark.parametrize("form", [form for form in formats.names() if form != "dmig"])
 def test_a_round_trip_is_bit_for_bit(form: str, tmp_path: Path) -> None:
     wanted, found = there_and_back(form, tmp_path)
     for name in "KA":
@@ -183,6 +186,51 @@ def test_bad_lines_of_abaqus_text_are_named(tmp_path: Path) -> None:
     assert [fault.key for fault in error.value.faults] == ["line 2", "line 3", "line 5"]
 
 
+TEXT = """
+from pathlib import Path
+
+import numpy as np
+
+from problems.formats import Data
+
+DESCRIPTION = "a file .plain of f"
+SUFFIXES = (".plain",)
+
+
+def write(path: Path, data: Data) -> None:
+    path.write_text(" ".join(map(repr, data["f"].tolist())))
+
+
+def read(path: Path) -> Data:
+    return {"f": np.array(path.read_text().split(), dtype=float)}
+"""
+
+
+def test_a_format_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put into the folder of formats, it is listed, written, read and in the messages."""
+    (tmp_path / "plain_format.py").write_text(TEXT)
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
+    monkeypatch.delitem(sys.modules, "problems.formats.plain_format", raising=False)
+    assert "plain" in formats.names()
+    data = matrices(*small())
+    formats.write("plain", tmp_path / "f.plain", data)
+    np.testing.assert_array_equal(formats.read(tmp_path / "f.plain")["f"], data["f"])
+    (tmp_path / "x.txt").write_text("1 2 3")
+    with pytest.raises(InputError, match=r"\.op4, \.plain"):
+        formats.read(tmp_path / "x.txt")
+    done = CliRunner().invoke(app, ["list", "formats"])
+    assert "a file .plain of f" in done.output
+    sys.modules.pop("problems.formats.plain_format")
+
+
+def test_the_format_of_a_file_is_known_without_its_library() -> None:
+    code = (
+        "import sys, pathlib, problems.formats as f; f.module_of(pathlib.Path('k.op4')); print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert not {"pandas", "pyyeti", "qpsolvers"} & set(done.stdout.split())
+
+
 # --- import -------------------------------------------------------------------------------------------
 
 
@@ -280,8 +328,6 @@ def test_a_matrix_market_file_that_ends_early(name: str, tmp_path: Path) -> None
 
 
 def test_nastran_without_pyyeti_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
-
     monkeypatch.setitem(sys.modules, "pyyeti", None)
     (tmp_path / "k.op4").write_bytes(b"x" * 100)
     with pytest.raises(InputError, match="pip install"):

@@ -36,6 +36,7 @@ class Listed(StrEnum):
     solvers = "solvers"
     scenes = "scenes"
     suites = "suites"
+    formats = "formats"
 
 
 @app.callback()
@@ -196,7 +197,7 @@ def gate(
 
 @app.command("list")
 def list_(what: Listed) -> None:
-    """List the available solvers, scenes or suites.
+    """List the available solvers, scenes, suites or file formats.
 
     \b
     Examples:

@@ -1,10 +1,11 @@
-"""The tables of `list`: solvers, scenes, suites."""
+"""The tables of `list`: solvers, scenes, suites, file formats."""
 
 from __future__ import annotations
 
 from rich.table import Table
 
 from harness.planning.suite import read_suite, suite_names
+from problems import formats
 from problems.errors import InputError
 from problems.manufactured.ladder import rung_names
 from problems.scene import read_scene, scene_names
@@ -12,8 +13,8 @@ from solvers.registry import make_solver, modules, solver_names, solver_version
 
 
 def listing(what: str) -> Table:
-    """A table of "solvers", "scenes" or "suites"."""
-    return {"solvers": _solvers, "scenes": _scenes, "suites": _suites}[what]()
+    """A table of "solvers", "scenes", "suites" or "formats"."""
+    return {"solvers": _solvers, "scenes": _scenes, "suites": _suites, "formats": _formats}[what]()
 
 
 def _solvers() -> Table:
@@ -41,4 +42,11 @@ def _suites() -> Table:
         suite = read_suite(name)
         solvers = dict.fromkeys(entry.name for entry in suite.solver)
         table.add_row(name, str(len(suite.scenes)), " ".join(solvers), suite.description or suite.title)
+    return table
+
+
+def _formats() -> Table:
+    table = Table("format", "what is written")
+    for name in formats.names():
+        table.add_row(name, formats.description(name))
     return table

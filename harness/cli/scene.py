@@ -63,10 +63,8 @@ def validate(scene: SceneName) -> None:
 @app.command()
 def export(
     scene: SceneName,
-    form: Annotated[
-        str, typer.Option("--format", metavar="FORMAT", help="npz, mtx, op4, dmig, abaqus, qpsolvers.")
-    ],
-    out: Annotated[Path, option("PATH", "A file; a folder for mtx and abaqus.")],
+    form: Annotated[str, typer.Option("--format", metavar="FORMAT", help="A name from `list formats`.")],
+    out: Annotated[Path, option("PATH", "A file, or a folder for a format with one file per matrix.")],
 ) -> None:
     """Write K, A, f, g of a scene for another program.
 

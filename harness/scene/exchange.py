@@ -22,14 +22,14 @@ from .few_digits import digits_sentence
 
 def export(source: str, format: str, out: Path, console: Console) -> None:
     """Write K, A, f, g of a scene in a format of problems.formats. Raises InputError."""
-    if format not in formats.WRITERS:
-        raise InputError.one("--format", "format", format, f"one of {', '.join(formats.WRITERS)}")
+    if format not in formats.names():
+        raise InputError.one("--format", "format", format, f"one of {', '.join(formats.names())}")
     scene = read_scene(source)
     data = prepared(scene)
     load = load_case(scene)
     out.parent.mkdir(parents=True, exist_ok=True)
     formats.write(format, out, matrices(data, load))
-    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.WRITERS[format]}.")
+    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.description(format)}.")
 
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:

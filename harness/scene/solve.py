@@ -17,8 +17,6 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from harness.measurement.answers import Refused
-from harness.measurement.solver_session import SolverSession
 from harness.planning.estimate import refuse_what_cannot_fit
 from harness.results.machine import resident_mib
 from harness.results.records import replace_text, to_line
@@ -28,15 +26,14 @@ from harness.verification.reference import Reference, reference_of
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.names import default_form
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.scene import read_scene
 from solvers.base import Solver
 
+from .answer import answer_of, form_of
 from .few_digits import digits_sentence
 from .layout import layout
 from .ledger import Entry, ledger, not_called_for
@@ -146,26 +143,17 @@ def _solver(name: str) -> Solver:
 
 
 def _answer(
-    name: str, solver: Solver, data: Prepared, case: LoadCase, tolerance: float
+    name: str, solver: Solver, data: Prepared, load: LoadCase, tolerance: float
 ) -> tuple[Vector, Vector, dict[str, Any]]:
     """x (n,), λ (m,) or NaN if there is none, and the solver's report. Raises InputError without an x."""
-    session = SolverSession(solver, in_form(data, default_form(solver.forms)), tolerance)
-    problem = session.problem
-    session.open()
-    (load,) = problem.loads([case])
-    try:
-        answer = session.next(load, None)
-    except Refused as error:
-        raise InputError.one("--solver", name, str(error), "gave no answer; try another solver") from error
-    (x,) = problem.recover([answer.lam], [answer.x], [load])
-    if x is None:
-        raise InputError.one("--solver", name, answer.status, "gave no answer; try another solver")
+    form = form_of(name, solver.forms)
+    answer = answer_of(name, solver, data, form, load, tolerance)
     lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
     outcome = {
-        "method": f"{name}, {problem.form} form, tolerance {tolerance:g}",
+        "method": f"{name}, {form} form, tolerance {tolerance:g}",
         "status": answer.status,
     }
-    return np.asarray(x, dtype=float), lam, outcome | {"iterations": answer.iterations}
+    return np.asarray(answer.x, dtype=float), lam, outcome | {"iterations": answer.iterations}
 
 
 def _skipped(scene: Scene, steps: Steps, has_contact: bool, solver: str | None, p: Vector) -> Iterator[str]:

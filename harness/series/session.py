@@ -27,7 +27,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.load_cases.base import LoadCases
 from problems.model.scene import Scene
-from solvers.base import Answer, Form, failed
+from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver
 
 Gaps = NDArray[np.float32]
@@ -39,7 +39,10 @@ KEPT_ANSWERS = 32  # for warm starts: memory does not grow with the number of ca
 
 @dataclass(frozen=True)
 class Job:
-    """What a series solves, and how. check : every check-th case is compared with the reference; 0: none."""
+    """What a series solves, and how.
+
+    check : every check-th case is compared with the reference; 0: none. threads : None: as they are.
+    """
 
     scene: Scene
     cases: LoadCases
@@ -48,7 +51,7 @@ class Job:
     tolerance: float
     limit_mm: float
     check: int
-    threads: int
+    threads: int | None
     options: dict[str, Any] = field(default_factory=dict)
     plugin: Path | None = None
     key: str = field(default_factory=lambda: uuid4().hex)
@@ -71,16 +74,16 @@ class _Attempt:
 
 
 class SeriesSession:
-    """A job in this process."""
+    """A job in this process. solver : made by the caller, or else by its name."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, solver: Solver | None = None) -> None:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
         self.code = provenance()
         self.data: Prepared = prepared(job.scene)
         self.bound = Bound.of(self.data)
         self.problem = in_form(self.data, job.form)
-        solver = make_solver(job.solver, job.options, job.plugin)
+        solver = solver or make_solver(job.solver, job.options, job.plugin)
         self.row: Row = {}  # of the case being solved
         self.session = SolverSession(solver, self.problem, job.tolerance, self._lap, KEPT_ANSWERS)
         self.session.open(batched=True)

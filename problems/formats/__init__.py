@@ -1,12 +1,19 @@
-"""File formats of K, A, f, g: one file each, with `write(path, data)` and `read(path)`.
+"""File formats of K, A, f, g: one file NAME_format.py each, found by its name. It holds
 
-Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known. A format is imported
-when a file of its kind is read or written. A new one is one file here and a line in WRITERS and `module_of`.
+    DESCRIPTION          what is written: a file, or a folder with one file per matrix
+    SUFFIXES             of the files that are read
+    write(path, data)
+    read(path)           the matrices of a file
+    accepts(path)        whether a file's content is of this format; only if another format shares a suffix
+
+Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known. Libraries are
+imported when a file is read or written.
 """
 
 from __future__ import annotations
 
 import importlib
+import pkgutil
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -19,20 +26,20 @@ from problems.errors import Fault, InputError
 Data = dict[str, Any]
 NAMES = ("K", "A", "f", "g", "nodes")
 
-#: What each writes: a file, or a folder with one file per matrix.
-WRITERS = {
-    "npz": "a file .npz, bit for bit",
-    "mtx": "a folder of Matrix Market files, bit for bit",
-    "op4": "a file .op4 (Nastran OUTPUT4, binary), bit for bit",
-    "dmig": "a file .pch (Nastran DMIG), 10 digits",
-    "abaqus": "a folder: K as Abaqus matrix text, the others as Matrix Market, bit for bit",
-    "qpsolvers": "a file .npz that qpsolvers.Problem.load reads, bit for bit",
-}
-DMIG_SUFFIXES = (".pch", ".bdf", ".nas", ".dat")
+
+def names() -> list[str]:
+    """The formats, by their files."""
+    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
+    return [name.removesuffix("_format") for name in found if name.endswith("_format")]
+
+
+def description(name: str) -> str:
+    """What the format writes."""
+    return str(_module(name).DESCRIPTION)
 
 
 def write(name: str, path: Path, data: Data) -> None:
-    """Write data in a format of WRITERS."""
+    """Write data in the format of that name."""
     _module(name).write(path, data)
 
 
@@ -55,18 +62,12 @@ def read(path: Path) -> Data:
 
 def module_of(path: Path) -> ModuleType:
     """The format of a file, from its suffix and, if that is ambiguous, its content."""
-    match path.suffix.lower():
-        case ".npz":
-            with np.load(path) as archive:
-                return _module("qpsolvers" if "P" in archive.files else "npz")
-        case ".mtx":
-            with path.open("rb") as file:
-                return _module("mtx" if file.read(14) == b"%%MatrixMarket" else "abaqus")
-        case ".op4":
-            return _module("op4")
-        case suffix if suffix in DMIG_SUFFIXES:
-            return _module("dmig")
-    allowed = f".npz, .mtx, .op4, {', '.join(DMIG_SUFFIXES)}"
+    modules, suffix = [_module(name) for name in names()], path.suffix.lower()
+    alike = [module for module in modules if suffix in module.SUFFIXES]
+    for module in alike:
+        if len(alike) == 1 or module.accepts(path):
+            return module
+    allowed = ", ".join(dict.fromkeys(known for module in modules for known in module.SUFFIXES))
     raise InputError.one(path, "suffix", path.suffix, allowed)
 
 

@@ -16,9 +16,15 @@ import scipy.sparse as sp
 from problems.errors import Fault, InputError
 from problems.formats import Data
 
-from .mtx_format import write_others
+from . import mtx_format
 
+DESCRIPTION = "a folder: K as Abaqus matrix text, the others as Matrix Market, bit for bit"
+SUFFIXES = (".mtx",)
 NORMAL = 3  # the degree of freedom under which displacements are written
+
+
+def accepts(path: Path) -> bool:
+    return not mtx_format.accepts(path)
 
 
 def write(path: Path, data: Data) -> None:
@@ -30,7 +36,7 @@ def write(path: Path, data: Data) -> None:
     )
     with (path / "K.mtx").open("w", encoding="ascii") as file:
         file.writelines(lines)
-    write_others(path, data)
+    mtx_format.write_others(path, data)
 
 
 def read(path: Path) -> Data:

@@ -7,16 +7,23 @@ are zeros at the points of K, and a load or gap that is zero everywhere is not w
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from problems.errors import InputError
 from problems.formats import Data, pyyeti
 
+if TYPE_CHECKING:
+    import pandas as pd  # slow to import
+
+DESCRIPTION = "a file .pch (Nastran DMIG), 10 digits"
+SUFFIXES = (".pch", ".bdf", ".nas", ".dat")
+
 
 def write(path: Path, data: Data) -> None:
+    import pandas as pd
+
     n, m = data["A"].shape
     if m == 0:
         allowed = "at least one: DMIG has no matrix without columns; use another format"
@@ -45,6 +52,8 @@ def read(path: Path) -> Data:
 
 
 def _points(count: int) -> pd.MultiIndex:
+    import pandas as pd
+
     return pd.MultiIndex.from_product([range(1, count + 1), [0]], names=["id", "dof"])
 
 

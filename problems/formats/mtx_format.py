@@ -10,6 +10,15 @@ import scipy.sparse as sp
 from problems.formats import Data, vector
 from problems.input.user_matrices import read_mtx
 
+DESCRIPTION = "a folder of Matrix Market files, bit for bit"
+SUFFIXES = (".mtx",)
+HEADER = b"%%MatrixMarket"
+
+
+def accepts(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(HEADER)) == HEADER
+
 
 def write(path: Path, data: Data) -> None:
     path.mkdir(parents=True, exist_ok=True)

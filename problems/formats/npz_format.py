@@ -8,6 +8,14 @@ import numpy as np
 
 from problems.formats import NAMES, Data
 
+DESCRIPTION = "a file .npz, bit for bit"
+SUFFIXES = (".npz",)
+
+
+def accepts(path: Path) -> bool:
+    with np.load(path) as archive:
+        return "P" not in archive.files  # which qpsolvers' have
+
 
 def write(path: Path, data: Data) -> None:
     dense = {name: data[name].toarray() for name in "KA"}

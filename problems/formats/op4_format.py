@@ -6,6 +6,9 @@ from pathlib import Path
 
 from problems.formats import Data, pyyeti, vector
 
+DESCRIPTION = "a file .op4 (Nastran OUTPUT4, binary), bit for bit"
+SUFFIXES = (".op4",)
+
 
 def write(path: Path, data: Data) -> None:
     op4 = pyyeti(path).op4

@@ -7,6 +7,15 @@ from pathlib import Path
 from problems.errors import InputError
 from problems.formats import Data
 
+from . import npz_format
+
+DESCRIPTION = "a file .npz that qpsolvers.Problem.load reads, bit for bit"
+SUFFIXES = (".npz",)
+
+
+def accepts(path: Path) -> bool:
+    return not npz_format.accepts(path)
+
 
 def write(path: Path, data: Data) -> None:
     import qpsolvers

@@ -1,7 +1,8 @@
-"""A user's own K, A, f, g: from one .npz, or from Matrix Market files."""
+"""A user's own K, A, f, g: from one .npz, from Matrix Market files, or as arrays."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,14 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
         where = {key: str(files["problem"]) for key in (*"KAfg", "nodes")}
     else:
         data = {key: _read_mtx(path, key) for key, path in files.items()}
+    return checked(data, where)
+
+
+def checked(data: Mapping[str, Any], where: Mapping[str, str]) -> tuple[Assembly, LoadCase]:
+    """K, A (dense or sparse), f, g and perhaps nodes as an assembly and a load case.
+
+    where : the file or the argument that each comes from. Raises InputError with all faults.
+    """
     faults = [Fault(where.get(key, "matrices"), key, None, "is missing") for key in "KAfg" if key not in data]
     if faults:
         raise InputError(faults)

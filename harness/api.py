@@ -1,0 +1,234 @@
+"""rivetbench from Python.
+
+    from harness import load_scene, solve, judge
+
+    scene = load_scene("gallery/three-part-stack")
+    answer = solve(scene)                            # the certified reference: x, λ, gaps, error bound
+    answer = solve(scene, "piqp", tolerance=1e-9)    # a solver by name, judged
+    judge(scene, x, lam)                             # an x that came from elsewhere
+
+A problem is min ½xᵀKx − fᵀx subject to Aᵀx ≤ g: x (n,) displacements in mm, λ (m,) contact forces in N,
+g (m,) initial gaps in mm, f (n,) loads in N. A `scene` argument is a Scene, the name of a packaged one, the
+path of a .toml or .npz file, or a dict with the content of a scene's file. All faults of an input are in one
+InputError. Matrices are cached as by the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+from numpy.typing import ArrayLike
+
+import harness.verification.judge as referee
+from harness.conformance.check import run as check_solver
+from harness.planning.estimate import refuse_what_cannot_fit
+from harness.scene.answer import answer_of, form_of
+from harness.series.session import Job, Result, SeriesSession
+from harness.verification.judge import LIMIT_MM, Judgement
+from harness.verification.reference import reference_of
+from problems.build import load_case, prepared
+from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.dual_alone import DualAlone, load_of
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.forms.names import Form
+from problems.input.user_matrices import SYMMETRY, checked
+from problems.load_cases.base import LoadCases
+from problems.load_cases.listed import Listed
+from problems.load_cases.random_gaps import random_gaps
+from problems.model.scene import MadeScene, Scene
+from problems.scene import read_scene, scene_of
+from solvers.base import Answer, Solver
+from solvers.registry import make_solver
+
+__all__ = [
+    "Answer",
+    "InputError",
+    "Judgement",
+    "LoadCase",
+    "Scene",
+    "Solution",
+    "Solver",
+    "check_solver",
+    "judge",
+    "load_scene",
+    "own_matrices",
+    "random_gaps",
+    "solve",
+    "solve_dual",
+    "solve_series",
+]
+
+Source = Scene | str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """An answer to a scene.
+
+    x : (n,) displacements, mm. lam : (m,) contact forces, N; NaN if the solver gives none.
+    gap : (m,) the gaps that are left, g − Aᵀx, mm.
+    status, iterations : what the solver said; the reference has no iterations.
+    judgement : what the judge found. error_bound_mm : proven, max|x − x*| for the exact answer x*.
+    """
+
+    x: Vector
+    lam: Vector
+    gap: Vector
+    status: str
+    iterations: int | None
+    judgement: Judgement
+    error_bound_mm: float
+
+
+def load_scene(source: Source) -> Scene:
+    """A checked scene by name, path or content; nothing is computed.
+
+    In a dict, `joint` and the entries of `effect` may be tables or objects (problems.model.joint.Joint,
+    problems.effects); paths are relative to the working directory.
+    """
+    if isinstance(source, Scene):
+        return source
+    return scene_of(source) if isinstance(source, Mapping) else read_scene(str(source))
+
+
+def own_matrices(
+    K: Any, A: Any, f: ArrayLike, g: ArrayLike, nodes: ArrayLike | None = None, title: str = "own matrices"
+) -> Scene:
+    """A scene of your own matrices, dense or sparse.
+
+    K : (n, n) symmetric positive definite, N/mm. A : (n, m), column j the normal of contact j.
+    f : (n,) N. g : (m,) mm. nodes : (n, 2) mm, which `newton` uses to number the contacts.
+    """
+    given = {"K": K, "A": A, "f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
+    arrays = {name: value if sp.issparse(value) else np.asarray(value) for name, value in given.items()}
+    assembly, load = checked(arrays, dict.fromkeys(arrays, title))
+    return MadeScene(title, title, ManufacturedProblem(assembly, load))
+
+
+def solve(
+    scene: Source,
+    solver: str | Solver | None = None,
+    *,
+    options: Mapping[str, Any] | None = None,
+    form: Form | None = None,
+    tolerance: float = 1e-9,
+) -> Solution:
+    """Solve a scene, and judge the answer.
+
+    solver : a name (`python -m harness list solvers`) or an object of your own; by default the certified
+        reference, as also where the answer without contact violates no gap and so no solver is called for.
+    form : "primal" or "dual"; by default the dual where the solver takes it.
+    tolerance : passed to the solver, with its options.
+    """
+    scene = load_scene(scene)
+    refuse_what_cannot_fit(scene, scene.name)
+    data, load = prepared(scene), load_case(scene)
+    named = None if solver is None else _solver(solver, options)
+    known = reference_of(scene, data, load)
+    answer = Answer("solved", known.lam, known.x)
+    if named is not None and (data.dual_load(load) > 0).any():
+        name, chosen = named
+        answer = answer_of(name, chosen, data, form_of(name, chosen.forms, form), load, tolerance)
+    x = np.asarray(answer.x, dtype=float)
+    lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
+    judgement = referee.judge(data, load, known, x, lam, LIMIT_MM)
+    bound = (judgement.displacement_error_mm or 0.0) + known.bound_mm
+    gap = load.g - data.assembly.A.T @ x
+    return Solution(x, lam, gap, answer.status, answer.iterations, judgement, bound)
+
+
+def judge(scene: Source, x: ArrayLike, lam: ArrayLike | None = None, limit_mm: float = LIMIT_MM) -> Judgement:
+    """Judge x (n,) in mm, and λ (m,) in N if there is one, against the certified reference of the scene."""
+    scene = load_scene(scene)
+    data, load = prepared(scene), load_case(scene)
+    n, m = data.assembly.n, data.assembly.m
+    x = _vector("judge", "x", x, n)
+    forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)
+    return referee.judge(data, load, reference_of(scene, data, load), x, forces, limit_mm)
+
+
+def solve_dual(
+    Q: ArrayLike,
+    p: ArrayLike,
+    solver: str | Solver = "newton",
+    *,
+    options: Mapping[str, Any] | None = None,
+    tolerance: float = 1e-9,
+) -> Answer:
+    """One solver on plain arrays: min ½λᵀQλ − pᵀλ, λ ≥ 0. The answer is the solver's own, not judged.
+
+    Q : (m, m) symmetric positive definite. p : (m,). Units: mm/N and mm, or any others that fit.
+    """
+    Q = np.array(Q, dtype=float, order="F")
+    if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all():
+        raise InputError.one("solve_dual", "Q", f"shape {Q.shape}", "a square matrix of finite numbers")
+    p = _vector("solve_dual", "p", p, len(Q))
+    if abs(Q - Q.T).max(initial=0) > SYMMETRY * abs(Q).max(initial=0):
+        raise InputError.one("solve_dual", "Q", "asymmetric", "must be symmetric")
+    try:
+        sla.cholesky(Q)
+    except np.linalg.LinAlgError as error:
+        raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
+    name, chosen = _solver(solver, options)
+    form = form_of(name, chosen.forms, "dual")
+    return replace(answer_of(name, chosen, DualAlone(Q), form, load_of(p), tolerance), x=None)
+
+
+def solve_series(
+    scene: Source,
+    cases: LoadCases | Sequence[LoadCase],
+    solver: str | Solver = "newton",
+    *,
+    options: Mapping[str, Any] | None = None,
+    form: Form | None = None,
+    tolerance: float = 1e-11,
+    limit_mm: float = LIMIT_MM,
+    check: int = 0,
+) -> Iterator[Result]:
+    """Solve load cases on one assembly, each from the nearest answer or many at a time, as the solver can.
+
+    cases : a list of LoadCase(f, g), or made by `random_gaps` or another file of problems/load_cases.
+    check : every so many cases are compared with the certified reference; 0: none.
+    Yields for each case, in order, its `row` (status, iterations, seconds, residuals, the proven bound_mm,
+    verdict) and the `gap` that is left, (m,) mm in float32; None where there is no answer.
+    """
+    scene = load_scene(scene)
+    assembly = prepared(scene).assembly
+    if not isinstance(cases, LoadCases):
+        cases = Listed(tuple(cases))
+        for k, case in enumerate(cases.cases):
+            _vector(f"case {k}", "f", case.f, assembly.n)
+            _vector(f"case {k}", "g", case.g, assembly.m)
+    name, chosen = _solver(solver, options)
+    taken = form_of(name, chosen.forms, form)
+    job = Job(
+        scene, cases, name, taken, tolerance, limit_mm, check, threads=None, options=dict(options or {})
+    )
+    return chain.from_iterable(SeriesSession(job, chosen).solve(range(cases.count)))
+
+
+def _solver(solver: str | Solver, options: Mapping[str, Any] | None) -> tuple[str, Solver]:
+    """The solver and its name."""
+    if isinstance(solver, str):
+        return solver, make_solver(solver, dict(options or {}))
+    if options:
+        raise InputError.one("solver", "options", dict(options), "an object has its options already")
+    return type(solver).__name__, solver
+
+
+def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:
+    try:
+        vector = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError.one(where, name, value, "must be numbers") from error
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise InputError.one(where, name, f"shape {vector.shape}", f"finite numbers of shape ({size},)")
+    return vector

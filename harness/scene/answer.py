@@ -1,0 +1,45 @@
+"""One load case by one solver, from its set-up to displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from harness.measurement.answers import Refused
+from harness.measurement.solver_session import SolverSession
+from problems.errors import InputError
+from problems.forms.assembly import LoadCase
+from problems.forms.names import Form, default_form
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.base import Answer, Solver
+
+NO_ANSWER = "gave no answer; try another solver"
+
+
+def form_of(name: str, taken: Sequence[Form], form: Form | None = None) -> Form:
+    """The form asked for, else the usual one of those that a solver takes. Raises InputError."""
+    form = form or default_form(taken)
+    if form not in taken:
+        raise InputError.one(f"solver {name}", "form", form, f"it takes {' and '.join(taken)}")
+    return form
+
+
+def answer_of(
+    name: str, solver: Solver, data: Prepared, form: Form, case: LoadCase, tolerance: float
+) -> Answer:
+    """The solver's answer with x (n,) in mm, recovered where the form has none.
+
+    lam is None if the solver gives no forces. Raises InputError if there are no displacements.
+    """
+    session = SolverSession(solver, in_form(data, form), tolerance)
+    session.open()
+    (load,) = session.problem.loads([case])
+    try:
+        answer = session.next(load, None)
+    except Refused as error:
+        raise InputError.one(f"solver {name}", "answer", str(error), NO_ANSWER) from error
+    (x,) = session.problem.recover([answer.lam], [answer.x], [load])
+    if x is None:
+        raise InputError.one(f"solver {name}", "status", answer.status, NO_ANSWER)
+    return replace(answer, x=x)

@@ -1,0 +1,210 @@
+"""The public interface: what it gives is what the commands give, and what it refuses it names."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from small import make_load, make_prepared, solve_by_nnls
+from strip import STRIP, write_strip
+
+import harness
+from harness import (
+    Answer,
+    InputError,
+    LoadCase,
+    Solver,
+    api,
+    judge,
+    load_scene,
+    own_matrices,
+    random_gaps,
+    solve,
+    solve_dual,
+    solve_series,
+)
+from problems.build import load_case, prepared
+from problems.effects.fasteners import Fasteners
+from problems.forms.assembly import Matrix, Vector
+from problems.forms.prepared import Prepared
+from problems.model.joint import Joint
+from solvers.registry import modules
+
+
+def matrices(seed: int = 3) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
+    data = make_prepared(seed, 6, tools=2)
+    load = make_load(seed, data)[1]
+    return data, load, (sp.block_diag(data.assembly.blocks), data.assembly.A, load.f, load.g)
+
+
+def dual(seed: int = 3) -> tuple[Matrix, Vector, Vector]:
+    data, load, _ = matrices(seed)
+    return data.Q, load.p, solve_by_nnls(data, load)[1]
+
+
+def test_the_names_are_offered_and_documented() -> None:
+    assert harness.__all__ == api.__all__
+    for name in harness.__all__:
+        assert getattr(harness, name) is getattr(api, name)
+        assert getattr(harness, name).__doc__
+    with pytest.raises(AttributeError, match="no attribute 'slove'"):
+        _ = harness.slove
+
+
+def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> None:
+    table = tomllib.loads(STRIP)
+    scenes = [load_scene(write_strip(tmp_path)), load_scene(table)]
+    gap, fasteners, *others = table["effect"]
+    effects = (gap, Fasteners.model_validate(fasteners), *others)
+    scenes.append(load_scene({"joint": Joint.model_validate(table["joint"]), "effect": effects}))
+    assert len({scene.key for scene in scenes}) == 1
+    assert load_scene(scenes[0]) is scenes[0]
+
+
+def test_a_dict_is_left_as_it_was() -> None:
+    table = tomllib.loads(STRIP)
+    load_scene(table)
+    assert table == tomllib.loads(STRIP)
+
+
+def test_all_faults_of_a_dict_are_named() -> None:
+    table = tomllib.loads(STRIP.replace("preload = 60.0", "preload = -1.0").replace("ribs", "rips"))
+    with pytest.raises(InputError) as caught:
+        load_scene(table)
+    assert [fault.key for fault in caught.value.faults] == ["effect[1] (fasteners).preload", "effect[3].kind"]
+
+
+@pytest.mark.parametrize("solver", [None, "newton", "piqp"])
+@pytest.mark.parametrize("form", [None, "primal"])
+def test_solutions_are_the_independent_answer(solver: str | None, form: Any) -> None:
+    if solver == "newton" and form == "primal":
+        with pytest.raises(InputError, match="newton: form = 'primal': it takes dual"):
+            solve(own_matrices(*matrices()[2]), solver, form=form)
+        return
+    data, load, own = matrices()
+    x, lam = solve_by_nnls(data, load)
+    found = solve(own_matrices(*own), solver, form=form, tolerance=1e-10)
+    assert found.status == "solved"
+    assert found.judgement.verdict == "within"
+    np.testing.assert_allclose(found.x, x, atol=1e-9)
+    np.testing.assert_allclose(found.lam, lam, atol=1e-5)
+    np.testing.assert_allclose(found.gap, load.g - data.assembly.A.T @ x, atol=1e-9)
+    assert abs(found.x - x).max() <= found.error_bound_mm + 1e-11
+    assert (found.iterations is None) == (solver is None)
+    assert 0 < found.error_bound_mm < (1e-11 if solver is None else 1e-7)
+
+
+def test_an_x_from_elsewhere_is_judged() -> None:
+    data, load, own = matrices()
+    scene = own_matrices(*own)
+    x, lam = solve_by_nnls(data, load)
+    right, wrong = judge(scene, x, lam), judge(scene, x + 1e-6)
+    assert right.verdict == "within"
+    assert right.backward_error is not None
+    assert right.backward_error < 1e-14
+    assert wrong.verdict == "outside"
+    assert wrong.displacement_error_mm == pytest.approx(1e-6, rel=1e-5)
+    assert wrong.dual_residual is None
+    assert judge(scene, x + 1e-6, limit_mm=1e-5).verdict == "within"
+    with pytest.raises(InputError, match=r"judge: x = .*\(14,\)"):
+        judge(scene, x[:-1])
+
+
+@pytest.mark.parametrize("solver", modules())
+def test_a_solver_on_plain_arrays(solver: str) -> None:
+    Q, p, lam = dual()
+    found = solve_dual(Q, p, solver, tolerance=1e-11)
+    np.testing.assert_allclose(found.lam, lam, atol=1e-5)
+    assert found.x is None
+
+
+def test_plain_arrays_are_copied_and_checked() -> None:
+    Q, p, _ = dual()
+    before = Q.copy(), p.copy()
+    solve_dual(Q, p)
+    assert Q.flags.writeable
+    assert p.flags.writeable
+    np.testing.assert_array_equal(Q, before[0])
+    np.testing.assert_array_equal(p, before[1])
+    for bad, said in (
+        ((Q[:-1], p), "a square matrix"),
+        ((Q, p[:-1]), r"shape \(8,\)"),
+        ((Q + np.triu(np.ones_like(Q), 1), p), "symmetric"),
+        ((-Q, p), "positive definite"),
+        ((Q * np.nan, p), "finite"),
+    ):
+        with pytest.raises(InputError, match=said):
+            solve_dual(*bad)
+    with pytest.raises(InputError, match="did you mean 'newton'"):
+        solve_dual(Q, p, "newtom")
+
+
+class Idle(Solver):
+    """Gives λ = 0."""
+
+    def __init__(self, lam: Any = None, status: Any = "solved") -> None:
+        self.lam, self.status = lam, status
+
+    forms = ("dual",)
+
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        return Answer(self.status, self.lam if self.lam is not None else 0 * load.p)
+
+
+def test_a_solver_object_is_judged_and_its_nonsense_named() -> None:
+    scene = own_matrices(*matrices()[2])
+    idle = solve(scene, Idle())
+    assert (idle.status, idle.judgement.verdict) == ("solved", "outside")
+    assert idle.error_bound_mm > 0.01
+    with pytest.raises(InputError, match=r"solver Idle: answer = 'lam has shape \(1,\)"):
+        solve(scene, Idle(np.zeros(1)))
+    with pytest.raises(InputError, match="has its options already"):
+        solve(scene, Idle(), options={"lam": None})
+
+
+def test_without_contact_no_solver_is_called() -> None:
+    K, A, f, g = matrices()[2]
+    found = solve(own_matrices(K, A, f * 1e-9, g + 1.0), Idle(status="nonsense"))
+    assert found.judgement.verdict == "within"
+    assert not found.lam.any()
+
+
+@pytest.mark.parametrize(("change", "said"), [(0, r"max\|K − Kᵀ\|"), (2, "f.shape"), (3, "NaN")])
+def test_bad_matrices_are_refused(change: int, said: str) -> None:
+    own = [np.array(a.toarray() if sp.issparse(a) else a) for a in matrices()[2]]
+    own[change] = {0: own[0] + np.triu(own[0]), 2: own[2][:-1], 3: own[3] * np.nan}[change]
+    with pytest.raises(InputError, match=said):
+        own_matrices(*own)
+
+
+@pytest.mark.parametrize("solver", ["newton", "gi"])
+def test_a_series_of_own_load_cases(solver: str) -> None:
+    data, _, own = matrices()
+    loads = [make_load(seed, data)[0] for seed in range(4)]
+    found = list(solve_series(own_matrices(*own), loads, solver, check=2))
+    assert [result.row["case"] for result in found] == [0, 1, 2, 3]
+    for load, result in zip(loads, found, strict=True):
+        x, _ = solve_by_nnls(data, load)
+        assert result.row["verdict"] == "within"
+        assert ("displacement_error_mm" in result.row) == (result.row["case"] % 2 == 0)
+        np.testing.assert_allclose(result.gap, load.g - data.assembly.A.T @ x, atol=1e-6)
+    with pytest.raises(InputError, match="case 1: g"):
+        solve_series(own_matrices(*own), [loads[0], LoadCase(loads[1].f, loads[1].g[1:])])
+
+
+def test_a_series_of_random_gaps_by_an_object() -> None:
+    scene = load_scene(tomllib.loads(STRIP))
+    cases = random_gaps(scene, 3, seed=5)
+    named, own = (
+        list(solve_series(scene, cases, solver)) for solver in ("newton", api.make_solver("newton", {}))
+    )
+    for one, two in zip(named, own, strict=True):
+        np.testing.assert_array_equal(one.gap, two.gap)
+        assert one.row["gap_seed"] == two.row["gap_seed"]
+    first = cases.load(0)
+    assert prepared(scene).assembly.m == len(first.g)
+    np.testing.assert_array_equal(first.f, load_case(scene).f)

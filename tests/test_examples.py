@@ -1,0 +1,43 @@
+"""Each example prints the number that it is expected to; the solver template is a solver."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+from harness.conformance.check import run
+from solvers.base import Solver
+from solvers.plugin import load_plugin
+from solvers.registry import modules
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+TEMPLATE = EXAMPLES / "my_solver.py"
+PRINTED = {
+    "fista": 48.585408,
+    "judge_an_answer": 1.820476e-05,
+    "own_matrices": 0.914625,
+    "scene_in_python": 229.700842,
+    "series_of_gaps": 0.138673,
+}
+
+
+def test_every_example_is_tested() -> None:
+    assert sorted(path.stem for path in EXAMPLES.glob("*.py")) == sorted([*PRINTED, TEMPLATE.stem])
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_an_example_prints_its_number(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    (line,) = capsys.readouterr().out.splitlines()
+    assert float(line) == pytest.approx(PRINTED[name], rel=2e-6)
+
+
+def test_the_template_has_every_step_and_no_faults() -> None:
+    template = load_plugin(TEMPLATE)
+    own = {name for name in vars(Solver) if not name.startswith("_")}
+    assert own <= set(vars(template))
+    assert all(getattr(template, name).__doc__ for name in own - {"forms", "distribution"})
+    assert run(template) == []
+    assert "my-solver" not in modules()
