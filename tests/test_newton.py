@@ -8,9 +8,10 @@ import scipy.linalg as sla
 from scipy.optimize import nnls
 from small import make_load, make_prepared, solve_by_nnls
 
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.manufactured.ladder import make_rung
 from solvers.active_set.block_pivoting import MAX_STALE_PASSES, block_pivoting
 from solvers.active_set.bordered_factor import BorderedFactor
 from solvers.active_set.contact_sets import ContactSets, trial_of
@@ -174,3 +175,31 @@ def test_the_limit_on_sets_is_kept_and_reported() -> None:
     answer = solved(prepared, load, nested=False, max_sets=1)
     assert (answer.status, answer.iterations) == ("iteration_limit", 1)
     assert (answer.lam >= 0).all()
+
+
+@pytest.mark.parametrize("batched", [False, True])
+def test_sets_that_make_no_progress_give_way_to_an_interior_point(
+    batched: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With no stale pass allowed, Fathi's problem in random order is beyond the sets alone."""
+    for name, value in (("block_pivoting.MAX_STALE_PASSES", 0), ("block_pivoting.MAX_SINGLE_EXCHANGES", 0)):
+        monkeypatch.setattr(f"solvers.active_set.{name}", value)
+    monkeypatch.setattr("solvers.methods.newton.MAX_SINGLE_EXCHANGES", 0)
+    made = make_rung("hard/pivoting/fathi-064").made
+    assert made is not None
+    order = np.random.default_rng(5).permutation(64)
+    K = np.asfortranarray(made.assembly.blocks[0][np.ix_(order, order)])
+    problem = in_form(Prepared(Assembly((K,), made.assembly.A)), "dual")
+    (load,) = problem.loads([made.load])
+    solver = ActiveSetNewton(nested=False)
+    state = solver.prepare(problem)
+    if batched:
+        batch = solver.batched(state)
+        assert batch is not None
+        batch.use_sweeps = False
+        (answer,) = batch([load], 1e-10)
+    else:
+        answer = solver.solve(state, load, 1e-10)
+    assert answer.status == "solved"
+    assert answer.details["interior_point"]
+    assert np.flatnonzero(answer.lam).tolist() == [int(np.flatnonzero(order == 0)[0])]

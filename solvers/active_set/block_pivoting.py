@@ -17,6 +17,7 @@ from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
 MAX_STALE_PASSES = 50  # passes without a new smallest count of wrong signs, before single exchanges
+MAX_SINGLE_EXCHANGES = 100  # of these without one, before it gives up: there may be exponentially many
 ROUNDING_FACTOR = 10.0  # times the observed rounding: a value closer to zero has no wrong sign
 
 
@@ -46,14 +47,15 @@ def block_pivoting(
     contacts, as long as a force is negative, and closes contacts once none is (as Hungerländer and Rendl 2015
     reach a feasible point): this stops the oscillation that a few forces on a stiff part cause. After fifty
     such passes only the last wrong index is exchanged, until there is a new smallest count: finite for Q
-    positive definite, in exact arithmetic (Júdice and Pires 1994).
+    positive definite, in exact arithmetic (Júdice and Pires 1994), but exponential at worst, so that a
+    hundred without one end it: `single_exchanges` then are at least as many, and it has not converged.
     """
     fewest, stale, single_exchanges = len(C) + 1, 0, 0
     for k in range(1, passes + 1):
         trial = at(C)
         wrong = wrong_signs(C, trial, compliance, tolerance)
         count = int(wrong.sum())
-        if not count or k == passes:
+        if not count or k == passes or stale > MAX_STALE_PASSES + MAX_SINGLE_EXCHANGES:
             break
         fewest, stale = (count, 0) if count < fewest else (fewest, stale + 1)
         if stale > MAX_STALE_PASSES:

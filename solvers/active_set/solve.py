@@ -62,6 +62,6 @@ def _settled(C: Set, sets: ContactSets, threshold: float, tolerance: float, max_
         passes, single_exchanges = passes + found.passes, single_exchanges + found.single_exchanges
         trial = sets.refined(found.C, found.trial, RESIDUAL_TARGET * tolerance)
         wrong = wrong_signs(found.C, trial, sets.compliance, threshold)
-        if not wrong.any() or passes == max_sets:
+        if not wrong.any() or passes == max_sets or not found.converged:
             return _Settled(found.C, trial, passes, single_exchanges, not wrong.any())
         C = found.C ^ wrong

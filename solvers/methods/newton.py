@@ -19,12 +19,13 @@ import numpy as np
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.batched import BatchedSweeps
-from solvers.active_set.block_pivoting import block_pivoting
+from solvers.active_set.block_pivoting import MAX_SINGLE_EXCHANGES, block_pivoting
 from solvers.active_set.bordered_factor import Set
 from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.nested import Cells, cells_of, representatives
 from solvers.active_set.solve import solve_from
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.interior_point.identify import identified_set
 from solvers.linear_algebra.banded_inverse import banded_inverse
 from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
@@ -95,7 +96,8 @@ class ActiveSetNewton(Solver):
         def alone(C: Set | None, p: Vector, tolerance: float) -> Answer:
             if C is None:
                 C, _ = _first_guess(state, p, tolerance)
-            return solve_from(C, ContactSets(Q, p, inverse), tolerance, self.max_sets)
+            sets = ContactSets(Q, p, inverse)
+            return self._settled(solve_from(C, sets, tolerance, self.max_sets), sets, tolerance)
 
         return BatchedSweeps(Q, banded_inverse(Q, nodes), alone)
 
@@ -105,10 +107,20 @@ class ActiveSetNewton(Solver):
         try:
             C, coarse = _first_guess(ready, load.p, tolerance)
             sets = ContactSets(ready.problem.Q, load.p, ready.inverse)
-            answer = solve_from(C, sets, tolerance, self.max_sets)
+            answer = self._settled(solve_from(C, sets, tolerance, self.max_sets), sets, tolerance)
         except np.linalg.LinAlgError as error:
             return failed(str(error))
         return replace(answer, inner_iterations=coarse)
+
+    def _settled(self, answer: Answer, sets: ContactSets, tolerance: float) -> Answer:
+        """The answer; if its sets made no progress, from the set that an interior point identifies."""
+        if answer.status == "solved" or answer.details["single_exchanges"] < MAX_SINGLE_EXCHANGES:
+            return answer
+        again = solve_from(identified_set(sets.Q, sets.p), sets, tolerance, self.max_sets)
+        if again.details["kkt_residual_mm"] > answer.details["kkt_residual_mm"]:
+            return answer
+        tried = (answer.iterations or 0) + (again.iterations or 0)
+        return replace(again, iterations=tried, details=again.details | {"interior_point": True})
 
 
 def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
