@@ -3,7 +3,7 @@
 K, A and Q are the joint's, g is the load case's: the mean plus a Gaussian random field. `newton` is prepared
 once and solves 64 cases at a time; each answer comes with a proven bound on its error.
 
-Prints the mean over the cases of the largest gap that is left, mm.
+Prints the mean over the cases of the largest remaining gap, mm.
 """
 
 import numpy as np

@@ -15,7 +15,7 @@ InputError. Matrices are cached as by the command line.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -66,6 +66,7 @@ __all__ = [
     "solve_series",
 ]
 
+NOT_FINITE = "NaN or infinity"
 Source = Scene | str | Path | Mapping[str, Any]
 
 
@@ -74,7 +75,7 @@ class Solution:
     """An answer to a scene.
 
     x : (n,) displacements, mm. lam : (m,) contact forces, N; NaN if the solver gives none.
-    gap : (m,) the gaps that are left, g − Aᵀx, mm.
+    gap : (m,) the remaining gaps, g − Aᵀx, mm.
     status, iterations : what the solver said; the reference has no iterations.
     judgement : what the judge found. error_bound_mm : proven, max|x − x*| for the exact answer x*.
     """
@@ -107,8 +108,9 @@ def own_matrices(
     K : (n, n) symmetric positive definite, N/mm. A : (n, m), column j the normal of contact j.
     f : (n,) N. g : (m,) mm. nodes : (n, 2) mm, which `newton` uses to number the contacts.
     """
-    given = {"K": K, "A": A, "f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
-    arrays = {name: value if sp.issparse(value) else np.asarray(value) for name, value in given.items()}
+    given = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
+    arrays = {name: M if sp.issparse(M) else np.asarray(M) for name, M in (("K", K), ("A", A))}
+    arrays |= {name: np.array(value) for name, value in given.items()}
     assembly, load = checked(arrays, dict.fromkeys(arrays, title))
     return MadeScene(title, title, ManufacturedProblem(assembly, load))
 
@@ -140,7 +142,8 @@ def solve(
     x = np.asarray(answer.x, dtype=float)
     lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
     judgement = referee.judge(data, load, known, x, lam, LIMIT_MM)
-    bound = (judgement.displacement_error_mm or 0.0) + known.bound_mm
+    error = judgement.displacement_error_mm
+    bound = np.inf if error is None else error + known.bound_mm
     gap = load.g - data.assembly.A.T @ x
     return Solution(x, lam, gap, answer.status, answer.iterations, judgement, bound)
 
@@ -168,8 +171,10 @@ def solve_dual(
     Q : (m, m) symmetric positive definite. p : (m,). Units: mm/N and mm, or any others that fit.
     """
     Q = np.array(Q, dtype=float, order="F")
-    if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all():
-        raise InputError.one("solve_dual", "Q", f"shape {Q.shape}", "a square matrix of finite numbers")
+    if Q.ndim != 2 or Q.shape[0] != Q.shape[1]:
+        raise InputError.one("solve_dual", "Q.shape", Q.shape, "must be a square matrix")
+    if not np.isfinite(Q).all():
+        raise InputError.one("solve_dual", "Q", NOT_FINITE, "every entry must be finite")
     p = _vector("solve_dual", "p", p, len(Q))
     if abs(Q - Q.T).max(initial=0) > SYMMETRY * abs(Q).max(initial=0):
         raise InputError.one("solve_dual", "Q", "asymmetric", "must be symmetric")
@@ -184,7 +189,7 @@ def solve_dual(
 
 def solve_series(
     scene: Source,
-    cases: LoadCases | Sequence[LoadCase],
+    cases: LoadCases | Iterable[LoadCase],
     solver: str | Solver = "newton",
     *,
     options: Mapping[str, Any] | None = None,
@@ -193,20 +198,21 @@ def solve_series(
     limit_mm: float = LIMIT_MM,
     check: int = 0,
 ) -> Iterator[Result]:
-    """Solve load cases on one assembly, each from the nearest answer or many at a time, as the solver can.
+    """Solve load cases on one assembly: in blocks if the solver can, else each from the nearest answer.
 
-    cases : a list of LoadCase(f, g), or made by `random_gaps` or another file of problems/load_cases.
+    cases : made by `random_gaps` or another file of problems/load_cases; or each a LoadCase(f, g), best with
+        the same array f if the forces are the same.
     check : every so many cases are compared with the certified reference; 0: none.
     Yields for each case, in order, its `row` (status, iterations, seconds, residuals, the proven bound_mm,
-    verdict) and the `gap` that is left, (m,) mm in float32; None where there is no answer.
+    verdict) and the remaining `gap`, (m,) mm in float32; None without an answer.
     """
     scene = load_scene(scene)
     assembly = prepared(scene).assembly
     if not isinstance(cases, LoadCases):
-        cases = Listed(tuple(cases))
-        for k, case in enumerate(cases.cases):
-            _vector(f"case {k}", "f", case.f, assembly.n)
-            _vector(f"case {k}", "g", case.g, assembly.m)
+        given = list(cases)
+        f = {id(case.f): _vector(f"case {k}", "f", case.f, assembly.n) for k, case in enumerate(given)}
+        g = [_vector(f"case {k}", "g", case.g, assembly.m) for k, case in enumerate(given)]
+        cases = Listed(tuple(LoadCase(f[id(case.f)], mine) for case, mine in zip(given, g, strict=True)))
     name, chosen = _solver(solver, options)
     taken = form_of(name, chosen.forms, form)
     job = Job(
@@ -226,9 +232,11 @@ def _solver(solver: str | Solver, options: Mapping[str, Any] | None) -> tuple[st
 
 def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:
     try:
-        vector = np.asarray(value, dtype=float)
+        vector = np.array(value, dtype=float)  # a copy, which a form may make read-only
     except (TypeError, ValueError) as error:
         raise InputError.one(where, name, value, "must be numbers") from error
-    if vector.shape != (size,) or not np.isfinite(vector).all():
-        raise InputError.one(where, name, f"shape {vector.shape}", f"finite numbers of shape ({size},)")
+    if vector.shape != (size,):
+        raise InputError.one(where, f"{name}.shape", vector.shape, f"must be ({size},)")
+    if not np.isfinite(vector).all():
+        raise InputError.one(where, name, NOT_FINITE, "every entry must be finite")
     return vector
