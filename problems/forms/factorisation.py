@@ -51,9 +51,9 @@ def schur(assembly: Assembly, factors: tuple[Matrix, ...]) -> Matrix:
 
 
 def dependent_column(Q: Matrix) -> int | None:
-    """The first column of A that depends on those before it; None where A has full rank.
+    """The first column of A that depends on those before it; None if A has full rank.
 
-    A pivot of Q over its diagonal entry is what sets a column apart from the others.
+    The pivot of Q relative to its diagonal entry measures the independence of a column.
     """
     U, info = lapack.dpotrf(Q)
     if info:

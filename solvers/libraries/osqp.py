@@ -25,8 +25,8 @@ POLISH = {0: "not tried", 1: "accepted", 2: "nothing active", -1: "rejected", -2
 
 
 class Osqp(Solver):
-    """polishing : solve once more on the guessed active set. OSQP may accept the outcome outside the
-    tolerance and still say solved (its issue 790): by its own residuals that is inaccurate, and so called.
+    """polishing : solve again on the estimated active set. OSQP may accept a result outside the tolerance and
+    still report solved (its issue 790); if its own residuals exceed the tolerance, the status is inaccurate.
     """
 
     def __init__(self, *, polishing: bool = False) -> None:

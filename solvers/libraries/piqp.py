@@ -1,7 +1,7 @@
 """PIQP: a proximal interior-point method, https://predict-epfl.github.io/piqp.
 
 Stops when the unscaled ∞-norms of both residuals and the duality gap are below the tolerance; its
-relative tests, either of which would do, are off. The dual form passes λ ≥ 0 as bounds, not as rows.
+relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as bounds, not as rows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STATUS: dict[Any, Status] = {
 
 class Piqp(Solver):
     """backend : "dense" or "sparse" Cholesky. K consists of dense blocks, so dense is several times
-    faster in both forms (seen from n = 594 to 4386); sparse takes less memory in the primal form.
+    faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal form.
     """
 
     def __init__(self, *, backend: str = "dense") -> None:

@@ -24,7 +24,7 @@ STATUS: dict[Any, Status] = {
     proxqp.QPSolverOutput.PROXQP_SOLVED_CLOSEST_PRIMAL_FEASIBLE: "inaccurate",
     proxqp.QPSolverOutput.PROXQP_MAX_ITER_REACHED: "iteration_limit",
 }
-INFINITY = 1e20  # what ProxQP takes for no bound
+INFINITY = 1e20  # ProxQP's value for no bound
 
 
 class ProxQp(Solver):
@@ -61,8 +61,8 @@ class ProxQp(Solver):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """QP.update, with the preconditioner kept, and a warm start.
 
-        It cannot be given the multipliers of box constraints, so that a problem with bounds starts from the
-        case before, whichever is nearest.
+        The multipliers of box constraints cannot be passed, so a problem with bounds starts from the case
+        before, even if another is nearer.
         """
         _, library, _ = ready
         h = state.h(load)
