@@ -17,9 +17,9 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.assembly import Matrix, Vector
 
-from .base import Answer, Problem, Status, WarmStart
+from .base import Answer, Problem, Status
 
 
 @dataclass(frozen=True)
@@ -29,23 +29,6 @@ class Converted:
     problem: Problem
     P: Any
     G: Any = None
-
-    @property
-    def bounded(self) -> bool:
-        """Whether z ≥ 0 replaces the rows Gz ≤ h."""
-        return self.problem.bounded
-
-    def q(self, load: LoadCase) -> Vector:
-        """The linear term: −f in N (primal) or −p in mm (dual)."""
-        return self.problem.q(load)
-
-    def h(self, load: LoadCase) -> Vector | None:
-        """The right-hand side of the rows, g in mm; None if bounds replace them."""
-        return self.problem.h(load)
-
-    def start(self, start: WarmStart) -> tuple[Vector | None, Vector]:
-        """(z, multipliers) of a warm start."""
-        return self.problem.start(start.lam, start.gap, start.x)
 
     def answer(
         self, status: Status, tolerance: float, z: Vector, multipliers: Vector | None, **facts: Any

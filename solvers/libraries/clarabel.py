@@ -47,18 +47,18 @@ class Clarabel(Solver):
         settings.tol_feas = tolerance
         settings.tol_gap_abs = tolerance
         settings.tol_gap_rel = 0.0
-        if state.bounded:
+        if state.problem.bounded:
             settings.equilibrate_enable = False
             settings.static_regularization_constant = 1e-12
-        h = state.h(load)
+        h = state.problem.h(load)
         h = np.zeros(state.G.shape[0]) if h is None else h
         cones = [clarabel.NonnegativeConeT(len(h))]
-        return state, clarabel.DefaultSolver(state.P, state.q(load), state.G, h, cones, settings)
+        return state, clarabel.DefaultSolver(state.P, state.problem.q(load), state.G, h, cones, settings)
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """Clarabel's update of the vectors, with the equilibration kept; it has no warm start."""
-        h = state.h(load)
-        ready[1].update(q=state.q(load), **({} if h is None else {"b": h}))
+        h = state.problem.h(load)
+        ready[1].update(q=state.problem.q(load), **({} if h is None else {"b": h}))
         return ready
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:

@@ -55,7 +55,7 @@ class QpSolvers(Solver):
         return Converted(problem, sp.csc_matrix(P), None if G is None else sp.csc_matrix(G))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        q, h = state.q(load), state.h(load)
+        q, h = state.problem.q(load), state.problem.h(load)
         limits = {"lb": np.zeros_like(q)} if h is None else {"G": state.G, "h": np.array(h)}
         return state, qpsolvers.Problem(state.P, q, **limits)
 
@@ -68,7 +68,7 @@ class QpSolvers(Solver):
             solution = qpsolvers.solve_problem(problem, self.name, **settings)
         except QPError as error:
             return Answer("failed", None, details={**details, "message": str(error)})
-        if solution.x is None or (not state.bounded and (solution.z is None or not solution.z.size)):
+        if solution.x is None or (not state.problem.bounded and (solution.z is None or not solution.z.size)):
             return Answer("failed", None, details=details)
         iterations = solution.extras.get("iterations", solution.extras.get("iter"))
         if isinstance(iterations, np.ndarray):  # quadprog: constraints added, constraints dropped

@@ -7,6 +7,7 @@ V = U + √D (eq. 15), from the start of Algorithm 5. Each option changes one in
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
@@ -39,6 +40,7 @@ class _Ready:
     units: Vector
 
 
+@dataclass(kw_only=True, frozen=True, eq=False)
 class Ipm(Solver):
     """Primal–dual interior point.
 
@@ -71,57 +73,52 @@ class Ipm(Solver):
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
 
-    def __init__(
-        self,
-        *,
-        start: StartName = "algorithm_5",
-        scheme: str = "algorithm_3",
-        preconditioner: str = "V",
-        ordering: Ordering = "lexicographic",
-        theta: float = 0.995,
-        sigma: float = 0.1,
-        rho: float = 0.1,
-        epsilon: float = 0.01,
-        cg_tolerance: float = 1e-3,
-        feasibility: float | None = None,
-        max_iterations: int = 200,
-        max_cg: float = np.inf,
-    ) -> None:
-        rules: list[tuple[str, Any, bool, str]] = [
-            ("start", start, start in get_args(StartName), f"one of {', '.join(get_args(StartName))}"),
-            ("scheme", scheme, scheme in SCHEMES, f"one of {', '.join(SCHEMES)}"),
-            ("preconditioner", preconditioner, preconditioner in SYSTEMS, f"one of {', '.join(SYSTEMS)}"),
-            ("ordering", ordering, ordering in get_args(Ordering), f"one of {', '.join(get_args(Ordering))}"),
-            ("ordering", ordering, ordering != "open_last" or preconditioner == "V", "open_last is for V"),
-            ("theta", theta, 0 < theta < 1, "must lie in (0, 1)"),
-            ("sigma", sigma, 0 <= sigma <= 1, "must lie in [0, 1]"),
-            ("rho", rho, rho > 0, "must be positive"),
-            ("epsilon", epsilon, epsilon > 0, "must be positive, mm"),
-            ("cg_tolerance", cg_tolerance, 0 < cg_tolerance < 1, "must lie in (0, 1)"),
-            ("feasibility", feasibility, feasibility is None or feasibility > 0, "must be positive, mm"),
-            ("max_iterations", max_iterations, max_iterations >= 1, "must be at least 1"),
-            ("max_cg", max_cg, max_cg >= 1, "must be at least 1"),
+    start: StartName = "algorithm_5"
+    scheme: str = "algorithm_3"
+    preconditioner: str = "V"
+    ordering: Ordering = "lexicographic"
+    theta: float = 0.995
+    sigma: float = 0.1
+    rho: float = 0.1
+    epsilon: float = 0.01
+    cg_tolerance: float = 1e-3
+    feasibility: float | None = None
+    max_iterations: int = 200
+    max_cg: float = np.inf
+
+    def __post_init__(self) -> None:
+        choices: dict[str, Collection[str]] = {
+            "start": get_args(StartName),
+            "scheme": SCHEMES,
+            "preconditioner": SYSTEMS,
+            "ordering": get_args(Ordering),
+        }
+        rules = [
+            (key, getattr(self, key) in known, f"one of {', '.join(known)}") for key, known in choices.items()
         ]
-        faults = [Fault("ipm", key, value, allowed) for key, value, holds, allowed in rules if not holds]
+        rules += [
+            ("ordering", self.ordering != "open_last" or self.preconditioner == "V", "open_last is for V"),
+            ("theta", 0 < self.theta < 1, "must lie in (0, 1)"),
+            ("sigma", 0 <= self.sigma <= 1, "must lie in [0, 1]"),
+            ("rho", self.rho > 0, "must be positive"),
+            ("epsilon", self.epsilon > 0, "must be positive, mm"),
+            ("cg_tolerance", 0 < self.cg_tolerance < 1, "must lie in (0, 1)"),
+            ("feasibility", self.feasibility is None or self.feasibility > 0, "must be positive, mm"),
+            ("max_iterations", self.max_iterations >= 1, "must be at least 1"),
+            ("max_cg", self.max_cg >= 1, "must be at least 1"),
+        ]
+        faults = [
+            Fault("ipm", key, getattr(self, key), allowed) for key, holds, allowed in rules if not holds
+        ]
         if faults:
             raise InputError(faults)
-        self.start = start
-        self.scheme = SCHEMES[scheme]
-        self.make_system = OpenLast if ordering == "open_last" else SYSTEMS[preconditioner]
-        self.theta = theta
-        self.sigma = sigma
-        self.rho = rho
-        self.epsilon = epsilon
-        self.cg_tolerance = cg_tolerance
-        self.feasibility = feasibility
-        self.max_iterations = max_iterations
-        self.max_cg = max_cg
 
     def prepare(self, data: Problem) -> _Ready | Answer:
         """The factors of Q; a failed answer if Q is not positive definite."""
         units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
+        make_system = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
         try:
-            return _Ready(data, self.make_system(data.Q), units)
+            return _Ready(data, make_system(data.Q), units)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 
@@ -195,7 +192,7 @@ class Ipm(Solver):
                 why = f"{newton.unconverged} unconverged CG solves" if newton.unconverged else "rounding"
                 return "inaccurate", f"{why}: stalled at {smallest:.1e} × the required accuracy", point
             try:
-                following = self.scheme(newton, point)  # steps 5 to 7
+                following = SCHEMES[self.scheme](newton, point)  # steps 5 to 7
             except CgExhausted:
                 return "iteration_limit", f"max_cg = {self.max_cg:g} CG iterations reached", point
             except np.linalg.LinAlgError as error:
