@@ -2,7 +2,7 @@
 
 Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms), so an adapter does
 not depend on it. Relative tolerances are 0 if a library has them separately, and the absolute ones are the
-tolerance asked for, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the
+requested tolerance, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the
 duality gap.
 """
 

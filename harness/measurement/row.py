@@ -40,7 +40,7 @@ class Task:
 class TaskResult:
     """The measuring process's part of each row, and the seconds in all.
 
-    From a worker of a scheduler also the answer files (None where there is none), its machine and its code.
+    From a worker of a scheduler also the answer files (None if there is none), its machine and its code.
     """
 
     reports: list[Row]

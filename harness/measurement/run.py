@@ -42,8 +42,8 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
     """Make the suite's measurements that DIRECTORY does not hold yet, here or on a scheduler's workers.
 
     Returns 0, 1 when a worker was lost too often, or 3 when no row of the suite could be judged. Raises
-    InputError before the first measurement where the suite cannot be run; KeyboardInterrupt leaves a
-    directory that resumes.
+    InputError before the first measurement if the suite cannot be run; after KeyboardInterrupt the same
+    command resumes.
     """
     descriptions = describe(suite)
     suite = with_forms(suite, descriptions)

@@ -2,8 +2,8 @@
 
     min ½zᵀPz + qᵀz   subject to   Gz ≤ h,   z ≥ 0 if the form is bounded
 
-P and G belong to the assembly, q and h to a load case. From the solution z and the multipliers of Gz ≤ h come
-the contact forces λ and the displacements x, in every form the same.
+P and G belong to the assembly, q and h to a load case. The solution z and the multipliers of Gz ≤ h give the
+contact forces λ and the displacements x, the same in every form.
 """
 
 from __future__ import annotations
