@@ -1,4 +1,4 @@
-"""From a scene to matrices and loads. Each stage is made when it is first asked for, and kept in the cache:
+"""From a scene to matrices and loads. Each stage is computed when first needed, and cached:
 
 scene → condensed parts → springs between them → Assembly (K, A) → factors of K → Q
 scene → LoadCase (f, g), loads beyond the junction condensed
@@ -25,15 +25,15 @@ from problems.storage.fingerprint import fingerprint
 
 
 def prepared(scene: Scene, progress: Progress = lambda text, fraction: None) -> Stored:
-    """K and A of a scene, memory-mapped from the cache or made now; factors and Q when they are asked for.
+    """K and A of a scene, memory-mapped from the cache or computed now; factors and Q when first needed.
 
-    Raises InputError where a part can move freely, or a user's matrices cannot be used.
+    Raises InputError if a part can move freely, or if a user's matrices are invalid.
     """
     match scene:
         case JointScene():
             return _condensed(scene, progress)
         case MatricesScene():
-            (arrays, facts), key = _own_matrices(scene)
+            (arrays, facts), key = _user_matrices(scene)
             columns = tuple(arrays[f"A_{name}"] for name in ("data", "indices", "indptr"))
             A = sp.csc_array(columns, shape=facts["shape"])
             blocks = tuple(arrays[f"K{k}"] for k in range(len(facts["parts"])))
@@ -46,7 +46,7 @@ def prepared(scene: Scene, progress: Progress = lambda text, fraction: None) -> 
 
 
 def built(scene: JointScene) -> bool:
-    """Whether every matrix of a scene is in the cache; nothing is made."""
+    """Whether every matrix of a scene is in the cache; computes nothing."""
     parts = [part_key(scene.joint, part, scene.stiffness_effects) for part in scene.joint.part]
     tied = [_springs(scene, cache.digest(parts))[2]] if any(scene.effects_of(TieEffect)) else []
     return None not in map(cache.load, [*parts, *tied]) and prepared(scene).built
@@ -56,9 +56,9 @@ def load_case(scene: Scene) -> LoadCase:
     """f and g of a scene: the sum of its effects' terms, or the user's own."""
     match scene:
         case JointScene():
-            return _summed(scene)
+            return _load_of_effects(scene)
         case MatricesScene():
-            (arrays, _), _ = _own_matrices(scene)
+            (arrays, _), _ = _user_matrices(scene)
             return LoadCase(np.array(arrays["f"]), np.array(arrays["g"]))
         case MadeScene():
             return scene.made.load
@@ -86,8 +86,8 @@ def _condensed(scene: JointScene, progress: Progress) -> Stored:
 def _tied(
     scene: JointScene, untied: Assembly, untied_key: str, progress: Progress
 ) -> tuple[Assembly, str, float]:
-    """The assembly with the scene's springs between parts, what its K is known by, and the seconds."""
-    from problems.condensation import springs  # not without springs
+    """The assembly with the scene's springs between parts, the key of its K, and the seconds."""
+    from problems.condensation import springs  # imported only for springs
 
     T, k, key = _springs(scene, untied_key)
 
@@ -105,7 +105,7 @@ def _tied(
 
 
 def _springs(scene: JointScene, untied_key: str) -> tuple[sp.csc_array, Vector, str]:
-    """Directions T (n, r) and stiffnesses k (r,) of the springs, and what K with them is known by."""
+    """Directions T (n, r) and stiffnesses k (r,) of the springs, and the key of K with them."""
     from problems.condensation import springs
 
     pairs = [effect.springs(scene.joint) for effect in scene.effects_of(TieEffect)]
@@ -115,8 +115,8 @@ def _springs(scene: JointScene, untied_key: str) -> tuple[sp.csc_array, Vector, 
     return T, k, cache.digest("springs", untied_key, T.indices.tolist(), T.data.tolist(), k.tolist(), code)
 
 
-def _own_matrices(scene: MatricesScene) -> tuple[cache.Entry, str]:
-    """A user's own K, A, f, g, read and checked once, and what they are known by."""
+def _user_matrices(scene: MatricesScene) -> tuple[cache.Entry, str]:
+    """A user's K, A, f, g, read and checked once, and their key."""
     key = cache.digest("own", scene.assembly_key, fingerprint([Path(user_matrices.__file__)]))
 
     def made() -> cache.Entry:
@@ -133,7 +133,7 @@ def _own_matrices(scene: MatricesScene) -> tuple[cache.Entry, str]:
     return cache.load_or_make(key, made), key
 
 
-def _summed(scene: JointScene) -> LoadCase:
+def _load_of_effects(scene: JointScene) -> LoadCase:
     joint = scene.joint
     n, m = joint.size
     f, g = np.zeros(n), np.zeros(m)
@@ -142,8 +142,8 @@ def _summed(scene: JointScene) -> LoadCase:
             f += effect.force(joint)
         elif isinstance(effect, GapEffect):
             g += effect.gap(joint)
-    for beyond in scene.effects_of(PartLoadEffect):
-        from problems.condensation.condensed_load import condensed_load  # not without such loads
+    for effect in scene.effects_of(PartLoadEffect):
+        from problems.condensation.condensed_load import condensed_load  # imported only for such loads
 
-        f[joint.unknowns(beyond.part)] += condensed_load(beyond, joint, scene.stiffness_effects)
+        f[joint.unknowns(effect.part)] += condensed_load(effect, joint, scene.stiffness_effects)
     return LoadCase(f, g)

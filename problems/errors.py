@@ -1,4 +1,4 @@
-"""Errors that a person can act on: each names the file, the key, the value and what is allowed."""
+"""Errors that users can correct: each names the file, the key, the value and what is allowed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Fault:
-    """One wrong thing. where: file or argument; key: the entry in it; allowed: what would be right."""
+    """One error in an input. where : file or argument. key : the entry in it. allowed : valid values."""
 
     where: str
     key: str
@@ -22,7 +22,7 @@ class Fault:
 
 
 class InputError(ValueError):
-    """Everything that is wrong with an input, in one go."""
+    """All errors in an input, together."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.faults = list(faults)

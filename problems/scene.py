@@ -1,4 +1,4 @@
-"""A scene: which joint, and the effects that it calls for. Read from a TOML file and checked whole.
+"""Reads scenes, a joint with the effects to include, from TOML files; reports all errors at once.
 
     title = "…"
     assembly = "wing-fragment-4386"       # a file in problems/assemblies, or a path; or [joint] here
@@ -30,9 +30,9 @@ from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 
 from .errors import Fault, InputError
 
-HERE = Path(__file__).resolve().parent
-SCENES = HERE / "scenes"
-ASSEMBLIES = HERE / "assemblies"
+FOLDER = Path(__file__).resolve().parent
+SCENES = FOLDER / "scenes"
+ASSEMBLIES = FOLDER / "assemblies"
 KEYS = ("title", "assembly", "joint", "effect", "matrices")
 TOML_MIB = 10
 MATRIX_KEYS = ("problem", "K", "A", "f", "g")
@@ -59,9 +59,9 @@ def read_scene(name_or_path: str) -> Scene:
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
-            raise _no_such(name_or_path, scene_names())
-    own = not path.resolve().is_relative_to(SCENES)
-    name = path.stem if own else path.resolve().relative_to(SCENES).with_suffix("").as_posix()
+            raise _unknown_scene(name_or_path, scene_names())
+    is_users = not path.resolve().is_relative_to(SCENES)
+    name = path.stem if is_users else path.resolve().relative_to(SCENES).with_suffix("").as_posix()
     return _scene(name, path, read_toml(path))
 
 
@@ -87,7 +87,7 @@ def _as_toml(value: Any) -> Any:
 
 def _rung_scene(name: str) -> Scene:
     if name not in rung_names():
-        raise _no_such(name, rung_names())
+        raise _unknown_scene(name, rung_names())
     rung = make_rung(name)
     if rung.made:
         return MadeScene(name, rung.title, rung.made, on_ladder=True, refused=rung.refused)
@@ -95,9 +95,9 @@ def _rung_scene(name: str) -> Scene:
     return JointScene(name, rung.title, rung.joint, rung.effects, on_ladder=True, refused=rung.refused)
 
 
-def _no_such(name: str, known: list[str]) -> InputError:
+def _unknown_scene(name: str, known: list[str]) -> InputError:
     near = get_close_matches(name, known, 3, 0.4) or known[:5]
-    allowed = f"no such scene; near it: {', '.join(near)}; the path of a scene ends in .toml or .npz"
+    allowed = f"no such scene; similar: {', '.join(near)}; the path of a scene ends in .toml or .npz"
     return InputError.one("scene", "name", name, allowed)
 
 
@@ -140,7 +140,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
 
 
 def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple[Path, dict[str, Any]]:
-    """The table of the joint, and the file that it stands in; empty where there is none."""
+    """The table of the joint and its file; empty if there is none."""
     table = data.pop("joint", None)
     if "assembly" in data:
         if table is not None:
@@ -161,7 +161,7 @@ def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple
 def _joint(
     path: Path, table: dict[str, Any], effects: tuple[Effect, ...], faults: list[Fault]
 ) -> Joint | None:
-    """The joint with the contacts that effects bring; None if its table is wrong."""
+    """The joint with the contacts that effects add; None if its table is wrong."""
     if not table:
         return None
     try:
@@ -174,7 +174,7 @@ def _joint(
 
 
 def _with_contacts(joint: Joint, effects: tuple[Effect, ...]) -> Joint:
-    """The joint with the contacts that effects bring."""
+    """The joint with the contacts that effects add."""
     new: list[Pair] = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
     return joint.model_copy(update={"contacts": (*joint.pairs, *dict.fromkeys(new))}) if new else joint
 

@@ -1,8 +1,8 @@
-"""What the adapters of the libraries share: a quadratic program in a library's format, options, the answer.
+"""Shared by the adapters of libraries: a quadratic program in a library's format, options, the answer.
 
-Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms); an adapter never
-asks which form it is. Relative tolerances are 0 where a library has them apart, and the absolute ones are the
-tolerance asked for, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the
+Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms), so an adapter does
+not depend on it. Relative tolerances are 0 if a library has them separately, and the absolute ones are the
+requested tolerance, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the
 duality gap.
 """
 
@@ -17,35 +17,18 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.assembly import Matrix, Vector
 
-from .base import Answer, Problem, Status, WarmStart
+from .base import Answer, Problem, Status
 
 
 @dataclass(frozen=True)
 class Converted:
-    """P and G in a library's format; G is None where z ≥ 0 are bounds of the library's own kind."""
+    """P and G in a library's format; G is None if z ≥ 0 are passed as the library's bounds."""
 
     problem: Problem
     P: Any
     G: Any = None
-
-    @property
-    def bounded(self) -> bool:
-        """Whether z ≥ 0 replaces the rows Gz ≤ h."""
-        return self.problem.bounded
-
-    def q(self, load: LoadCase) -> Vector:
-        """The linear term: −f in N (primal) or −p in mm (dual)."""
-        return self.problem.q(load)
-
-    def h(self, load: LoadCase) -> Vector | None:
-        """The right-hand side of the rows, g in mm; None where there are bounds."""
-        return self.problem.h(load)
-
-    def start(self, start: WarmStart) -> tuple[Vector | None, Vector]:
-        """(z, multipliers) of a warm start."""
-        return self.problem.start(start.lam, start.gap, start.x)
 
     def answer(
         self, status: Status, tolerance: float, z: Vector, multipliers: Vector | None, **facts: Any
@@ -56,9 +39,9 @@ class Converted:
 
 
 def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = None, **facts: Any) -> Answer:
-    """An Answer with λ in [−tolerance, 0) set to 0, which the library's own test allows.
+    """An Answer with λ in [−tolerance, 0), which the library's own test allows, set to 0.
 
-    A larger negative stays for the judge to see. With values that are not finite there is no answer.
+    Larger negative values are kept, and the judge sees them. Values that are not finite are no answer.
     """
     lam = np.array(lam, dtype=float)
     if not np.isfinite(lam).all() or (x is not None and not np.isfinite(x).all()):
@@ -73,7 +56,7 @@ def unknowns(problem: Problem) -> int:
 
 
 def rows_for_bounds(problem: Problem, sign: float) -> sp.csc_matrix:
-    """G, or ±I where a library takes the bounds z ≥ 0 as rows, CSC."""
+    """G, or ±I if a library takes the bounds z ≥ 0 as rows, CSC."""
     return sp.csc_matrix(sign * sp.eye(unknowns(problem)) if problem.G is None else problem.G)
 
 

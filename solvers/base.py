@@ -1,19 +1,19 @@
-"""What a solver is: up to five steps from the problem's data to an answer.
+"""The interface of a solver: up to five steps from the problem's data to an answer.
 
     convert(problem)             once per assembly    data into the library's own format
     prepare(data)                once per assembly    factorisations
     setup(state, load, tol)      once per load case   the library's own set-up
     solve(ready, load, tol)      once per load case   the answer
 
-In a series of load cases on one assembly the first is set up so, and each that follows by
+In a series of load cases on one assembly, all but the first are set up by
 
-    update(state, ready, load, tol, start)          instead of setup: the library's own way to the next
-                                                    load case, a warm start
+    update(state, ready, load, tol, start)          instead of setup: a warm start, or the library's own
+                                                    update of the data
 
-or, if a solver has `batched(state)`, several at a time by the function that it returns.
+or solved several at a time by the function that `batched(state)` returns, if a solver has it.
 
-Only `solve` must be written; each of the others passes on what it was given, and `update` sets up anew.
-The harness calls and times them; a solver never reads a clock, scores itself or knows of limits.
+Only `solve` must be written: by default, the other steps pass on their argument, and `update` calls `setup`.
+The harness calls and times the steps; a solver never reads a clock, judges its answer or handles limits.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = [
     "failed",
 ]
 
-#: What a solver may say of its own answer.
+#: A solver's report on its own answer.
 Status = Literal["solved", "inaccurate", "iteration_limit", "failed"]
 
 
@@ -50,10 +50,10 @@ class Answer:
 
     lam : (m,) contact forces λ in N (the multipliers of Aᵀx ≤ g).
     x : (n,) displacements in mm; None in the dual form, where x = K⁻¹(f − Aλ) is recovered.
-    iterations : outer iterations; for an active-set method its changes of the set.
+    iterations : outer iterations; in an active-set method, changes of the set.
     inner_iterations : e.g. conjugate-gradient iterations.
     reported_s : seconds by the solver's own clock, if it has one.
-    details : anything else worth keeping that JSON can hold.
+    details : anything else to record, as JSON types.
     """
 
     status: Status
@@ -66,17 +66,17 @@ class Answer:
 
 
 def failed(cause: str, iterations: int | None = None) -> Answer:
-    """No answer, and why."""
+    """An answer without forces, and its cause."""
     return Answer("failed", None, iterations=iterations, details={"cause": cause})
 
 
-#: Takes several load cases of one assembly, and a tolerance: an answer to each, in their order.
+#: (load cases of one assembly, tolerance) → an answer to each, in their order.
 Batch = Callable[[Sequence[LoadCase], float], list[Answer]]
 
 
 @dataclass(frozen=True)
 class WarmStart:
-    """The answer of the solved load case that is nearest to the next one.
+    """The answer to the solved load case nearest to the next one.
 
     load : that case. lam : (m,) N. gap : (m,) mm, y = g − Aᵀx = Qλ − p. x : (n,) mm; None in the dual form.
     """
@@ -92,7 +92,7 @@ class Solver(ABC):
 
     #: The forms that the solver takes.
     forms: ClassVar[tuple[Form, ...]] = FORMS
-    #: The distribution that solves, if it has another name than the solver.
+    #: The distribution of the library, if it has another name than the solver.
     distribution: ClassVar[str | None] = None
 
     def convert(self, problem: Problem) -> Any:
@@ -105,15 +105,15 @@ class Solver(ABC):
         return state
 
     def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
-        """What `solve` takes for a further load case of the same assembly and tolerance.
+        """The argument `ready` of `solve` for another load case of the same assembly and tolerance.
 
-        state : from `prepare`. ready : from `setup` or `update` for the case solved before this one, which
-        may be changed and returned. start : where a warm start may begin; the case before is another one.
+        state : from `prepare`. ready : from `setup` or `update` for the case solved before this one; may be
+        changed and returned. start : a warm start, not necessarily from the case before.
         """
         return self.setup(state, load, tolerance)
 
     def batched(self, state: Any) -> Batch | None:
-        """What takes several load cases of the assembly at once; None if there is no such way.
+        """A function that solves several load cases of the assembly at once; None if there is none.
 
         state : from `prepare`.
         """

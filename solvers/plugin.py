@@ -17,8 +17,8 @@ from .base import Solver
 def load_plugin(path: Path) -> type[Solver]:
     """The Solver subclass that the file defines. Imported and abstract classes do not count.
 
-    Raises InputError if the file is missing or not Python, fails while it is imported, or defines none
-    or more than one such class.
+    Raises InputError if the file is missing or not Python, its import fails, or it does not define exactly
+    one such class.
     """
     if not path.is_file() or path.suffix != ".py":
         raise InputError.one(path, "plugin", str(path), "must be an existing Python file, NAME.py")

@@ -1,7 +1,7 @@
-"""The solvers by name. A new one is one file: in methods if the method is written here, else in libraries.
+"""The solvers by name. A new one is one file: in `methods` if the method is our own, else in `libraries`.
 
-The file's name, with - for _, is the solver's; its one subclass of Solver is the solver. What qpsolvers finds
-besides has its name there, and a user's own solver from a file (plugin.py) is called like that file.
+It defines one subclass of Solver; its file name, with - for _, is the solver's name. Further solvers found by
+qpsolvers have their name there, and a plug-in (plugin.py) has the name of its file.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from .plugin import load_plugin, solver_class
 from .scaling import Scaled
 
 METHODS, LIBRARIES = "solvers.methods", "solvers.libraries"
-#: The one file that stands for many solvers: all that qpsolvers finds.
-MANY = "qpsolvers"
+#: The one module for many solvers: all others that qpsolvers finds.
+QPSOLVERS = "qpsolvers"
 
 
 @cache
@@ -35,7 +35,7 @@ def modules() -> dict[str, str]:
     found: dict[str, str] = {}
     for package in (METHODS, LIBRARIES):
         path = importlib.import_module(package).__path__
-        names = sorted(module.name for module in pkgutil.iter_modules(path) if module.name != MANY)
+        names = sorted(module.name for module in pkgutil.iter_modules(path) if module.name != QPSOLVERS)
         found |= {name.replace("_", "-"): f"{package}.{name}" for name in names}
     return found
 
@@ -51,10 +51,10 @@ def solver_names() -> list[str]:
 
 
 def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) -> Solver:
-    """A solver with its options. `plugin` is a user's file, meant where name is the file's stem.
+    """A solver with its options. `plugin` is a user's file, used if `name` is the file's stem.
 
-    Raises InputError on a name or an option that there is not, on an option's value that the solver does
-    not take, and on a plugin that cannot be loaded.
+    Raises InputError if the name, an option or its value is unknown or invalid, or if the plug-in cannot be
+    loaded.
     """
     where = f"solver {name}"
     factory = _factory(name, plugin)
@@ -71,7 +71,7 @@ def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) 
 
 
 def solver_version(name: str, plugin: Path | None = None) -> str:
-    """Version of the package that solves; for a plugin a hash of its file; else "unknown"."""
+    """The version of the library; for a plug-in a hash of its file; "unknown" if there is none."""
     if plugin is not None and name == plugin.stem:
         return "sha256:" + hashlib.sha256(plugin.read_bytes()).hexdigest()[:12]
     if in_house(name):
@@ -83,7 +83,7 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
 
 
 def _distribution(name: str) -> str:
-    """What the package that solves is called where it is installed."""
+    """The name of the distribution that has the solver."""
     if name in modules():
         return _class_of(name).distribution or name
     from .libraries.qpsolvers import DISTRIBUTIONS
@@ -92,7 +92,7 @@ def _distribution(name: str) -> str:
 
 
 def _found_by_qpsolvers() -> list[str]:
-    import qpsolvers  # imports every solver that there is, which takes its time
+    import qpsolvers  # slow: imports every solver
 
     return sorted(set(qpsolvers.available_solvers) - set(modules()))
 
@@ -114,7 +114,7 @@ def _factory(name: str, plugin: Path | None) -> Callable[..., Solver]:
     known = [*solver_names(), *([plugin.stem] if plugin else [])]
     close = get_close_matches(name, known, 1)
     hint = f"did you mean {close[0]!r}? " if close else ""
-    raise InputError.one("solvers", "name", name, f"no such solver: {hint}there are {', '.join(known)}")
+    raise InputError.one("solvers", "name", name, f"no such solver: {hint}known: {', '.join(known)}")
 
 
 def _class_of(name: str) -> type[Solver]:

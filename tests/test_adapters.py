@@ -14,7 +14,7 @@ from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.conformance.check import run
 from problems.forms.problem import in_form
-from solvers.adapter import Converted, answer, dense, upper_triangle
+from solvers.adapter import answer, dense, upper_triangle
 from solvers.base import FORMS, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
 from solvers.libraries.clarabel import Clarabel
@@ -253,8 +253,8 @@ def test_a_stopped_solver_does_not_say_solved(
 def test_linear_term_has_the_sign_of_the_libraries() -> None:
     prepared = make_prepared(16, 3)
     _, load = make_load(16, prepared)
-    np.testing.assert_array_equal(Converted(in_form(prepared, "primal"), None).q(load), -load.f)
-    np.testing.assert_array_equal(Converted(in_form(prepared, "dual"), None).q(load), -load.p)
+    np.testing.assert_array_equal(in_form(prepared, "primal").q(load), -load.f)
+    np.testing.assert_array_equal(in_form(prepared, "dual").q(load), -load.p)
 
 
 def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:

@@ -47,7 +47,7 @@ def test_too_slow_on_every_smaller_scene_is_not_run(large):
 
 
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
-    (told,) = run_task(Task([large], ["primal"], "4386/0107"), tmp_path).reports
+    (told,) = run_task(Task([large], Description(["primal"], "1.0", ""), "4386/0107"), tmp_path).reports
     assert told == {"status": "not_run", "message": "too slow already on 4386/0107"}
     assert not list(tmp_path.iterdir())
     rows = [row("4386/0107", 4386), row("4386/1471", 4386, told["status"])]

@@ -17,7 +17,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer
 from solvers.interior_point.newton_system import SYSTEMS
-from solvers.interior_point.schemes import Newton, Point, algorithm_2, algorithm_3, mehrotra
+from solvers.interior_point.schemes import NewtonSteps, Point, algorithm_2, algorithm_3, mehrotra
 from solvers.interior_point.start import algorithm_5
 from solvers.methods.ipm import Ipm
 
@@ -35,10 +35,10 @@ def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = 1e-14, **options: An
     return solver.solve(solver.prepare(Given(Q)), LoadCase(np.zeros(0), np.zeros(0), p), tolerance)  # type: ignore[arg-type]
 
 
-def newton(Q: np.ndarray, p: np.ndarray, sigma: float = 0.3) -> tuple[Newton, Point]:
+def newton(Q: np.ndarray, p: np.ndarray, sigma: float = 0.3) -> tuple[NewtonSteps, Point]:
     system = SYSTEMS["direct"](Q)
     system.begin()
-    made = Newton(Q, p, system, 0.995, sigma, 1e-3, np.inf)
+    made = NewtonSteps(Q, p, system, 0.995, sigma, 1e-3, np.inf)
     start = algorithm_5(Q, p)
     return made, made.at(start.lam, start.y)
 
@@ -71,7 +71,7 @@ def test_every_start_scheme_and_system_leads_to_the_same_answer(start: str, sche
     if system == "none" and answer.status != "solved":
         # In the norm without V the large D hide the rest of the residual: it may not get there, but says so.
         assert answer.status == "inaccurate"
-        assert "× what was asked for" in answer.details["cause"]
+        assert "× the required accuracy" in answer.details["cause"]
         return
     assert answer.status == "solved", answer.details
     assert answer.lam is not None

@@ -54,8 +54,12 @@ def test_words_and_layout_do_not_count(package: Path) -> None:
         change(file, '\n\n# a comment\n\n\ndef _unused() -> None:\n    """Words."""\n', (
             '\n# another comment\ndef _unused() -> None:  # more\n    """Other\n    words."""\n'
         ))  # fmt: skip
-    change(package / "base.py", '"""No answer, and why."""', '"""There is none, for this cause."""')
-    change(package / "base.py", '"""What a solver is:', '"""What is meant by a solver:')
+    change(
+        package / "base.py",
+        '"""An answer without forces, and its cause."""',
+        '"""There is none, for this cause."""',
+    )
+    change(package / "base.py", '"""The interface of a solver:', '"""What is meant by a solver:')
     change(package / "linear_algebra/inverse.py", 'f"dpotri returned {info}"', 'f"dpotri says {info}"')
     change(
         package / "linear_algebra/inverse.py",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,7 +19,6 @@ from harness.verification.reference_problem import ReferenceProblem
 from problems.build import prepared
 from problems.forms.problem import in_form
 from problems.scene import read_scene
-from solvers.base import Form
 
 from .describe import Description
 from .process import measure
@@ -30,11 +28,11 @@ from .process import measure
 class Task:
     """What one process measures: a measurement, or load cases of a series.
 
-    forms : those that the solver takes. timed_out_on : the scenes that predict a timeout; "" if none do.
+    timed_out_on : the scenes that predict a timeout; "" if none do.
     """
 
     batch: list[Measurement]
-    forms: Sequence[Form]
+    solver: Description
     timed_out_on: str = ""
 
 
@@ -42,7 +40,7 @@ class Task:
 class TaskResult:
     """The measuring process's part of each row, and the seconds in all.
 
-    From a worker of a scheduler also the answer files (None where there is none), its machine and its code.
+    From a worker of a scheduler also the answer files (None if there is none), its machine and its code.
     """
 
     reports: list[Row]
@@ -54,15 +52,13 @@ class TaskResult:
 
 def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into that directory."""
-    start, batch = time.monotonic(), task.batch
+    start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     if task.timed_out_on:
-        not_run: Row = {"status": "not_run", "message": f"too slow already on {task.timed_out_on}"}
-        reports = [not_run] * len(batch)
-    elif batch[0].form in task.forms:
+        reports = [{"status": "not_run", "message": f"too slow already on {task.timed_out_on}"}] * len(batch)
+    elif batch[0].form in forms:
         reports = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
     else:
-        unsupported: Row = {"status": "unsupported", "message": f"takes {' and '.join(task.forms)} only"}
-        reports = [unsupported] * len(batch)
+        reports = [{"status": "unsupported", "message": f"takes {' and '.join(forms)} only"}] * len(batch)
     return TaskResult(reports, time.monotonic() - start)
 
 
@@ -78,36 +74,30 @@ def run_task_on_worker(task: Task) -> TaskResult:
 
 
 def rows_of(
-    batch: list[Measurement],
-    result: TaskResult,
-    problem: ReferenceProblem,
-    directory: Path,
-    solver: Description,
-    origin: Row,
+    task: Task, result: TaskResult, problem: ReferenceProblem, directory: Path, origin: Row
 ) -> list[Row]:
-    """The rows of a batch, its answers judged. origin : their `machine`, `commit`, `clean`."""
-    answers = [directory / "answers" / f"{m.stem}.npz" for m in batch]
+    """The rows of a task, its answers judged. origin : the `machine`, `commit` and `clean` of the process."""
+    answers = [directory / "answers" / f"{m.stem}.npz" for m in task.batch]
     for answer, content in zip(answers, result.files or (), strict=bool(result.files)):
         if content is not None:
             answer.write_bytes(content)
-    rows = []
-    for m, answer, report in zip(batch, answers, result.reports, strict=True):
-        if "cannot_save" in report:
-            raise OSError(report["cannot_save"])
-        rows.append(_row(m, answer, report, problem, solver, origin, result.elapsed_s))
-    return rows
+    shared = {
+        **origin,
+        "scene_key": problem.scene.key,
+        "in_house": task.solver.in_house,
+        "solver_version": task.solver.version,
+        "solver_code": task.solver.code,
+        "rivetbench_version": installed_version("rivetbench"),
+        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    cases = zip(task.batch, answers, result.reports, strict=True)
+    return [_row(*case, problem, result.elapsed_s) | shared for case in cases]
 
 
-def _row(
-    m: Measurement,
-    answer: Path,
-    report: Row,
-    problem: ReferenceProblem,
-    solver: Description,
-    origin: Row,
-    elapsed_s: float,
-) -> Row:
-    """The row of one measurement."""
+def _row(m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, elapsed_s: float) -> Row:
+    """The fields of one measurement."""
+    if "cannot_save" in report:
+        raise OSError(report["cannot_save"])
     series = m.series.model_dump() if m.series else None
     problem = problem.of_case(series, m.case)
     limit_mm, judgement = problem.limit_mm(m.limit_mm), Judgement("no_answer", problem.reference.bound_mm)
@@ -133,11 +123,4 @@ def _row(
         **asdict(judgement),
         **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
         "overhead_s": elapsed_s - sum(steps) if m.case is None else None,
-        **origin,
-        "scene_key": problem.scene.key,
-        "in_house": solver.in_house,
-        "solver_version": solver.version,
-        "solver_code": solver.code,
-        "rivetbench_version": installed_version("rivetbench"),
-        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }

@@ -42,8 +42,8 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
     """Make the suite's measurements that DIRECTORY does not hold yet, here or on a scheduler's workers.
 
     Returns 0, 1 when a worker was lost too often, or 3 when no row of the suite could be judged. Raises
-    InputError before the first measurement where the suite cannot be run; KeyboardInterrupt leaves a
-    directory that resumes.
+    InputError before the first measurement if the suite cannot be run; after KeyboardInterrupt the same
+    command resumes.
     """
     descriptions = describe(suite)
     suite = with_forms(suite, descriptions)
@@ -81,11 +81,10 @@ def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
 
 @dataclass(frozen=True)
 class Pending:
-    """A task that is being done, and what its rows need of this process."""
+    """A task that is being done, and the problem that its answers are judged on."""
 
     task: Task
     problem: ReferenceProblem
-    solver: Description
 
 
 #: Does tasks, each beside what stays here; gives back the latter with the result, or what was raised.
@@ -126,7 +125,7 @@ def measure_remaining(
             of_worker = origin
             if outcome.machine and outcome.code:
                 of_worker = {"machine": record_machine(directory, outcome.machine), **outcome.code}
-            new = rows_of(batch, outcome, pending.problem, directory, pending.solver, of_worker)
+            new = rows_of(pending.task, outcome, pending.problem, directory, of_worker)
             records.append(directory / records.MEASUREMENTS, *new)
             rows += new
             for m, row in zip(batch, new, strict=True):
@@ -147,10 +146,9 @@ def pending_tasks(
             record(problem, directory)
             display.ready(m.scene, time.monotonic() - start)
         display.doing(f"{m.scene}: {m.solver} {m.form}")
-        solver = solvers[m.solver, m.variant]
         timed_out_on = predicted_timeout(m, problem.prepared.assembly.n, rows)
-        task = Task(batch, solver.forms, timed_out_on)
-        yield Pending(task, problem, solver), task
+        task = Task(batch, solvers[m.solver, m.variant], timed_out_on)
+        yield Pending(task, problem), task
 
 
 def batches(remaining: list[Measurement]) -> list[list[Measurement]]:

@@ -1,4 +1,4 @@
-"""Work on Dask workers: `local:N`, or the address of a scheduler. Dask is imported here, when asked for.
+"""Work on Dask workers: `local:N`, or the address of a scheduler. Dask is imported only if they are used.
 
 Each worker takes one task at a time, so that a measurement has its worker to itself. The tasks of a lost
 worker are done by others; a task that keeps killing workers fails alone. Only the driver writes results.

@@ -23,7 +23,7 @@ from typing import Any
 
 import threadpoolctl
 
-from harness.results.machine import resident_mib
+from harness.results.machine import blas_kernels, resident_mib
 from harness.results.records import Row, to_line
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -33,7 +33,7 @@ from problems.scene import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .answers import Refused, figures, save
+from .answers import InvalidAnswer, figures, save
 from .solver_session import SolverSession
 from .yardstick import yardstick
 
@@ -56,7 +56,7 @@ def main() -> None:
         end = {}
     except MemoryError as error:
         end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
-    except Refused as error:
+    except InvalidAnswer as error:
         end = {"status": "failed", "message": str(error)}
     except Unsupported as error:
         end = {"status": "unsupported", "message": str(error)}
@@ -203,10 +203,8 @@ def threads_in_effect() -> Row:
     """BLAS kernels and thread count of the libraries loaded so far."""
     pools = threadpoolctl.threadpool_info()
     blas = [pool for pool in pools if pool["user_api"] == "blas"]
-    names = ("internal_api", "version", "architecture")
-    kernels = {" ".join(str(pool[name]) for name in names if pool.get(name)) for pool in blas}
     return {
-        "kernels": ", ".join(sorted(kernels)) or None,
+        "kernels": ", ".join(blas_kernels(pools)) or None,
         "threads": max((pool["num_threads"] for pool in blas or pools), default=None),
     }
 

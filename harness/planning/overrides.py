@@ -51,17 +51,6 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     named = {entry["name"] for entry in data["solver"]}
     own = [change.plugin.stem] if change.plugin and not change.solvers else []
     data["solver"] += [{"name": name} for name in (*change.solvers, *own) if name not in named]
-    for entry in data["solver"]:
-        if change.forms:
-            entry["forms"] = list(change.forms)
-        if change.tolerances:
-            entry.pop("tolerances", None)
-        if change.time_limit_s is not None:
-            entry.pop("time_limit_s", None)
-        if change.repeats is not None:
-            entry.pop("repeats", None)
-        if change.threads:
-            entry.pop("threads", None)
     changes = {
         "tolerances": list(change.tolerances),
         "repeats": change.repeats,
@@ -70,9 +59,15 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
         "memory_limit_mib": change.memory_limit_mib,
         "plugin": plugin,
     }
-    data |= {key: value for key, value in changes.items() if value not in ([], None)}
-    if change.time_limit_s is not None:
+    changes = {key: value for key, value in changes.items() if value not in ([], None)}
+    data |= changes
+    if "time_limit_s" in changes:
         data.pop("time_limit_by_size_s", None)
+    for entry in data["solver"]:
+        if change.forms:
+            entry["forms"] = list(change.forms)
+        for key in changes:  # of the suite: they override the entry's
+            entry.pop(key, None)
     if faults:
         raise InputError(faults)
     return suite_from(data, Path("command line"))

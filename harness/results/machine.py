@@ -71,11 +71,16 @@ def _cpu_model() -> str:
     return platform.processor() or platform.machine()
 
 
+def blas_kernels(pools: list[dict[str, Any]]) -> list[str]:
+    """Library, version and architecture of the BLAS among the pools of threadpoolctl."""
+    names = ("internal_api", "version", "architecture")
+    blas = [pool for pool in pools if pool["user_api"] == "blas"]
+    return sorted({" ".join(str(pool[name]) for name in names if pool.get(name)) for pool in blas})
+
+
 def _blas() -> list[str]:
-    """The BLAS libraries of numpy and scipy: kind, version, kernels, threads by default."""
+    """The BLAS libraries of numpy and scipy."""
     import scipy.linalg  # noqa: F401  loads scipy's own
     import threadpoolctl
 
-    pools = [pool for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"]
-    names = ("internal_api", "version", "architecture")
-    return sorted({" ".join(str(pool[name]) for name in names if pool.get(name)) for pool in pools})
+    return blas_kernels(threadpoolctl.threadpool_info())

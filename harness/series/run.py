@@ -168,7 +168,7 @@ def metadata(job: Job) -> dict[str, Any]:
 
 
 def record_contacts(job: Job, directory: Path) -> int:
-    """DIRECTORY/contacts.npz: where the contacts and the fasteners are, for the pictures. Returns m."""
+    """DIRECTORY/contacts.npz: the positions of contacts and fasteners, for the figures. Returns m."""
     assembly = prepared(job.scene).assembly
     arrays = {"m": np.array(assembly.m)}
     if assembly.contact_nodes is not None:

@@ -1,4 +1,4 @@
-"""The accuracy gate: judges the saved answers anew; its exit code says whether all are accurate enough.
+"""The accuracy gate: judges the saved answers again; its exit code says whether all are accurate enough.
 
 The figures in the rows are not used. A row only says which answer belongs to which scene; the problem's
 data and the reference are made from the scene.
@@ -31,7 +31,7 @@ NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", 
 
 @dataclass(frozen=True)
 class Finding:
-    """One gated measurement, judged anew. why : it is not within the limit."""
+    """One gated measurement, judged again. why : the reason if it is not within the limit."""
 
     key: str
     judgement: Judgement
@@ -103,7 +103,7 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
         case "no_answer":
             why = f"{row['answer']} is missing, damaged or not finite"
         case "cannot_be_judged":
-            why = f"the reference is known to {bound:.0e} mm only, not to {REFERENCE_SHARE * limit:.0e}"
+            why = f"the reference is known only to {bound:.0e} mm, not to {REFERENCE_SHARE * limit:.0e}"
         case "outside":
             why = f"{judgement.displacement_error_mm:.3e} mm from the reference"
         case _:
@@ -123,7 +123,7 @@ def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
 
 def table(findings: list[Finding]) -> Table:
     made = Table(
-        "measurement", "error mm", "limit mm", "verdict", "why", title="Gate: the answers judged anew"
+        "measurement", "error mm", "limit mm", "verdict", "why", title="Gate: the answers judged again"
     )
     for finding in findings:
         error, verdict = finding.judgement.displacement_error_mm, finding.judgement.verdict

@@ -38,7 +38,7 @@ REFERENCE_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Judgement:
-    """The judge's part of a row; None where a figure does not apply."""
+    """The judge's part of a row; None if a figure does not apply."""
 
     verdict: Verdict
     reference_bound_mm: float | None = None

@@ -103,7 +103,7 @@ def _dense(K: Any) -> Matrix:
 
 
 def _code() -> str:
-    """The fingerprint of the code for references: those of other code are computed anew."""
+    """The fingerprint of the code for references: those of other code are recomputed."""
     return fingerprint([Path(__file__)], within=["harness/verification"])
 
 

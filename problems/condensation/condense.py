@@ -42,11 +42,11 @@ def condense(
 
     Raises
     ------
-    NotPositiveDefinite : a pivot block is not positive definite, so some motion costs no energy.
+    NotPositiveDefinite : a pivot block is not positive definite: some motion costs no energy.
     """
     size = int(keep.sum())
     S = np.zeros((size, size))
-    kept = 0  # S[:kept, :kept] is final but for the updates still to come
+    kept = 0  # S[:kept, :kept] is filled; later lines still update it
     C = K[lines[0]][:, lines[0]].toarray()  # the current line
     B = np.zeros((0, len(lines[0])))  # its coupling to the kept unknowns behind it
     for step, line in enumerate(lines):

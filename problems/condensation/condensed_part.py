@@ -1,4 +1,4 @@
-"""The stiffness of one part, condensed onto the deflections of its junction nodes; kept in the cache."""
+"""The stiffness of one part, condensed onto the deflections of its junction nodes and cached."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CODE = ("problems/fem", "problems/model", "problems/effects")
 
 
 def part_key(joint: Joint, part: Part, effects: tuple[StiffnessEffect, ...]) -> str:
-    """The hash of what makes a part's stiffness, code and data; not of its name."""
+    """The hash of the code and data of a part's stiffness; its name does not count."""
     own = [effect for effect in effects if effect.part == part.name]
     modules = (inspect.getmodule(type(effect)) for effect in own)
     files = [Path(inspect.getfile(module)) for module in modules if module]
@@ -42,8 +42,8 @@ def condensed_part(
     """The part's stiffness on the junction nodes, (node_count, node_count) N/mm, x running fastest.
 
     effects : the scene's, of which those on this part count.
-    Returns also the seconds that it took when it was made.
-    Raises NotPositiveDefinite where some motion of the part costs no energy.
+    Also returns the seconds of the computation.
+    Raises NotPositiveDefinite if some motion of the part costs no energy.
     """
 
     def made() -> cache.Entry:

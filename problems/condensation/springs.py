@@ -15,7 +15,7 @@ def with_springs(
 ) -> tuple[Blocks, tuple[str, ...]]:
     """The blocks and names of K + T diag(k) Tᵀ.
 
-    T : (n, r), the direction of a spring in each column. k : (r,) stiffnesses, N/mm.
+    T : (n, r), one column per spring, its direction. k : (r,) stiffnesses, N/mm.
     A block extends from the first to the last part that a spring joins.
     """
     ends = np.cumsum([len(K) for K in blocks])

@@ -1,1 +1,1 @@
-"""The quadratic programs: what load cases share, and one file per form."""
+"""The quadratic programs: the data that load cases share, and one file per form."""

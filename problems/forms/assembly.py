@@ -1,4 +1,4 @@
-"""The data of a riveting problem: what load cases share, and what one of them adds. Units: mm and N."""
+"""The data of a riveting problem: what load cases share, and each load case's own. Units: mm and N."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from .assembly import LoadCase, Matrix, Vector
 from .names import Form
-from .problem import Problem, read_only, side_by_side
+from .problem import Problem, read_only, stacked
 
 
 class Dual(Problem):
@@ -36,7 +36,7 @@ class Dual(Problem):
 
     def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
         """With p; K⁻¹f is computed once if they share their f."""
-        p = self.prepared.dual_load(side_by_side(cases)).T
+        p = self.prepared.dual_load(stacked(cases)).T
         pairs = zip(cases, p, strict=True)
         return [read_only(LoadCase(case.f, case.g, np.ascontiguousarray(mine))) for case, mine in pairs]
 

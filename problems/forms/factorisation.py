@@ -13,12 +13,12 @@ SMALL = 50  # unknowns below which eigenvalues are computed densely
 
 
 def factor(K: Matrix) -> Matrix:
-    """U, upper triangular, with K = UᵀU. Raises LinAlgError where K is not positive definite."""
+    """U, upper triangular, with K = UᵀU. Raises LinAlgError if K is not positive definite."""
     return sla.cholesky(K, check_finite=False)
 
 
 def extreme_eigenvalues(K: Matrix, U: Matrix) -> tuple[float, float]:
-    """λmin and λmax of K by Lanczos on K⁻¹ and K (dense where K is tiny)."""
+    """λmin and λmax of K by Lanczos on K⁻¹ and K (densely if K is small)."""
     n = len(K)
     if n < SMALL:
         values = np.linalg.eigvalsh(K)
@@ -51,9 +51,9 @@ def schur(assembly: Assembly, factors: tuple[Matrix, ...]) -> Matrix:
 
 
 def dependent_column(Q: Matrix) -> int | None:
-    """The first column of A that depends on those before it; None where A has full rank.
+    """The first column of A that depends on those before it; None if A has full rank.
 
-    A pivot of Q over its diagonal entry is what sets a column apart from the others.
+    The pivot of Q relative to its diagonal entry measures the independence of a column.
     """
     U, info = lapack.dpotrf(Q)
     if info:

@@ -13,5 +13,5 @@ FORMS: tuple[Form, ...] = get_args(Form)
 
 
 def default_form(forms: Sequence[Form]) -> Form:
-    """The form that a solver is run in unless another is asked for: the dual, if it takes that."""
+    """The form in which a solver is run by default: the dual, if it takes that."""
     return "dual" if "dual" in forms else forms[0]

@@ -13,7 +13,7 @@ from .factorisation import factor, schur
 
 
 class Prepared:
-    """An assembly with what is derived from it: each stage is made when it is first asked for.
+    """An assembly with what is derived from it, each stage computed when first needed.
 
     Parameters
     ----------
@@ -21,24 +21,24 @@ class Prepared:
     factors : U_i upper triangular with K_i = U_iᵀU_i, each (n_i, n_i); computed unless given.
     Q : (m, m), mm/N, Q = AᵀK⁻¹A; computed unless given.
 
-    Another way to K⁻¹ (a sparse factor, a band) overrides `solve_K`, and `compliance` by products with it:
-    what judges an answer needs no more than these and products with K and A.
+    A subclass with another K⁻¹ (a sparse or a banded factor) overrides `solve_K` and `compliance`: judging an
+    answer needs only these and products with K and A.
     """
 
     def __init__(
         self, assembly: Assembly, factors: tuple[Matrix, ...] | None = None, Q: Matrix | None = None
     ) -> None:
         self.assembly = assembly
-        #: What the matrices are known by on disk; None if they are in memory only.
+        #: The key of the matrices in the cache; None if they are in memory only.
         self.key: str | None = None
         if factors is not None:
-            self.__dict__["factors"] = factors  # in the place of the cached properties
+            self.__dict__["factors"] = factors  # overrides the cached property
         if Q is not None:
             self.__dict__["Q"] = Q
 
     @property
     def facts(self) -> dict[str, object]:
-        """What was measured while the stages were made: cond_K, λmin, λmax, seconds of each step, …"""
+        """Facts recorded with the stages: cond_K, λmin, λmax, seconds of each step, …"""
         return {}
 
     @cached_property

@@ -1,9 +1,9 @@
-"""A quadratic program in one form: what a solver is given, and the only place that knows its form.
+"""A quadratic program in one form, as solvers are given it; no other code depends on the form.
 
     min ½zᵀPz + qᵀz   subject to   Gz ≤ h,   z ≥ 0 if the form is bounded
 
-P and G belong to the assembly, q and h to a load case. From the solution z and the multipliers of Gz ≤ h come
-the contact forces λ and the displacements x, in every form the same.
+P and G belong to the assembly, q and h to a load case. The solution z and the multipliers of Gz ≤ h give the
+contact forces λ and the displacements x, the same in every form.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ class Problem(ABC):
     """An assembly in one of its forms. The arrays may be memory-mapped and are read-only."""
 
     form: ClassVar[Form]
-    #: Whether z ≥ 0 stands in the place of the rows Gz ≤ h.
+    #: Whether bounds z ≥ 0 replace the rows Gz ≤ h.
     bounded: ClassVar[bool]
-    #: What an answer must hold; x is recovered from λ where it is not among them.
+    #: What an answer must contain; x, if not among these, is recovered from λ.
     needs: ClassVar[tuple[str, ...]]
 
     def __init__(self, prepared: Prepared) -> None:
@@ -39,7 +39,7 @@ class Problem(ABC):
 
     @property
     def Q(self) -> Matrix:
-        """Q = AᵀK⁻¹A, (m, m), mm/N; made when first asked for."""
+        """Q = AᵀK⁻¹A, (m, m), mm/N; computed when first needed."""
         return self.prepared.Q
 
     @property
@@ -50,7 +50,7 @@ class Problem(ABC):
     @property
     @abstractmethod
     def G(self) -> sp.csr_array | None:
-        """The rows of Gz ≤ h; None where there are bounds in their place."""
+        """The matrix of Gz ≤ h; None if bounds replace it."""
 
     @abstractmethod
     def q(self, load: LoadCase) -> Vector:
@@ -58,27 +58,27 @@ class Problem(ABC):
 
     @abstractmethod
     def h(self, load: LoadCase) -> Vector | None:
-        """The right-hand side of Gz ≤ h; None where there are bounds in its place."""
+        """The right-hand side of Gz ≤ h; None if bounds replace it."""
 
     @abstractmethod
     def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
-        """The load cases with what this form needs of them, read-only."""
+        """The load cases with what this form adds to them, read-only."""
 
     @abstractmethod
     def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
-        """(λ, x) of a solution z and the multipliers of its rows; x is None where it is to be recovered."""
+        """(λ, x) of a solution z and the multipliers of its rows; x is None if it must be recovered."""
 
     @abstractmethod
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector | None, Vector]:
-        """(z, multipliers) of forces λ, gaps g − Aᵀx and displacements x: where a warm start begins."""
+        """(z, multipliers) of a warm start from forces λ, gaps g − Aᵀx and displacements x."""
 
     @abstractmethod
     def gap(self, load: LoadCase, lam: Vector, x: Vector | None) -> Vector:
-        """The gaps that an answer leaves, g − Aᵀx = Qλ − p, (m,) mm."""
+        """The gaps of an answer, g − Aᵀx = Qλ − p, (m,) mm."""
 
     @abstractmethod
     def distance(self, one: LoadCase, other: LoadCase) -> float:
-        """How far two load cases are from each other, to choose the answer to start from."""
+        """A distance between load cases, to choose the answer to start from."""
 
     @property
     @abstractmethod
@@ -100,7 +100,7 @@ class Problem(ABC):
         known = [k for k, lam in enumerate(lams) if lam is not None]
         if known:
             lam = np.column_stack([np.asarray(lams[k], dtype=float) for k in known])
-            x = self.prepared.recover(lam, side_by_side([cases[k] for k in known])).T
+            x = self.prepared.recover(lam, stacked([cases[k] for k in known])).T
             for k, mine in zip(known, x, strict=True):
                 found[k] = np.ascontiguousarray(mine)
         return found
@@ -113,8 +113,8 @@ def in_form(prepared: Prepared, form: Form) -> Problem:
     return problem
 
 
-def side_by_side(cases: Sequence[LoadCase]) -> LoadCase:
-    """f (n, k), or (n, 1) where all have the same, and g (m, k)."""
+def stacked(cases: Sequence[LoadCase]) -> LoadCase:
+    """Load cases as columns: f (n, k), or (n, 1) if all share it, and g (m, k)."""
     shared = all(case.f is cases[0].f for case in cases)
     f = cases[0].f[:, None] if shared else np.column_stack([case.f for case in cases])
     return LoadCase(f, np.column_stack([case.g for case in cases]))

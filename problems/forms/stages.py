@@ -1,4 +1,4 @@
-"""Data preparation that is kept on disk: factors of K, then Q, each made when it is first asked for."""
+"""Cached data preparation: factors of K, then Q, each computed when first needed."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 
 
 class Stored(Prepared):
-    """A prepared assembly whose stages come memory-mapped from the cache, or are made and kept there.
+    """A prepared assembly whose stages are memory-mapped from the cache, or computed and stored there.
 
     Parameters
     ----------
-    assembly : K and A. key : what K is known by.
+    assembly : K and A. key : of K in the cache.
     seconds : of the stages before.
-    source_of : what an error message names as the place that "K" or "A" comes from.
-    check_A : whether the columns of A may be dependent, which then is an error.
+    source_of : the origin of "K" or "A", for error messages.
+    check_A : whether to raise an error if the columns of A are dependent.
 
-    Raises InputError, from `factors` on, where K is not positive definite or worse conditioned than 1e14, and
-    from `Q` on where the columns of A are dependent.
+    `factors` raises InputError if K is not positive definite or its condition number exceeds 1e14, `Q` if the
+    columns of A are dependent.
     """
 
     def __init__(
@@ -122,6 +122,6 @@ class Stored(Prepared):
 
 
 def indefinite(where: object, key: str, value: object) -> InputError:
-    """What is said of a problem whose K is not positive definite."""
+    """The error for a K that is not positive definite."""
     allowed = "K must be positive definite: is a part held against every rigid motion?"
     return InputError.one(where, key, value, allowed)

@@ -1,7 +1,7 @@
 """One part as finite elements: its plate, what stiffens and holds it, and where it meets the others.
 
-All that is made of a part (its condensed stiffness, condensed loads, the model without condensation) reads
-its unknowns here: the deflections at the junction nodes, those at built-in edges, and the rest.
+All models of a part (condensed stiffness, condensed loads, the model without condensation) take its unknowns
+from here: the deflections at the junction nodes, those at built-in edges, and the others.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A scene: a joint with its effects, a user's own matrices, or matrices made for a ladder's rung."""
+"""A scene: a joint with its effects, a user's matrices, or matrices constructed for a rung of a ladder."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Scene(ABC):
     """A checked scene.
 
     on_ladder : whether it is a rung, whose limit follows its conditioning.
-    refused : words of the InputError that building a rung is to end with; "" where it is not.
+    refused : text of the InputError that building this rung must raise; "" if it must not raise one.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Scene(ABC):
         """(n, m) without building anything; None if that takes reading the matrices."""
 
     def source_of(self, matrix: str) -> object:
-        """What an error message names as the place that a matrix comes from."""
+        """The origin of a matrix, for error messages."""
         return f"scene {self.name}"
 
     def marks(self) -> Matrix:
@@ -60,7 +60,7 @@ class Scene(ABC):
 
 @dataclass(frozen=True)
 class JointScene(Scene):
-    """A joint, and the effects that the scene calls for."""
+    """A joint and the effects that the scene includes."""
 
     joint: Joint
     effects: tuple[Effect, ...] = ()
@@ -93,7 +93,7 @@ class JointScene(Scene):
 
 @dataclass(frozen=True)
 class MatricesScene(Scene):
-    """The files of a user's own matrices: ("problem", x.npz), or one for each of K, A, f and g."""
+    """The files of a user's matrices: ("problem", x.npz), or one for each of K, A, f and g."""
 
     files: tuple[tuple[str, Path], ...]
 
@@ -116,7 +116,7 @@ class MatricesScene(Scene):
 
 @dataclass(frozen=True)
 class MadeScene(Scene):
-    """Matrices that were made in memory: a ladder's rung without plates."""
+    """Matrices constructed in memory: a rung of a ladder without plates."""
 
     made: ManufacturedProblem
 
@@ -137,5 +137,5 @@ class MadeScene(Scene):
 
 
 def plain(table: Table) -> dict[str, Any]:
-    """What a key is made of."""
+    """The table as JSON, for keys."""
     return table.model_dump(mode="json")

@@ -1,4 +1,4 @@
-"""Arrays on disk under a hash of what made them; opened memory-mapped, written all or nothing."""
+"""Arrays on disk under a hash of their data and code; opened memory-mapped, written atomically."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def digest(*parts: object) -> str:
 
 @contextmanager
 def lock(key: str) -> Iterator[None]:
-    """One process at a time makes the entry; the others wait and then find it."""
+    """One process at a time computes the entry; the others wait and then load it."""
     folder = root()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -52,7 +52,7 @@ def lock(key: str) -> Iterator[None]:
 
 
 def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -> None:
-    """Write an entry. The folder appears under its name only when it is whole."""
+    """Write an entry. The folder gets its name when it is complete."""
     root().mkdir(parents=True, exist_ok=True)
     work = Path(tempfile.mkdtemp(dir=root(), prefix=f"{key}."))
     try:
@@ -80,16 +80,16 @@ def load(key: str) -> Entry | None:
         manifest = json.loads((folder / MANIFEST).read_text())
         sizes, facts = manifest["files"], manifest["facts"]
     except (OSError, ValueError, KeyError) as error:
-        raise InputError.one(folder / MANIFEST, "content", str(error), _mend(folder)) from error
+        raise InputError.one(folder / MANIFEST, "content", str(error), _repair(folder)) from error
     for name, size in sizes.items():
         found = (folder / name).stat().st_size if (folder / name).exists() else None
         if found != size:
-            raise InputError.one(folder / name, "bytes", found, f"must be {size}; {_mend(folder)}")
+            raise InputError.one(folder / name, "bytes", found, f"must be {size}; {_repair(folder)}")
     return {Path(name).stem: np.load(folder / name, mmap_mode="r") for name in sizes}, facts
 
 
 def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:
-    """The entry, made by one process while the others wait if there is none yet; memory-mapped either way."""
+    """The entry, memory-mapped; if there is none yet, one process computes it while the others wait."""
     found = load(key)
     if found is None:
         with lock(key):
@@ -101,5 +101,5 @@ def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:
     return found
 
 
-def _mend(folder: Path) -> str:
+def _repair(folder: Path) -> str:
     return f"the cache is damaged: delete {folder} and run again"

@@ -1,9 +1,8 @@
-"""A hash of code by what it does: what rows and cached matrices are known by.
+"""A hash of what code does, part of the identity of rows and cached matrices.
 
-Two states of the code have the same fingerprint if they can only give the same numbers: comments, layout,
-docstrings, annotations of functions, the wording of what is raised, import lines and the places of files do
-not count. The files that a file imports count with it, as far as they lie in the given folders, and what
-those import in turn.
+It ignores what cannot change a number: comments, layout, docstrings, annotations of functions, what `raise`
+raises, import lines and the locations of files. It includes the files that a file imports, directly or not,
+if they lie in the given folders.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ def fingerprint(files: Iterable[Path], within: Iterable[str] = (), root: Path = 
     within : the folders below `root` whose files count when they are imported.
     """
     folders = [root / folder for folder in within]
-    todo = list(files)
+    unread = list(files)
     seen: dict[Path, str] = {}
-    while todo:
-        path = todo.pop()
+    while unread:
+        path = unread.pop()
         if path not in seen:
             seen[path], imported = _read(path, root, path.stat().st_mtime_ns)
-            todo += [file for file in imported if any(folder in file.parents for folder in folders)]
+            unread += [file for file in imported if any(folder in file.parents for folder in folders)]
     return hashlib.sha256("".join(sorted(seen.values())).encode()).hexdigest()[:12]
 
 
@@ -39,12 +38,12 @@ def _read(path: Path, root: Path, changed: int) -> tuple[str, tuple[Path, ...]]:
     """The hash of one file's code and the files below root that it imports; `changed` renews the cache."""
     tree = ast.parse(path.read_bytes())
     imported = tuple(_imported(path, tree, root))
-    code = ast.dump(_WithoutWords().visit(tree))
+    code = ast.dump(_WithoutText().visit(tree))
     return hashlib.sha256(code.encode()).hexdigest(), imported
 
 
-class _WithoutWords(ast.NodeTransformer):
-    """Takes out of a tree, which holds neither comments nor layout, what cannot change a number."""
+class _WithoutText(ast.NodeTransformer):
+    """Removes from a tree, which has neither comments nor layout, what cannot change a number."""
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):

@@ -9,7 +9,7 @@ from problems.forms.assembly import Matrix, Vector
 
 from .infeasible_start import stp2
 from .newton_system import Direct
-from .schemes import Newton, mehrotra
+from .schemes import NewtonSteps, mehrotra
 
 ITERATIONS = 60
 SMALLEST_MU = 1e-20  # of the first μ: signs do not change any more
@@ -23,7 +23,7 @@ def identified_set(Q: Matrix, p: Vector) -> NDArray[np.bool_]:
     """
     system = Direct(Q)
     system.begin()
-    newton = Newton(Q, p, system, THETA, 0.0, 1.0, np.inf)
+    newton = NewtonSteps(Q, p, system, THETA, 0.0, 1.0, np.inf)
     start = stp2(Q, p, RHO, LEAST_GAP)
     point = newton.at(start.lam, start.y)
     found, first = np.diag(Q) * point.lam > point.y, point.mu

@@ -44,7 +44,7 @@ class Point:
 
 
 @dataclass
-class Newton:
+class NewtonSteps:
     """Directions and steps for one load case, and the CG iterations that they took.
 
     theta : fraction of the step to the boundary, in (0, 1). sigma : centring parameter of Algorithm 2.
@@ -87,13 +87,13 @@ class Newton:
         return self.at(point.lam + alpha * dlam, point.y + alpha * dy)
 
 
-def algorithm_2(newton: Newton, point: Point) -> Point:
+def algorithm_2(newton: NewtonSteps, point: Point) -> Point:
     """One Newton step with a given centring parameter σ: plain path following."""
     s3 = newton.sigma * point.mu - point.lam * point.y
     return newton.moved(point, *newton.direction(point, s3, "predictor"))
 
 
-def algorithm_3(newton: Newton, point: Point) -> Point:
+def algorithm_3(newton: NewtonSteps, point: Point) -> Point:
     """The predictor step is taken; the corrector is a second Newton step, with its own matrix."""
     s3 = -point.lam * point.y
     predicted = newton.moved(point, *newton.direction(point, s3, "predictor"))  # step 5
@@ -102,7 +102,7 @@ def algorithm_3(newton: Newton, point: Point) -> Point:
     return newton.moved(predicted, *newton.direction(predicted, s3, "corrector"))  # step 6
 
 
-def mehrotra(newton: Newton, point: Point) -> Point:
+def mehrotra(newton: NewtonSteps, point: Point) -> Point:
     """Predictor–corrector as in the textbooks: one matrix, two right-hand sides.
 
     The affine direction is not taken; it gives σ = (μ_aff/μ)³ and the second-order term of
@@ -117,7 +117,7 @@ def mehrotra(newton: Newton, point: Point) -> Point:
 
 
 #: The option `scheme`.
-SCHEMES: dict[str, Callable[[Newton, Point], Point]] = {
+SCHEMES: dict[str, Callable[[NewtonSteps, Point], Point]] = {
     "algorithm_3": algorithm_3,
     "algorithm_2": algorithm_2,
     "mehrotra": mehrotra,

@@ -32,16 +32,16 @@ class Start:
     multiplications: int = 0
 
 
-def algorithm_5(Q: Matrix, p: Vector, force: float = 1.0) -> Start:
-    """λ = force·e (N), corrected until Qλ > 0 (16), then multiplied until y = Qλ − p ≥ 0.
+def algorithm_5(Q: Matrix, p: Vector) -> Start:
+    """λ = e (1 N), corrected until Qλ > 0 (16), then multiplied until y = Qλ − p ≥ 0.
 
     One more multiplication follows, because the interior needs y > 0: mult·Qλ − p > Qλ − p ≥ 0. Raises
     NoStart if no λ > 0 with Qλ > 0 is found.
     """
-    return _opened(lambda lam: Q @ lam, lambda i: Q[:, i], p, force)
+    return _opened(lambda lam: Q @ lam, lambda i: Q[:, i], p)
 
 
-def algorithm_4(prepared: Prepared, load: LoadCase, force: float = 1.0) -> Start:
+def algorithm_4(prepared: Prepared, load: LoadCase) -> Start:
     """The same from displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
     A = prepared.assembly.A
 
@@ -51,13 +51,11 @@ def algorithm_4(prepared: Prepared, load: LoadCase, force: float = 1.0) -> Start
     def column(i: int) -> Vector:
         return A.T @ prepared.solve_K(A[:, [i]].toarray()[:, 0])
 
-    return _opened(response, column, prepared.dual_load(load), force)
+    return _opened(response, column, prepared.dual_load(load))
 
 
-def _opened(
-    response: Callable[[Vector], Vector], column: Callable[[int], Vector], p: Vector, force: float
-) -> Start:
-    lam, Qlam, corrections = _positive_response(response, column, np.full(len(p), force))  # step 1
+def _opened(response: Callable[[Vector], Vector], column: Callable[[int], Vector], p: Vector) -> Start:
+    lam, Qlam, corrections = _positive_response(response, column, np.ones(len(p)))  # step 1
     for multiplications in range(1, MAX_STEPS + 1):  # step 2
         y = Qlam - p  # step 3
         opened = bool((y >= 0).all())  # step 4

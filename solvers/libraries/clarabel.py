@@ -3,11 +3,11 @@
 Stops when both residuals, as 2-norms divided by max(1, norms of data and iterates), and the absolute
 duality gap are below the tolerance; the relative gap test is off. `AlmostSolved` is not solved.
 
-The dual form's Q has eigenvalues down to 1e-5 mm/N and costs of 1e8 N·mm, whose last bit is 1e-8. Its
-equilibration and its regularisation of 1e-8 then cost digits (at n = 4386 it gives up, or ends as
-`AlmostSolved` some 1e-5 mm off): without the first, and with 1e-12 for the second, it ends as `Solved`
-within 1e-10 mm there on three plates; on smaller ones the worst of seven was 8e-8 mm. These two
-settings were chosen on such plates. Rows instead of bounds, the primal form, keep the defaults.
+In the dual form, Q has eigenvalues down to 1e-5 mm/N, and the objective is about 1e8 N·mm, with a rounding
+error of 1e-8. Clarabel's equilibration and its regularisation of 1e-8 then cost accuracy (at n = 4386 it
+fails, or ends as `AlmostSolved` with an error of about 1e-5 mm). Without the former, and with 1e-12 for the
+latter, it ends as `Solved` within 1e-10 mm on three such problems; on seven smaller ones the largest error
+was 8e-8 mm. The settings were chosen on these problems. The primal form keeps the defaults.
 """
 
 from __future__ import annotations
@@ -47,18 +47,18 @@ class Clarabel(Solver):
         settings.tol_feas = tolerance
         settings.tol_gap_abs = tolerance
         settings.tol_gap_rel = 0.0
-        if state.bounded:
+        if state.problem.bounded:
             settings.equilibrate_enable = False
             settings.static_regularization_constant = 1e-12
-        h = state.h(load)
+        h = state.problem.h(load)
         h = np.zeros(state.G.shape[0]) if h is None else h
         cones = [clarabel.NonnegativeConeT(len(h))]
-        return state, clarabel.DefaultSolver(state.P, state.q(load), state.G, h, cones, settings)
+        return state, clarabel.DefaultSolver(state.P, state.problem.q(load), state.G, h, cones, settings)
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """Clarabel's update of the vectors, with the equilibration kept; it has no warm start."""
-        h = state.h(load)
-        ready[1].update(q=state.q(load), **({} if h is None else {"b": h}))
+        h = state.problem.h(load)
+        ready[1].update(q=state.problem.q(load), **({} if h is None else {"b": h}))
         return ready
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:

@@ -25,8 +25,8 @@ POLISH = {0: "not tried", 1: "accepted", 2: "nothing active", -1: "rejected", -2
 
 
 class Osqp(Solver):
-    """polishing : solve once more on the guessed active set. OSQP may accept the outcome outside the
-    tolerance and still say solved (its issue 790): by its own residuals that is inaccurate, and so called.
+    """polishing : solve again on the estimated active set. OSQP may accept a result outside the tolerance and
+    still report solved (its issue 790); if its own residuals exceed the tolerance, the status is inaccurate.
     """
 
     def __init__(self, *, polishing: bool = False) -> None:
@@ -37,13 +37,13 @@ class Osqp(Solver):
         return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, 1.0))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        h = state.h(load)
+        h = state.problem.h(load)
         free = np.full(state.G.shape[0], np.inf)
         bounds = (np.zeros_like(free), free) if h is None else (-free, h)
         library = osqp.OSQP()
         library.setup(
             state.P,
-            state.q(load),
+            state.problem.q(load),
             state.G,
             *bounds,
             eps_abs=tolerance,
@@ -60,10 +60,10 @@ class Osqp(Solver):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """OSQP.update and warm_start; the factors and the last ρ are kept."""
         _, library = ready
-        h, (z, multipliers) = state.h(load), state.start(start)
-        library.update(q=state.q(load), **({} if h is None else {"u": h}))
+        h, (z, multipliers) = state.problem.h(load), state.problem.start(start.lam, start.gap, start.x)
+        library.update(q=state.problem.q(load), **({} if h is None else {"u": h}))
         # OSQP's multipliers of lower bounds are negative.
-        library.warm_start(x=z, y=-np.maximum(multipliers, 0.0) if state.bounded else multipliers)
+        library.warm_start(x=z, y=-np.maximum(multipliers, 0.0) if state.problem.bounded else multipliers)
         return ready
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:

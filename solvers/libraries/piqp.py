@@ -1,7 +1,7 @@
 """PIQP: a proximal interior-point method, https://predict-epfl.github.io/piqp.
 
 Stops when the unscaled ∞-norms of both residuals and the duality gap are below the tolerance; its
-relative tests, either of which would do, are off. The dual form passes λ ≥ 0 as bounds, not as rows.
+relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as bounds, not as rows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STATUS: dict[Any, Status] = {
 
 class Piqp(Solver):
     """backend : "dense" or "sparse" Cholesky. K consists of dense blocks, so dense is several times
-    faster in both forms (seen from n = 594 to 4386); sparse takes less memory in the primal form.
+    faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal form.
     """
 
     def __init__(self, *, backend: str = "dense") -> None:
@@ -44,15 +44,15 @@ class Piqp(Solver):
         settings.check_duality_gap = True
         settings.max_iter = 500
         settings.compute_timings = True
-        q, h = state.q(load), state.h(load)
+        q, h = state.problem.q(load), state.problem.h(load)
         limits = {"x_l": np.zeros_like(q)} if h is None else {"G": state.G, "h_u": h}
         library.setup(state.P, q, **limits)
         return state, library
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """PIQP's update of the vectors, with the preconditioner kept; it has no warm start."""
-        h = state.h(load)
-        ready[1].update(c=state.q(load), **({} if h is None else {"h_u": h}))
+        h = state.problem.h(load)
+        ready[1].update(c=state.problem.q(load), **({} if h is None else {"h_u": h}))
         return ready
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:

@@ -24,7 +24,7 @@ STATUS: dict[Any, Status] = {
     proxqp.QPSolverOutput.PROXQP_SOLVED_CLOSEST_PRIMAL_FEASIBLE: "inaccurate",
     proxqp.QPSolverOutput.PROXQP_MAX_ITER_REACHED: "iteration_limit",
 }
-INFINITY = 1e20  # what ProxQP takes for no bound
+INFINITY = 1e20  # ProxQP's value for no bound
 
 
 class ProxQp(Solver):
@@ -41,10 +41,10 @@ class ProxQp(Solver):
         return Converted(problem, dense(problem.blocks), None if G is None else G.toarray())
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        q, h = state.q(load), state.h(load)
+        q, h = state.problem.q(load), state.problem.h(load)
         rows = 0 if h is None else len(h)
         backend = BACKENDS[self.backend]
-        library = proxqp.dense.QP(len(q), 0, rows, state.bounded, dense_backend=backend)
+        library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
         settings = library.settings
         settings.eps_abs = settings.eps_duality_gap_abs = tolerance
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
@@ -61,18 +61,18 @@ class ProxQp(Solver):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """QP.update, with the preconditioner kept, and a warm start.
 
-        It cannot be given the multipliers of box constraints, so that a problem with bounds starts from the
-        case before, whichever is nearest.
+        The multipliers of box constraints cannot be passed, so a problem with bounds starts from the case
+        before, even if another is nearer.
         """
         _, library, _ = ready
-        h = state.h(load)
+        h = state.problem.h(load)
         if h is None:
             library.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
-            library.update(g=state.q(load))
+            library.update(g=state.problem.q(load))
             return state, library, ()
         library.settings.initial_guess = proxqp.InitialGuess.WARM_START
-        library.update(g=state.q(load), u=h)
-        z, multipliers = state.start(start)
+        library.update(g=state.problem.q(load), u=h)
+        z, multipliers = state.problem.start(start.lam, start.gap, start.x)
         return state, library, (z, np.zeros(0), multipliers)
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:

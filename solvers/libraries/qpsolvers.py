@@ -1,4 +1,4 @@
-"""Any other solver that qpsolvers finds, by its name there, https://github.com/qpsolvers/qpsolvers.
+"""All other solvers that qpsolvers finds, by their names there, https://github.com/qpsolvers/qpsolvers.
 
 The matrices go through qpsolvers.Problem, λ comes back through Solution.z (primal form) or Solution.x
 (dual form).
@@ -18,9 +18,9 @@ from problems.errors import InputError
 from solvers.adapter import Converted, dense
 from solvers.base import Answer, LoadCase, Problem, Solver
 
-#: How each solver takes the absolute tolerance. Relative ones are 0 and iteration limits out of the way.
-#: DAQP's own dual tolerance of 1e-12 is not loosened. HiGHS takes no tolerance below 1e-10, and adds 1e-7
-#: to the diagonal of P unless told not to: beside eigenvalues of Q near 1e-5 that moved x by 1e-4 mm.
+#: Options that set the absolute tolerance. Relative tolerances are 0, iteration limits too large to matter.
+#: DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes no tolerance below 1e-10; by default it
+#: adds 1e-7 to the diagonal of P, which with eigenvalues of Q near 1e-5 changed x by 1e-4 mm.
 TOLERANCE: dict[str, Callable[[float], dict[str, Any]]] = {
     "daqp": lambda tol: {"primal_tol": tol, "dual_tol": min(tol, 1e-12), "iter_limit": 1_000_000},
     "highs": lambda tol: {
@@ -42,7 +42,7 @@ class QpSolvers(Solver):
     def __init__(self, name: str) -> None:
         if name not in qpsolvers.available_solvers:
             found = ", ".join(qpsolvers.available_solvers)
-            raise InputError.one("qpsolvers", "solver", name, f"one of those that it finds: {found}")
+            raise InputError.one("qpsolvers", "solver", name, f"one of those it finds: {found}")
         self.name = name
 
     def convert(self, problem: Problem) -> Converted:
@@ -55,7 +55,7 @@ class QpSolvers(Solver):
         return Converted(problem, sp.csc_matrix(P), None if G is None else sp.csc_matrix(G))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        q, h = state.q(load), state.h(load)
+        q, h = state.problem.q(load), state.problem.h(load)
         limits = {"lb": np.zeros_like(q)} if h is None else {"G": state.G, "h": np.array(h)}
         return state, qpsolvers.Problem(state.P, q, **limits)
 
@@ -68,7 +68,7 @@ class QpSolvers(Solver):
             solution = qpsolvers.solve_problem(problem, self.name, **settings)
         except QPError as error:
             return Answer("failed", None, details={**details, "message": str(error)})
-        if solution.x is None or (not state.bounded and (solution.z is None or not solution.z.size)):
+        if solution.x is None or (not state.problem.bounded and (solution.z is None or not solution.z.size)):
             return Answer("failed", None, details=details)
         iterations = solution.extras.get("iterations", solution.extras.get("iter"))
         if isinstance(iterations, np.ndarray):  # quadprog: constraints added, constraints dropped

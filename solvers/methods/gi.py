@@ -103,7 +103,7 @@ class GoldfarbIdnani(Solver):
 def _finished(
     ready: _Prepared, load: LoadCase, result: GiResult, tolerance: float, details: dict[str, Any]
 ) -> Answer:
-    """Block pivoting from the set that the pivots reached, if rounding in Q⁻¹ misled them."""
+    """Block pivoting from the final set of the pivots, if rounding in Q⁻¹ made them inaccurate."""
     closed = np.ones(len(load.p), dtype=bool)
     closed[result.active] = False
     sets = ContactSets(ready.problem.Q, load.p, ready.G)

@@ -7,6 +7,7 @@ V = U + √D (eq. 15), from the start of Algorithm 5. Each option changes one in
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
@@ -17,13 +18,13 @@ from problems.forms.assembly import Vector
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, failed
 from solvers.interior_point.infeasible_start import mehrotra_start, stp1, stp2
 from solvers.interior_point.newton_system import SYSTEMS, NewtonSystem, OpenLast
-from solvers.interior_point.schemes import SCHEMES, CgExhausted, Newton, Point
+from solvers.interior_point.schemes import SCHEMES, CgExhausted, NewtonSteps, Point
 from solvers.interior_point.start import NoStart, Start, algorithm_4, algorithm_5
 
-STALLED = 10  # iterations without progress before the method gives up
+STALLED = 10  # iterations without progress before a restart, or the end
 RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
-TOUCH = 0.1  # mm/N
-FEASIBLE = 1e-3  # mm/√(N·mm)
+CONTACT_COMPLIANCE = 0.1  # mm/N
+FEASIBILITY = 1e-3  # mm/√(N·mm)
 EPS = float(np.finfo(float).eps)
 
 StartName = Literal["algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra"]
@@ -39,6 +40,7 @@ class _Ready:
     units: Vector
 
 
+@dataclass(kw_only=True, frozen=True, eq=False)
 class Ipm(Solver):
     """Primal–dual interior point.
 
@@ -71,58 +73,52 @@ class Ipm(Solver):
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
 
-    def __init__(
-        self,
-        *,
-        start: StartName = "algorithm_5",
-        scheme: str = "algorithm_3",
-        preconditioner: str = "V",
-        ordering: Ordering = "lexicographic",
-        theta: float = 0.995,
-        sigma: float = 0.1,
-        rho: float = 0.1,
-        epsilon: float = 0.01,
-        cg_tolerance: float = 1e-3,
-        feasibility: float | None = None,
-        max_iterations: int = 200,
-        max_cg: float = np.inf,
-    ) -> None:
-        one_of = "one of "
-        rules: list[tuple[str, Any, bool, str]] = [
-            ("start", start, start in get_args(StartName), one_of + ", ".join(get_args(StartName))),
-            ("scheme", scheme, scheme in SCHEMES, one_of + ", ".join(SCHEMES)),
-            ("preconditioner", preconditioner, preconditioner in SYSTEMS, one_of + ", ".join(SYSTEMS)),
-            ("ordering", ordering, ordering in get_args(Ordering), one_of + ", ".join(get_args(Ordering))),
-            ("ordering", ordering, ordering != "open_last" or preconditioner == "V", "open_last is for V"),
-            ("theta", theta, 0 < theta < 1, "must lie in (0, 1)"),
-            ("sigma", sigma, 0 <= sigma <= 1, "must lie in [0, 1]"),
-            ("rho", rho, rho > 0, "must be positive"),
-            ("epsilon", epsilon, epsilon > 0, "must be positive, mm"),
-            ("cg_tolerance", cg_tolerance, 0 < cg_tolerance < 1, "must lie in (0, 1)"),
-            ("feasibility", feasibility, feasibility is None or feasibility > 0, "must be positive, mm"),
-            ("max_iterations", max_iterations, max_iterations >= 1, "must be at least 1"),
-            ("max_cg", max_cg, max_cg >= 1, "must be at least 1"),
+    start: StartName = "algorithm_5"
+    scheme: str = "algorithm_3"
+    preconditioner: str = "V"
+    ordering: Ordering = "lexicographic"
+    theta: float = 0.995
+    sigma: float = 0.1
+    rho: float = 0.1
+    epsilon: float = 0.01
+    cg_tolerance: float = 1e-3
+    feasibility: float | None = None
+    max_iterations: int = 200
+    max_cg: float = np.inf
+
+    def __post_init__(self) -> None:
+        choices: dict[str, Collection[str]] = {
+            "start": get_args(StartName),
+            "scheme": SCHEMES,
+            "preconditioner": SYSTEMS,
+            "ordering": get_args(Ordering),
+        }
+        rules = [
+            (key, getattr(self, key) in known, f"one of {', '.join(known)}") for key, known in choices.items()
         ]
-        faults = [Fault("ipm", key, value, allowed) for key, value, holds, allowed in rules if not holds]
+        rules += [
+            ("ordering", self.ordering != "open_last" or self.preconditioner == "V", "open_last is for V"),
+            ("theta", 0 < self.theta < 1, "must lie in (0, 1)"),
+            ("sigma", 0 <= self.sigma <= 1, "must lie in [0, 1]"),
+            ("rho", self.rho > 0, "must be positive"),
+            ("epsilon", self.epsilon > 0, "must be positive, mm"),
+            ("cg_tolerance", 0 < self.cg_tolerance < 1, "must lie in (0, 1)"),
+            ("feasibility", self.feasibility is None or self.feasibility > 0, "must be positive, mm"),
+            ("max_iterations", self.max_iterations >= 1, "must be at least 1"),
+            ("max_cg", self.max_cg >= 1, "must be at least 1"),
+        ]
+        faults = [
+            Fault("ipm", key, getattr(self, key), allowed) for key, holds, allowed in rules if not holds
+        ]
         if faults:
             raise InputError(faults)
-        self.start = start
-        self.scheme = SCHEMES[scheme]
-        self.make_system = OpenLast if ordering == "open_last" else SYSTEMS[preconditioner]
-        self.theta = theta
-        self.sigma = sigma
-        self.rho = rho
-        self.epsilon = epsilon
-        self.cg_tolerance = cg_tolerance
-        self.feasibility = feasibility
-        self.max_iterations = max_iterations
-        self.max_cg = max_cg
 
     def prepare(self, data: Problem) -> _Ready | Answer:
         """The factors of Q; a failed answer if Q is not positive definite."""
         units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
+        make_system = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
         try:
-            return _Ready(data, self.make_system(data.Q), units)
+            return _Ready(data, make_system(data.Q), units)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 
@@ -131,14 +127,14 @@ class Ipm(Solver):
             return ready
         Q, system = ready.problem.Q, ready.system
         system.begin()
-        newton = Newton(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
+        newton = NewtonSteps(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
         details: dict[str, Any] = {"cg": newton.counts}
         try:
             start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
         except (NoStart, np.linalg.LinAlgError) as error:
             return failed(str(error), iterations=0)
         first = newton.at(start.lam, start.y)  # step 3
-        details["start"] = _about(start, first)
+        details["start"] = _start_details(start, first)
         status, cause, point = self._iterate(newton, first, tolerance, ready.units)
         for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
             if status != "inaccurate":
@@ -176,29 +172,29 @@ class Ipm(Solver):
             return mehrotra_start(problem.Q, load.p)
 
     def _iterate(
-        self, newton: Newton, point: Point, tolerance: float, units: Vector
+        self, newton: NewtonSteps, point: Point, tolerance: float, units: Vector
     ) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8: status, cause and the last finite point."""
-        feasibility = self.feasibility or FEASIBLE * np.sqrt(tolerance)
+        feasibility = self.feasibility or FEASIBILITY * np.sqrt(tolerance)
         smallest, stalled = np.inf, 0
         for _ in range(self.max_iterations):  # step 4
             rounding = _rounding(newton, point.lam)
             measure = max(
                 point.mu / tolerance,
                 point.infeasibility / max(feasibility, rounding),
-                _undecided(newton, point, units) / max(np.sqrt(TOUCH * tolerance), rounding),
+                _undecided(newton, point, units) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
             )
             if measure <= 1:
                 return "solved", "", point
             stalled = 0 if measure < smallest else stalled + 1
             smallest = min(smallest, measure)
             if stalled == STALLED or point.mu == 0.0:
-                why = f"{newton.unconverged} systems of unconverged CG" if newton.unconverged else "rounding"
-                return "inaccurate", f"{why}: {smallest:.1e} × what was asked for, and no less", point
+                why = f"{newton.unconverged} unconverged CG solves" if newton.unconverged else "rounding"
+                return "inaccurate", f"{why}: stalled at {smallest:.1e} × the required accuracy", point
             try:
-                following = self.scheme(newton, point)  # steps 5 to 7
+                following = SCHEMES[self.scheme](newton, point)  # steps 5 to 7
             except CgExhausted:
-                return "iteration_limit", f"all of max_cg = {self.max_cg:g} CG iterations are spent", point
+                return "iteration_limit", f"max_cg = {self.max_cg:g} CG iterations reached", point
             except np.linalg.LinAlgError as error:
                 return "inaccurate", f"Q + D is no longer positive definite: {error}", point
             if not _is_inside(following):
@@ -207,7 +203,7 @@ class Ipm(Solver):
         return "iteration_limit", f"max_iterations = {self.max_iterations}", point
 
 
-def _about(start: Start, point: Point) -> dict[str, float]:
+def _start_details(start: Start, point: Point) -> dict[str, float]:
     return {
         "mu": point.mu,
         "infeasibility_mm": float(abs(point.s1).max()),
@@ -216,12 +212,12 @@ def _about(start: Start, point: Point) -> dict[str, float]:
     }
 
 
-def _undecided(newton: Newton, point: Point, units: Vector) -> float:
+def _undecided(newton: NewtonSteps, point: Point, units: Vector) -> float:
     """max min(y_i, q_ii λ_i) / max_j |a_ji|: the largest distance from being closed or open, mm."""
     return float((np.minimum(point.y, np.diag(newton.Q) * point.lam) / units).max())
 
 
-def _rounding(newton: Newton, lam: Vector) -> float:
+def _rounding(newton: NewtonSteps, lam: Vector) -> float:
     """Bound on the rounding error of Qλ − p, mm."""
     root = np.sqrt(np.diag(newton.Q))
     return 4 * EPS * float((abs(newton.p) + root * (root @ lam)).max())

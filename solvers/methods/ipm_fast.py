@@ -19,7 +19,7 @@ from solvers.active_set.solve import solve_from
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, failed
 from solvers.interior_point.infeasible_start import stp2
 from solvers.interior_point.newton_system import Direct, NewtonSystem
-from solvers.interior_point.schemes import Newton, Point, mehrotra
+from solvers.interior_point.schemes import NewtonSteps, Point, mehrotra
 from solvers.interior_point.single_precision import SinglePrecision
 from solvers.interior_point.start import NoStart, algorithm_5
 from solvers.linear_algebra.inverse import inverse_with_factor
@@ -87,7 +87,7 @@ class FastIpm(Solver):
         Q, p, system = ready.problem.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()
-        newton = Newton(Q, p, system, THETA, 0.0, REFINEMENT, np.inf)
+        newton = NewtonSteps(Q, p, system, THETA, 0.0, REFINEMENT, np.inf)
         start = stp2(Q, p, RHO, LEAST_GAP) if self.start_at_gaps else algorithm_5(Q, p)
         point = newton.at(start.lam, start.y)
         details: dict[str, Any] = {"start": {"mu": point.mu}}

@@ -31,8 +31,8 @@ from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
 
 WIDTHS = (4, 2)  # of the cells, in contacts
-COARSE_PASSES = 4  # a guess need not be right
-NEAR = 1 / 8  # of the contacts: an answer that is wrong at more of them is no better than the subsets'
+COARSE_PASSES = 4  # on each subset, which only needs an approximate solution
+MAX_WARM_CHANGES = 1 / 8  # of the contacts: with more changes, a warm start is no better than the subsets
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class ActiveSetNewton(Solver):
 
     Options
     -------
-    nested : begin with the subsets; without, with C = {p > 0}. In a series both come after a near answer
-        that is wrong at no more than an eighth of the contacts.
+    nested : start from the subsets; if false, from C = {p > 0}. In a series, a warm start that changes at
+        most an eighth of the contacts takes precedence.
     max_sets : limit on the contact sets tried.
     """
 
@@ -84,22 +84,22 @@ class ActiveSetNewton(Solver):
         tolerance: float,
         start: WarmStart,
     ) -> _Ready | Answer:
-        """The first guess comes from the near answer."""
+        """The first guess comes from the warm start."""
         return state if isinstance(state, Answer) else replace(state, start=start)
 
     def batched(self, state: _Ready | Answer) -> BatchedSweeps | None:
-        """Sweeps with a banded M ≈ Q⁻¹; contact sets as in `solve` for what they do not settle."""
+        """Sweeps with a banded M ≈ Q⁻¹; unsettled cases are solved as in `solve`."""
         if isinstance(state, Answer):
             return None
         Q, nodes, inverse = state.problem.Q, state.problem.assembly.contact_nodes, state.inverse
 
-        def alone(C: Set | None, p: Vector, tolerance: float) -> Answer:
+        def solve_one(C: Set | None, p: Vector, tolerance: float) -> Answer:
             if C is None:
                 C, _ = _first_guess(state, p, tolerance)
             sets = ContactSets(Q, p, inverse)
             return self._settled(solve_from(C, sets, tolerance, self.max_sets), sets, tolerance)
 
-        return BatchedSweeps(Q, banded_inverse(Q, nodes), alone)
+        return BatchedSweeps(Q, banded_inverse(Q, nodes), solve_one)
 
     def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
@@ -124,12 +124,12 @@ class ActiveSetNewton(Solver):
 
 
 def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
-    """The set that the near answer suggests, else the forces of the finest subset; the sets tried there."""
+    """The contact set of the warm start, else of the finest subset; the number of sets tried on subsets."""
     Q, tried = ready.problem.Q, 0
     if ready.start is not None:
         lam, y = ready.start.lam, ready.start.gap + ready.start.load.p - p  # Qλ − p
         C = np.diag(Q) * lam > y
-        if (C ^ (lam > 0)).sum() <= NEAR * len(p):
+        if (C ^ (lam > 0)).sum() <= MAX_WARM_CHANGES * len(p):
             return C, tried
     C = p > 0
     for cells in ready.cells:
@@ -140,6 +140,6 @@ def _first_guess(ready: _Ready, p: Vector, tolerance: float) -> tuple[Set, int]:
         lam = np.zeros(len(p))
         lam[rows] = np.where(found.C, np.maximum(found.trial.lam, 0.0), 0.0)
         C = (lam > 0) | (product(Q, lam) < p)
-    if tried and 2 * found.C.sum() > len(found.C):  # sets of few open contacts take small factors of Q⁻¹
+    if tried and 2 * found.C.sum() > len(found.C):  # few open contacts: small factors of Q⁻¹
         C = p > 0
     return C, tried

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.problem import side_by_side
+from problems.forms.problem import stacked
 
 from .bound import Bound, gaps
 from .residual import refined, residual, split
@@ -49,7 +49,7 @@ def assess(
     A = assembly.A
     f, g = (np.column_stack([getattr(load, name) for load in loads]) for name in "fg")
     has_p = all(load.p.size for load in loads)
-    p = np.column_stack([load.p for load in loads]) if has_p else prepared.dual_load(side_by_side(loads))
+    p = np.column_stack([load.p for load in loads]) if has_p else prepared.dual_load(stacked(loads))
     lam = np.column_stack(lams)
     compliance = np.diag(prepared.Q)[:, None]
     clean = np.where(compliance * lam > prepared.Q @ lam - p, np.maximum(lam, 0.0), 0.0)
