@@ -111,7 +111,7 @@ def test_a_wrong_set_is_corrected(seed: int, monkeypatch: pytest.MonkeyPatch) ->
     load, x, lam = chosen(made, seed, 0.4, 0.0)
     wrong = lam > 0
     wrong[[np.flatnonzero(lam > 0)[0], np.flatnonzero(lam == 0)[0]]] ^= True
-    monkeypatch.setattr(module, "contact_set", lambda *_: wrong)
+    monkeypatch.setattr(module, "contact_set", lambda *_, **__: wrong)
     found = refined_active_set(made, load)
     np.testing.assert_array_equal(found.active, lam > 0)
     np.testing.assert_allclose(found.x, x, atol=1e-10)
@@ -121,7 +121,7 @@ def test_a_wrong_set_is_corrected(seed: int, monkeypatch: pytest.MonkeyPatch) ->
 def test_the_bound_of_a_wrong_set_is_wide_and_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     made = make_prepared(1, 25)
     load, x, lam = chosen(made, 1, 0.4, 0.0)
-    monkeypatch.setattr(module, "contact_set", lambda *_: lam == 0)
+    monkeypatch.setattr(module, "contact_set", lambda *_, **__: lam == 0)
     monkeypatch.setattr(module, "MAX_SET_CORRECTIONS", 1)
     found = refined_active_set(made, load)
     assert 1e-2 < abs(found.x - x).max() <= found.bound_mm

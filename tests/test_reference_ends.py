@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small import make_load, make_prepared
 
+from harness.measurement.row import _why_not_judged
+from harness.planning.plan import expand
+from harness.planning.suite import read_suite
 from harness.verification import principal_pivoting
 from harness.verification.interior_point import interior_contact_set
+from harness.verification.judge import Judgement
 from harness.verification.principal_pivoting import contact_set
-from harness.verification.reference import refined_active_set
+from harness.verification.reference import STOPPED, reference, refined_active_set
+from harness.verification.reference_problem import reference_problem
 from problems.forms.prepared import Prepared
 from problems.manufactured.ladder import make_rung
 
@@ -80,3 +87,37 @@ def test_a_stopped_search_returns_at_once() -> None:
     found = contact_set(fathi(64).Q, np.ones(64), np.ones(64, dtype=bool), lambda: next(calls) >= 3)
     assert next(calls) <= 6
     assert found.shape == (64,)
+
+
+def test_a_search_out_of_time_says_so_and_is_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
+    made = make_rung("hard/pivoting/fathi-128").made
+    assert made is not None
+    data = Prepared(made.assembly)
+    data.key = "fathi"
+    stopped = reference(data, made.load, 1e-9)
+    assert "stopped after 1e-09 s" in stopped.route
+    x = np.asarray(made.x)
+    assert abs(stopped.x - x).max() <= stopped.bound_mm  # wide or not, the bound holds
+    found = reference(data, made.load)
+    assert found.route.startswith("proven")
+    assert found.bound_mm < 1e-12
+    again = reference(data, made.load, 1e-9)
+    assert (again.route, again.bound_mm) == (found.route, found.bound_mm)
+
+
+def test_a_row_says_why_it_cannot_be_judged(tmp_path: Path) -> None:
+    """The search is stopped at once: either the first set was right, or the rows say that it was stopped."""
+    suite = tmp_path / "mine.toml"
+    suite.write_text(
+        'scenes = ["hard/pivoting/fathi-008"]\nreference_limit_s = 0.001\n[[solver]]\nname = "newton"\n'
+    )
+    assert read_suite(str(suite)).reference_limit_s == 0.001
+    assert {m.reference_limit_s for m in expand(read_suite(str(suite)))} == {0.001}
+    judgement = Judgement("cannot_be_judged", 1e-3)
+    problem = reference_problem("hard/pivoting/fathi-008")
+    wide = replace(problem, reference=replace(problem.reference, bound_mm=1e-3, route=f"proven, {STOPPED}"))
+    assert _why_not_judged(judgement, wide) == f"reference error bound 1e-03 mm: proven, {STOPPED}"
+    assert _why_not_judged(Judgement("within"), problem) is None

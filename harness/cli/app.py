@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import Plugin, Scheduler, error_reporting, option
+from harness.terminal.console import Plugin, ReferenceLimit, Scheduler, error_reporting, option
 from harness.terminal.exit_codes import DONE, FAILED
 
 from . import scene as scene_commands
@@ -89,6 +89,7 @@ def run(
     memory_limit: Annotated[
         int | None, option("MIB", "Memory limit, over all processes of the solver.", min=1)
     ] = None,
+    reference_limit: ReferenceLimit = None,
     out: Annotated[Path | None, option("DIR", "Output directory.  [default: results/SUITE]")] = None,
     plugin: Plugin = None,
     scheduler: Scheduler = None,
@@ -127,6 +128,7 @@ def run(
             threads=tuple(threads or ()),
             time_limit_s=time_limit,
             memory_limit_mib=memory_limit,
+            reference_limit_s=reference_limit,
             plugin=plugin,
         )
         chosen = overridden(read_suite(suite), change)
@@ -173,6 +175,7 @@ def report(
 @app.command()
 def gate(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")],
+    reference_limit: ReferenceLimit = None,
 ) -> None:
     """Judge the saved answers again, and fail if accuracy was lost.
 
@@ -192,7 +195,7 @@ def gate(
     with error_reporting() as console:
         from harness.verification.gate import gate as judge_directory
 
-        raise typer.Exit(judge_directory(directory, console))
+        raise typer.Exit(judge_directory(directory, console, reference_limit))
 
 
 @app.command("list")

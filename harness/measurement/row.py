@@ -94,6 +94,13 @@ def rows_of(
     return [_row(*case, problem, result.elapsed_s) | shared for case in cases]
 
 
+def _why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | None:
+    if judgement.verdict != "cannot_be_judged":
+        return None
+    known = problem.reference
+    return f"reference error bound {known.bound_mm:.0e} mm: {known.route}"
+
+
 def _row(m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, elapsed_s: float) -> Row:
     """The fields of one measurement."""
     if "cannot_save" in report:
@@ -121,6 +128,7 @@ def _row(m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, e
         "threads_asked": m.threads,
         **measured,
         **asdict(judgement),
+        "message": measured["message"] or _why_not_judged(judgement, problem),
         **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
         "overhead_s": elapsed_s - sum(steps) if m.case is None else None,
     }

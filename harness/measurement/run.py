@@ -142,7 +142,7 @@ def pending_tasks(
         m = batch[0]
         if problem is None or problem.scene.name != m.scene:
             start = time.monotonic()
-            problem = reference_problem(m.source, partial(display.building, m.scene))
+            problem = reference_problem(m.source, partial(display.building, m.scene), m.reference_limit_s)
             record(problem, directory)
             display.ready(m.scene, time.monotonic() - start)
         display.doing(f"{m.scene}: {m.solver} {m.form}")

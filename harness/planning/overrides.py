@@ -26,6 +26,7 @@ class Overrides:
     threads: tuple[int, ...] = ()
     time_limit_s: float | None = None
     memory_limit_mib: int | None = None
+    reference_limit_s: float | None = None
     plugin: Path | None = None
 
 
@@ -57,6 +58,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
         "threads": list(change.threads),
         "time_limit_s": change.time_limit_s,
         "memory_limit_mib": change.memory_limit_mib,
+        "reference_limit_s": change.reference_limit_s,
         "plugin": plugin,
     }
     changes = {key: value for key, value in changes.items() if value not in ([], None)}

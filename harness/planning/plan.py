@@ -45,6 +45,7 @@ class Measurement:
     series: RandomCases | None = None
     case: int | None = None
     batched: int | None = None
+    reference_limit_s: float | None = None
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -153,6 +154,7 @@ def _of_entry(
             series=series,
             case=case,
             batched=entry.batched,
+            reference_limit_s=suite.reference_limit_s,
         )
 
 

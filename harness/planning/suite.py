@@ -76,6 +76,7 @@ class Suite(BaseModel):
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
+    reference_limit_s is for the search of each reference; by default 60 s per thousand contacts, at least 60.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -90,6 +91,7 @@ class Suite(BaseModel):
     time_limit_s: Positive = 60.0
     time_limit_by_size_s: dict[PositiveInt, Positive] = {}
     memory_limit_mib: PositiveInt = 8192
+    reference_limit_s: Positive | None = None
     limit_mm: Positive = 1e-7
     yardstick: bool = False
     plugin: str | None = None

@@ -67,7 +67,14 @@ class Steps:
             self.built.append(text)
 
 
-def solve(source: str, solver: str | None, tolerance: float, out: Path, console: Console) -> int:
+def solve(
+    source: str,
+    solver: str | None,
+    tolerance: float,
+    out: Path,
+    console: Console,
+    reference_limit_s: float | None = None,
+) -> int:
     """Solve a scene, write DIR, show the outcome. Returns 0 if the answer is within 1e-7 mm, else 1.
 
     Raises InputError.
@@ -90,7 +97,7 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
         p = data.dual_load(load)
     has_contact = bool((p > 0).any())
     with steps.step("answer with a proven bound"):
-        known = reference_of(scene, data, load)
+        known = reference_of(scene, data, load, reference_limit_s)
     if solver and chosen and has_contact:
         with steps.step(f"solving with {solver}"):
             x, lam, outcome = _answer(solver, chosen, data, load, tolerance)

@@ -27,6 +27,12 @@ SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or .npz with matrices.")
 ]
 Plugin = Annotated[Path | None, option("FILE", "Python file with your own solver.")]
+ReferenceLimit = Annotated[
+    float | None,
+    option(
+        "SECONDS", "For each reference's search.  [default: 60 per thousand contacts, at least 60]", min=0.001
+    ),
+]
 Scheduler = Annotated[
     str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
 ]

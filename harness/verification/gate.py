@@ -39,7 +39,7 @@ class Finding:
     why: str = ""
 
 
-def gate(directory: Path, console: Console) -> int:
+def gate(directory: Path, console: Console, reference_limit_s: float | None = None) -> int:
     """Judge every gated row of DIRECTORY.
 
     Returns 0 if all gated rows are within 1e-7 mm (on a rung of a ladder, what conditioning allows), 1 if
@@ -49,7 +49,7 @@ def gate(directory: Path, console: Console) -> int:
     if not directory.is_dir():
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
     rows = gated_rows(directory / records.MEASUREMENTS)
-    findings = [*judged(rows, directory), *never_measured(rows, directory)]
+    findings = [*judged(rows, directory, reference_limit_s), *never_measured(rows, directory)]
     console.print(table(findings))
     verdicts = [finding.judgement.verdict for finding in findings]
     fine = verdicts.count("within")
@@ -79,13 +79,13 @@ def gated_rows(path: Path) -> dict[str, Row]:
     return {row["key"]: row for row in rows if row["gated"]}
 
 
-def judged(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
+def judged(rows: dict[str, Row], directory: Path, limit_s: float | None = None) -> Iterator[Finding]:
     """The rows' answers, judged scene by scene, so that each scene is opened once."""
     problem: ReferenceProblem | None = None
     source = None
     for row in sorted(rows.values(), key=lambda row: str(row["source"])):
         if problem is None or row["source"] != source:
-            problem, source = reference_problem(row["source"]), row["source"]
+            problem, source = reference_problem(row["source"], limit_s=limit_s), row["source"]
         yield judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
 
 

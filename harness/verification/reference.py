@@ -13,6 +13,7 @@ refinement repeated until λ_C ≥ 0 and g − Aᵀx ≥ 0 hold for the refined 
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ from .principal_pivoting import contact_set
 
 MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
+STOPPED = "the search for the contact set was stopped"
 ENOUGH = 1e-20  # relative to x: a smaller correction is the last
 
 
@@ -55,29 +57,40 @@ class Reference:
     gap_unit_mm: Vector | float = 1.0
 
 
-def reference_of(scene: Scene, prepared: Prepared, load: LoadCase) -> Reference:
-    """The reference of a scene: the answer that it was made from, if any, else the refined one."""
+def default_limit_s(m: int) -> float:
+    """Seconds for the search of the contact set among m contacts: 60 per thousand, at least 60."""
+    return 0.06 * max(m, 1000)
+
+
+def reference_of(scene: Scene, prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
+    """The reference of a scene: the answer that it was made from, if any, else the refined one.
+
+    limit_s : of the search for the contact set, by default `default_limit_s(m)`. What it has found by then is
+        refined and certified; if the bound is wide, answers cannot be judged, and `route` says why.
+    """
     if isinstance(scene, MadeScene):
         made = scene.made
         if made.x is None or made.lam is None:
-            return refined_active_set(prepared, load)
+            return refined_active_set(prepared, load, limit_s)
         route = "chosen, exact"
         return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
-    return reference(prepared, load)
+    return reference(prepared, load, limit_s)
 
 
-def reference(prepared: Prepared, load: LoadCase) -> Reference:
+def reference(prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
     """The reference of a load case, from the cache if it was computed before for these matrices."""
     if prepared.key is None:
-        return refined_active_set(prepared, load)
+        return refined_active_set(prepared, load, limit_s)
     key = cache.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
 
-    def made() -> cache.Entry:
-        found = refined_active_set(prepared, load)
-        arrays: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam, "active": found.active}
-        return arrays, {"bound_mm": found.bound_mm, "route": found.route}
-
-    arrays, facts = cache.load_or_make(key, made)
+    stored = cache.load(key)
+    if stored is None:
+        found = refined_active_set(prepared, load, limit_s)
+        if STOPPED not in found.route:  # else a longer search may find more
+            made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam, "active": found.active}
+            cache.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
+        return found
+    arrays, facts = stored
     x, lam, active = (np.array(arrays[name]) for name in ("x", "lam", "active"))
     return Reference(x, lam, active, facts["bound_mm"], facts["route"])
 
@@ -107,11 +120,15 @@ def _code() -> str:
     return fingerprint([Path(__file__)], within=["harness/verification"])
 
 
-def refined_active_set(prepared: Prepared, load: LoadCase) -> Reference:
+def refined_active_set(prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
     """The active set, refined and certified."""
     p = prepared.dual_load(load)
-    meets = bool((p > 0).any())  # else Q is not needed
-    active = contact_set(prepared.compliance, p) if meets else np.zeros(len(p), dtype=bool)
+    active = np.zeros(len(p), dtype=bool)
+    limit_s = default_limit_s(len(p)) if limit_s is None else limit_s
+    end = time.monotonic() + limit_s
+    if (p > 0).any():  # else Q is not needed
+        active = contact_set(prepared.compliance, p, stop=lambda: time.monotonic() > end)
+    stopped = time.monotonic() > end
     for _ in range(MAX_SET_CORRECTIONS):
         x, lam = _refine(prepared, load, active)
         s = gaps(prepared.assembly, load.g, x)
@@ -123,6 +140,8 @@ def refined_active_set(prepared: Prepared, load: LoadCase) -> Reference:
     proof = certify(prepared.assembly, load, x, lam, active, proven_lambda_min(prepared))
     undecided = int((~(proof.closed | proof.open)).sum())
     route = "proven" + (f", {undecided} contacts weakly active" if undecided else "")
+    if stopped:
+        route += f", {STOPPED} after {limit_s:g} s"
     return Reference(proof.x.hi, proof.lam.hi, active, proof.bound_mm, route)
 
 

@@ -20,18 +20,21 @@ from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 
 from .judge import Judgement, conditioned_limit, judge
-from .reference import Reference, reference, reference_of
+from .reference import Reference, default_limit_s, reference, reference_of
 
 
 @dataclass(frozen=True)
 class ReferenceProblem:
-    """A scene whose answers can be measured and judged. reference_s : seconds that its reference took."""
+    """A scene whose answers can be measured and judged. reference_s, limit_s : seconds that its
+    reference took, and may take.
+    """
 
     scene: Scene
     prepared: Prepared
     load: LoadCase
     reference: Reference
     reference_s: float
+    limit_s: float | None = None
 
     def limit_mm(self, asked: float) -> float:
         """The limit on an answer: as asked for; on a rung of a ladder, no less than conditioning allows."""
@@ -46,7 +49,7 @@ class ReferenceProblem:
         if series is None or case is None:
             return self
         load = random_gaps(self.scene, **series).load(case)
-        return replace(self, load=load, reference=reference(self.prepared, load))
+        return replace(self, load=load, reference=reference(self.prepared, load, self.limit_s))
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""
@@ -58,18 +61,21 @@ class ReferenceProblem:
         return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
 
 
-def reference_problem(source: str, progress: Progress = lambda text, fraction: None) -> ReferenceProblem:
-    """Open or build a scene, by name or path, and its reference. Raises InputError."""
+def reference_problem(
+    source: str, progress: Progress = lambda text, fraction: None, limit_s: float | None = None
+) -> ReferenceProblem:
+    """Open or build a scene, by name or path, and its reference, within limit_s. Raises InputError."""
     scene = read_scene(source)
     data = prepared(scene, progress)
     if data.assembly.m == 0:
         allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
         raise InputError.one(source, "contacts", 0, allowed)
     load = load_case(scene)
-    progress("reference", 0.0)
+    limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
+    progress(f"reference, at most {limit_s:g} s", 0.0)
     start = time.perf_counter()
-    known = reference_of(scene, data, load)
-    return ReferenceProblem(scene, data, load, known, time.perf_counter() - start)
+    known = reference_of(scene, data, load, limit_s)
+    return ReferenceProblem(scene, data, load, known, time.perf_counter() - start, limit_s)
 
 
 def record(problem: ReferenceProblem, directory: Path) -> None:
