@@ -167,7 +167,7 @@ def test_workers_of_this_machine_are_processes_of_their_own() -> None:
 def test_a_scheduler_that_does_not_answer_leaves_the_solved_cases(
     job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("harness.measurement.scheduler.ANSWERS_WITHIN", "1s")
+    monkeypatch.setattr("harness.measurement.scheduler.CONNECT_TIMEOUT", "1s")
     out = tmp_path / "out"
     with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9.*does not answer"):
         run(job, {}, out, quiet(), "tcp://127.0.0.1:9")

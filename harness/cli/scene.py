@@ -63,7 +63,7 @@ def validate(scene: SceneName) -> None:
 @app.command()
 def export(
     scene: SceneName,
-    file_format: Annotated[
+    form: Annotated[
         str, typer.Option("--format", metavar="FORMAT", help="npz, mtx, op4, dmig, abaqus, qpsolvers.")
     ],
     out: Annotated[Path, option("PATH", "A file; a folder for mtx and abaqus.")],
@@ -81,7 +81,7 @@ def export(
     with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.exchange import export as export_scene
 
-        export_scene(scene, file_format, out, console)
+        export_scene(scene, form, out, console)
 
 
 @app.command("import")

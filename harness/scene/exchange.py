@@ -20,16 +20,16 @@ from problems.scene import read_scene
 from .few_digits import digits_sentence
 
 
-def export(source: str, file_format: str, out: Path, console: Console) -> None:
+def export(source: str, format: str, out: Path, console: Console) -> None:
     """Write K, A, f, g of a scene in a format of problems.formats. Raises InputError."""
-    if file_format not in formats.WRITERS:
-        raise InputError.one("--format", "format", file_format, f"one of {', '.join(formats.WRITERS)}")
+    if format not in formats.WRITERS:
+        raise InputError.one("--format", "format", format, f"one of {', '.join(formats.WRITERS)}")
     scene = read_scene(source)
     data = prepared(scene)
     load = load_case(scene)
     out.parent.mkdir(parents=True, exist_ok=True)
-    formats.write(file_format, out, matrices(data, load))
-    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.WRITERS[file_format]}.")
+    formats.write(format, out, matrices(data, load))
+    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.WRITERS[format]}.")
 
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:

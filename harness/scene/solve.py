@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from harness.measurement.answers import InvalidAnswer
+from harness.measurement.answers import Refused
 from harness.measurement.solver_session import SolverSession
 from harness.planning.estimate import refuse_what_cannot_fit
 from harness.results.machine import resident_mib
@@ -152,7 +152,7 @@ def _answer(
     (load,) = problem.loads([case])
     try:
         answer = session.next(load, None)
-    except InvalidAnswer as error:
+    except Refused as error:
         raise InputError.one("--solver", name, str(error), "gave no answer; try another solver") from error
     (x,) = problem.recover([answer.lam], [answer.x], [load])
     if x is None:
