@@ -23,7 +23,7 @@ from pydantic import ValidationError
 from problems.input.bounded import regular_file
 from problems.input.validation import UNITS, unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, make_rung, rung_names
-from problems.model.effect import Effect, Pair, StiffnessEffect
+from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
 from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
@@ -165,18 +165,15 @@ def _joint(
     if not table:
         return None
     try:
-        joint = _with_contacts(Joint.model_validate(table), effects)
+        joint = Joint.model_validate(table)
     except ValidationError as error:
         faults += validation_faults(path, Joint, error, units=UNITS)
         return None
+    new = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
+    if new:
+        joint = joint.model_copy(update={"contacts": (*joint.pairs, *dict.fromkeys(new))})
     faults += [Fault(str(path), *fault) for fault in joint.faults()]
     return joint
-
-
-def _with_contacts(joint: Joint, effects: tuple[Effect, ...]) -> Joint:
-    """The joint with the contacts that effects add."""
-    new: list[Pair] = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
-    return joint.model_copy(update={"contacts": (*joint.pairs, *dict.fromkeys(new))}) if new else joint
 
 
 def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> list[EffectTable]:

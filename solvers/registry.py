@@ -11,14 +11,14 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Callable
-from difflib import get_close_matches
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from problems import __version__
 from problems.errors import Fault, InputError
+from problems.input.validation import unknown
 
 from .base import Solver
 from .plugin import load_plugin, solver_class
@@ -107,14 +107,9 @@ def _factory(name: str, plugin: Path | None) -> Callable[..., Solver]:
     if name in _found_by_qpsolvers():
         from .libraries.qpsolvers import QpSolvers
 
-        def by_name() -> Solver:
-            return QpSolvers(name)
-
-        return by_name
+        return partial(QpSolvers, name)
     known = [*solver_names(), *([plugin.stem] if plugin else [])]
-    close = get_close_matches(name, known, 1)
-    hint = f"did you mean {close[0]!r}? " if close else ""
-    raise InputError.one("solvers", "name", name, f"no such solver: {hint}known: {', '.join(known)}")
+    raise InputError.one("solvers", "name", name, unknown("solver", name, known))
 
 
 def _class_of(name: str) -> type[Solver]:

@@ -38,7 +38,7 @@ def test_versions_are_those_installed(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "words"),
     [
-        ("osqpp", {}, ["osqpp", "did you mean 'osqp'"]),
+        ("osqpp", {}, ["osqpp", "did you mean osqp?"]),
         ("osqp", {"polish": True, "speed": 9}, ["options.polish", "options.speed", "polishing"]),
         ("osqp", {"polishing": 1}, ["solver osqp", "options.polishing = 1", "False, True"]),
         ("clarabel", {"direct_solve_method": "mumps"}, ["'mumps'", "'faer', 'qdldl', 'auto'"]),

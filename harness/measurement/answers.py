@@ -14,27 +14,27 @@ from problems.forms.problem import Problem
 from solvers.base import Answer, Status
 
 
-class InvalidAnswer(Exception):
+class Refused(Exception):
     """The answer is invalid; the text says why."""
 
 
 def validated(answer: Answer, problem: Problem) -> Answer:
-    """The answer. Raises InvalidAnswer if it is not one: type, status, shapes or values are wrong."""
+    """The answer. Raises Refused if it is not one: type, status, shapes or values are wrong."""
     if not isinstance(answer, Answer):
-        raise InvalidAnswer(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
+        raise Refused(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
     if answer.status not in get_args(Status):
-        raise InvalidAnswer(f"status {answer.status!r}; allowed: {', '.join(get_args(Status))}")
+        raise Refused(f"status {answer.status!r}; allowed: {', '.join(get_args(Status))}")
     needed = problem.needs[-1]  # x in a form that gives it: forces may be missing there
     if answer.status == "solved" and getattr(answer, needed) is None:
-        raise InvalidAnswer(f"says solved, and gives no {needed}")
+        raise Refused(f"says solved, and gives no {needed}")
     assembly = problem.assembly
     for name, value, size in (("lam", answer.lam, assembly.m), ("x", answer.x, assembly.n)):
         if value is None:
             continue
         if np.shape(value) != (size,):
-            raise InvalidAnswer(f"{name} has shape {np.shape(value)}; wanted ({size},)")
+            raise Refused(f"{name} has shape {np.shape(value)}; wanted ({size},)")
         if not np.isfinite(np.asarray(value, dtype=float)).all():
-            raise InvalidAnswer(f"{name} has NaN or infinity")
+            raise Refused(f"{name} has NaN or infinity")
     return answer
 
 

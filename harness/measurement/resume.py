@@ -31,8 +31,7 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
 
     old = [row for row in rows if is_old(row)]
     if old:
-        for row in old:
-            records.append(directory / records.OUTDATED, row | {"answer": None})
+        records.append(directory / records.OUTDATED, *(row | {"answer": None} for row in old))
         rows = [row for row in rows if row not in old]
         records.rewrite(path, rows)
         why = "the scene, the solver or the limits have changed since"

@@ -14,7 +14,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.problem import Problem
 from solvers.base import Answer, Batch, Solver, WarmStart
 
-from .answers import InvalidAnswer, validated
+from .answers import Refused, validated
 
 #: A context around a step of the solver, given the row field of its seconds: times it, or names what failed.
 Lap = Callable[[str], AbstractContextManager[None]]
@@ -38,7 +38,7 @@ class SolverSession:
     lap : entered around each step, with convert_s, prepare_s, setup_s or solve_s.
     most : answers kept for warm starts; all by default.
 
-    Raises what the solver raises, and InvalidAnswer if an answer is invalid.
+    Raises what the solver raises, and Refused if an answer is invalid.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class SolverSession:
         assert self.batch is not None
         answers = list(self.batch(loads, self.tolerance))
         if len(answers) != len(loads):
-            raise InvalidAnswer(f"{len(answers)} answers to {len(loads)} load cases")
+            raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
         return [validated(answer, self.problem) for answer in answers]
 
     def forget(self) -> None:

@@ -33,7 +33,7 @@ from problems.scene import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .answers import InvalidAnswer, figures, save
+from .answers import Refused, figures, save
 from .solver_session import SolverSession
 from .yardstick import yardstick
 
@@ -56,7 +56,7 @@ def main() -> None:
         end = {}
     except MemoryError as error:
         end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
-    except InvalidAnswer as error:
+    except Refused as error:
         end = {"status": "failed", "message": str(error)}
     except Unsupported as error:
         end = {"status": "unsupported", "message": str(error)}

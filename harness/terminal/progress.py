@@ -31,8 +31,8 @@ COLUMNS = [
 ]
 
 
-def _figure(value: float | None, form: str) -> str:
-    return "–" if value is None else format(value, form)
+def _figure(value: float | None, spec: str) -> str:
+    return "–" if value is None else format(value, spec)
 
 
 def _sum(row: Row, *names: str) -> float | None:

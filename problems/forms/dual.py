@@ -56,7 +56,3 @@ class Dual(Problem):
     @property
     def arrays(self) -> list[Matrix]:
         return [*self.assembly.blocks, *self.prepared.factors, self.Q]
-
-    @property
-    def yardstick(self) -> Matrix:
-        return self.Q

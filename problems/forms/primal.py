@@ -53,7 +53,3 @@ class Primal(Problem):
     @property
     def arrays(self) -> list[Matrix]:
         return list(self.assembly.blocks)
-
-    @property
-    def yardstick(self) -> Matrix:
-        return self.Q

@@ -112,8 +112,8 @@ def read_mtx(path: Path) -> Any:
     Raises ValueError if entries are missing: mmread would take them for zeros or crash, as it does on an
     array without entries.
     """
-    rows, columns, entries, form, _, symmetry = scipy.io.mminfo(path)
-    if form == "array":
+    rows, columns, entries, layout, _, symmetry = scipy.io.mminfo(path)
+    if layout == "array":
         entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
     with path.open("rb") as file:
         found = sum(1 for line in file if line.strip() and not line.startswith(b"%")) - 1  # the size line
