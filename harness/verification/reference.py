@@ -36,6 +36,7 @@ from .principal_pivoting import contact_set
 
 MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
+UNPROVEN = "could not be proven"
 ENOUGH = 1e-20  # a correction so small, relative to x, was the last
 
 
@@ -122,7 +123,12 @@ def refined_active_set(prepared: Prepared, load: LoadCase) -> Reference:
         active = active ^ wrong
     proof = certify(prepared.assembly, load, x, lam, active, proven_lambda_min(prepared))
     undecided = int((~(proof.closed | proof.open)).sum())
-    route = "proven" + (f", {undecided} contacts weakly active" if undecided else "")
+    if not np.isfinite(proof.bound_mm):
+        route = UNPROVEN
+    elif prepared.assembly.altered:
+        route = "proven; what reading has rounded or symmetrised is counted"
+    else:
+        route = "proven" + (f", {undecided} contacts weakly active" if undecided else "")
     return Reference(proof.x.hi, proof.lam.hi, active, proof.bound_mm, route)
 
 

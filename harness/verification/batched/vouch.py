@@ -14,7 +14,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.problem import side_by_side
 
 from .bound import Bound, gaps
-from .residual import refined, residual, split
+from .residual import SAFE, refined, residual, split
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,8 @@ def vouch(
         answer = given - prepared.solve_K(shed) if shed.any() else given
     moved = answer - given
     rounding = np.finfo(float).eps * abs(given).max(axis=0)
-    bounds = bounds + abs(moved).max(axis=0) + rounding
+    bounds = SAFE * (bounds + abs(moved).max(axis=0) + rounding)  # `moved` itself is rounded
+    bounds = np.where(np.isfinite(bounds), bounds, np.inf)
     if moved.any():
         r = r - assembly.multiply_K(moved) - shed
     gap = g - A.T @ answer
