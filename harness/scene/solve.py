@@ -213,8 +213,10 @@ def _show(record: dict[str, Any], entries: list[Entry], known: Reference, consol
     style = "green" if record["verdict"] == "within" else "red"
     proven = np.isfinite(known.bound_mm)
     if error is None:
-        bound = f"within {known.bound_mm:.1e} mm, proven" if proven else f"a bound on its error {UNPROVEN}"
-        console.print(f"{record['method']}: every displacement {bound}.", style=style)
+        bound = (
+            f"every displacement within {known.bound_mm:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
+        )
+        console.print(f"{record['method']}: {bound}.", style=style)
     else:
         bound = f"with a proven bound ({known.bound_mm:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
         text = f"{record['method']}: {record['status']}, {error:.1e} mm from the answer {bound}"

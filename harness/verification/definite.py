@@ -4,9 +4,9 @@ If a floating-point Cholesky factorisation of the rounded B = fl(K − sI) runs 
 satisfies |RᵀR − B| ≤ γ_{n+1} |R|ᵀ|R|, entry by entry and whatever the order of its sums (Higham, Accuracy and
 Stability of Numerical Algorithms, 2002, theorem 10.3), so that λmin(B) ≥ −γ_{n+1} ‖|R|ᵀ|R|‖₂ and
 λmin(K) ≥ s − γ_{n+1} ‖|R|ᵀ|R|‖₂ − u max(B_ii). Computing this difference loses up to us more. A blocked
-factorisation may multiply by the reciprocal of a pivot where the theorem divides, one more rounding: γ_{2(n+1)}
-is used instead. The norm is at most max (|R|ᵀ|R|v)_i/v_i for any v > 0 (Collatz and Wielandt): about 3 λmax for
-plates, a thousandth of the trace at n = 24080.
+factorisation may multiply by the reciprocal of a pivot where the theorem divides, one more rounding:
+γ_{2(n+1)} is used instead. The norm is at most max (|R|ᵀ|R|v)_i/v_i for any v > 0 (Collatz and Wielandt):
+about 3 λmax for plates, a thousandth of the trace at n = 24080.
 
 K is first scaled by a power of two so that its largest entry is near 1: what then underflows is far below the
 margin of 1 %. An eigenvalue below 2⁻¹⁰⁰⁰ counts as none: what is computed with it would underflow.

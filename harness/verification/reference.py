@@ -108,6 +108,7 @@ def _code() -> str:
     return fingerprint([Path(__file__)], within=["harness/verification"])
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def refined_active_set(prepared: Prepared, load: LoadCase) -> Reference:
     """Active set, refinement, certificate."""
     p = prepared.dual_load(load)

@@ -84,7 +84,8 @@ class Bound:
         w = z / scale  # so that its squares do not underflow
         # |fl(wᵀKw) − wᵀKw| ≤ γ_2n |w|ᵀ|K||w| ≤ γ_2n ‖K‖_∞ ‖w‖², and η for each product that underflows
         energy = np.maximum((w * assembly.multiply_K(w)).sum(axis=0), 0.0)
-        energy = energy + gamma(2 * n) * self.stiffest * length(w) ** 2 + 2 * n * n * ETA
+        size = length(w)
+        energy = energy + gamma(2 * n) * self.stiffest * size**2 + 2 * n * n * ETA * (size > 0)
         left = delta - A.T @ z
         depth = int(np.diff(A.indptr).max(initial=0)) + 2
         lost = gamma(depth) * (abs(delta) + abs(A).T @ abs(z)) + depth * ETA
@@ -117,8 +118,8 @@ def independence(assembly: Assembly) -> float:
         if len(group) > 1:
             block = np.asfortranarray(G[group][:, group].toarray())
             least = min(least, smallest_eigenvalue(block, float(np.linalg.eigvalsh(block)[0])))
-    # The entries of AᵀA are rounded themselves.
-    doubt = SAFE * gamma(assembly.n) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
+    # The entries of AᵀA are rounded themselves, and so is the difference.
+    doubt = SAFE * gamma(assembly.n + 1) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
     sigma2 = least - doubt
     if assembly.altered and sigma2 > 0:  # (σ − ‖ΔA‖₂)² ≥ σ² − 2σ‖ΔA‖₂
         sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A

@@ -35,6 +35,7 @@ class Vouched:
     duality_gap: float
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def vouch(
     bound: Bound,
     loads: Sequence[LoadCase],
