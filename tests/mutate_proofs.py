@@ -4,9 +4,9 @@
     python tests/mutate_proofs.py batched    those whose file or text contains a word
 
 Each mutant is a file, a text that occurs in it exactly once, and what replaces it. It is made in a copy of
-the tree, where QUICK are run until the first failure. A mutant is killed if a test fails; if it survives, a term
-of a bound is not tested. Exits with 1 if one survives, or if a text is not to be found; `test_mutants.py` keeps
-the list up with the source.
+the tree, where QUICK are run until the first failure. A mutant is killed if a test fails; if it survives, a
+term of a bound is not tested. Exits with 1 if one survives, or if a text is not found exactly once, which
+`test_mutants.py` checks too.
 """
 
 from __future__ import annotations

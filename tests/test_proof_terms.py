@@ -277,9 +277,9 @@ def test_a_stiffness_near_the_end_of_the_numbers_is_bounded_or_refused(scale: fl
 
 
 def test_slack_that_underflows_counts() -> None:
-    """κ = 1e-311 was bounded by 0.0, with an error of e = 2⁻⁴⁰ mm: sᵀλ = κe² is below every number."""
-    e, K = 2.0**-40, 2.0**-1030
-    bound = bound_of(diagonal(K), K, 1.0, doubled(array(1 - e)), doubled(array(K * e)), K)
+    """The error is e, and sᵀλ = κe² is below every number."""
+    e, g, K = 2.0**-60, 2.0**-50, 2.0**-1000
+    bound = bound_of(diagonal(K), K * g, g, doubled(array(g - e)), doubled(array(K * e)), K)
     assert bound >= e
 
 

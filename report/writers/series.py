@@ -59,8 +59,10 @@ def _summary(series: Series) -> str:
         if proven == len(cases):
             lines.append(f"Every answer is proven to be within {bound} mm of the exact one.")
         else:
-            of_others = f" Of the other {proven} it is at most {bound} mm." if proven else ""
-            lines.append(f"The error of {len(cases) - proven} answers could not be bounded.{of_others}")
+            others = f"; of {counted(proven, 'other')} it is at most {bound} mm" if proven else ""
+            lines.append(
+                f"The error of {counted(len(cases) - proven, 'answer')} could not be bounded{others}."
+            )
         checked = cases["displacement_error_mm"].dropna()
         if len(checked):
             lines.append(
