@@ -120,6 +120,18 @@ def test_certificate_a_gap_that_may_be_negative_proves_nothing(monkeypatch: pyte
     assert bound_of(diagonal(1.0), 1.0, 10.0, doubled(array(1.0)), doubled(array(0.0)), 1.0) == np.inf
 
 
+def test_certificate_nothing_is_divided_by_a_stiffness_of_zero() -> None:
+    with np.errstate(divide="raise"):
+        assert bound_of(diagonal(1.0), 1.0, 10.0, doubled(array(1.0)), doubled(array(0.0)), 0.0) == np.inf
+
+
+def test_certificate_a_gap_that_is_not_a_number_is_not_feasible(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(certificate, "gaps", lambda *_: Enclosure(array(np.nan), array(0.0)))
+    closed = np.zeros(1, dtype=bool)
+    *_, feasible = certificate._repaired(diagonal(1.0), array(1.0), doubled(array(0.0)), closed)
+    assert not feasible
+
+
 def test_certificate_a_force_is_proven_by_what_both_uncertainties_leave() -> None:
     """λ* = 0.5 − 2⁻¹⁰; the certificate grants it ±(‖K_i‖ ‖e‖ + |r_i|), and each is |r| here: 1.01 · 2|r|."""
     for r, proven in ((0.24, True), (0.26, False)):

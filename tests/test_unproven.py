@@ -15,6 +15,7 @@ from harness.scene.solve import solve
 from harness.series.run import Tally, summary
 from problems.build import prepared
 from problems.errors import InputError
+from problems.forms.alteration import ALTERED
 from problems.scene import read_scene
 from report.results.series import FIGURES, Series
 from report.writers.series import _summary
@@ -51,6 +52,16 @@ def test_solve_says_what_was_proven(tmp_path: Path) -> None:
     code, text = said(tmp_path, 1.0)
     assert code == 0
     assert "mm, proven." in text
+    assert ALTERED not in text
+
+
+def test_solve_says_that_reading_has_altered_something(tmp_path: Path) -> None:
+    off = K.copy()
+    off[0, 1] = np.nextafter(-1.0, 0.0)
+    console = Console(file=StringIO(), width=200)
+    assert solve(write(tmp_path, off, 1.0), None, 1e-9, tmp_path / "out", console) == 0
+    assert isinstance(console.file, StringIO)
+    assert ALTERED in console.file.getvalue()
 
 
 @pytest.mark.parametrize("scale", [1e-305, 1e-311])

@@ -26,6 +26,7 @@ from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import UNPROVEN, Reference, reference_of
 from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import usual
 from problems.forms.prepared import Prepared
@@ -83,6 +84,8 @@ def solve(source: str, solver: str | None, tolerance: float, out: Path, console:
     with steps.step("matrices"):
         data = prepared(scene, steps.building)
         _ = data.factors
+    if data.assembly.altered:
+        console.print(f"{ALTERED}.", style="yellow")
     with steps.step("the effects, each alone"):
         entries = ledger(scene, steps.condensed)
     with steps.step("loads and gaps"):

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+ALTERED = "Reading has rounded some of the numbers, or symmetrised K: every bound counts it"
+
 
 @dataclass(frozen=True)
 class Alteration:
