@@ -7,6 +7,7 @@ scene → LoadCase (f, g), loads beyond the junction condensed
 from __future__ import annotations
 
 import time
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import scipy.sparse as sp
 
 from problems.condensation.condense import NotPositiveDefinite
 from problems.condensation.condensed_part import condensed_part, part_key
+from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.stages import Progress, Stored, indefinite
 from problems.input import user_matrices
@@ -22,6 +24,8 @@ from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
+
+ALTERED = tuple(field.name for field in fields(Alteration))
 
 
 def prepared(scene: Scene, progress: Progress = lambda text, fraction: None) -> Stored:
@@ -37,7 +41,10 @@ def prepared(scene: Scene, progress: Progress = lambda text, fraction: None) -> 
             columns = tuple(arrays[f"A_{name}"] for name in ("data", "indices", "indptr"))
             A = sp.csc_array(columns, shape=facts["shape"])
             blocks = tuple(arrays[f"K{k}"] for k in range(len(facts["parts"])))
-            assembly = Assembly(blocks, A, arrays.get("nodes"), tuple(facts["parts"]))
+            altered = (
+                Alteration(*(arrays[f"altered_{name}"] for name in ALTERED)) if facts["altered"] else None
+            )
+            assembly = Assembly(blocks, A, arrays.get("nodes"), tuple(facts["parts"]), altered)
             return Stored(assembly, key, facts["seconds"], scene.source_of, True, progress)
         case MadeScene():
             no_time = {"condensation": 0.0}
@@ -127,8 +134,16 @@ def _user_matrices(scene: MatricesScene) -> tuple[cache.Entry, str]:
         if assembly.nodes is not None:
             arrays["nodes"] = assembly.nodes
         arrays |= {f"K{k}": K for k, K in enumerate(assembly.blocks)}
+        if assembly.altered:
+            arrays |= {f"altered_{name}": getattr(assembly.altered, name) for name in ALTERED}
         steps = {"condensation": time.perf_counter() - start}
-        return arrays, {"parts": assembly.parts, "shape": A.shape, "seconds": steps}
+        facts = {
+            "parts": assembly.parts,
+            "shape": A.shape,
+            "altered": bool(assembly.altered),
+            "seconds": steps,
+        }
+        return arrays, facts
 
     return cache.load_or_make(key, made), key
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from harness.measurement.answers import InvalidAnswer
+from harness.measurement.answers import Refused
 from harness.measurement.solver_session import SolverSession
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
@@ -37,7 +37,7 @@ def answer_of(
     (load,) = session.problem.loads([case])
     try:
         answer = session.next(load, None)
-    except InvalidAnswer as error:
+    except Refused as error:
         raise InputError.one(f"solver {name}", "answer", str(error), NO_ANSWER) from error
     (x,) = session.problem.recover([answer.lam], [answer.x], [load])
     if x is None:

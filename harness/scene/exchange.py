@@ -12,6 +12,7 @@ from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import Fault, InputError
+from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.input.user_matrices import read_matrices
@@ -89,6 +90,8 @@ def _print_facts(out: Path, console: Console) -> None:
     blocks = " + ".join(str(len(K)) for K in data.assembly.blocks)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
     console.print(f"K is symmetric and positive definite, cond(K) = {data.facts['cond_K']:.2e}.")
+    if data.assembly.altered:
+        console.print(f"{ALTERED}.", style="yellow")
     known = reference(data, load)
     sentence, few = digits_sentence(data, known.x, known.lam)
     console.print(f"{sentence}.", style="yellow" if few else None)

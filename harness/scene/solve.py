@@ -22,9 +22,10 @@ from harness.results.machine import resident_mib
 from harness.results.records import replace_text, to_line
 from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.judge import LIMIT_MM, judge
-from harness.verification.reference import Reference, reference_of
+from harness.verification.reference import UNPROVEN, Reference, reference_of
 from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.model.effect import TieEffect
@@ -90,6 +91,8 @@ def solve(
     with steps.step("matrices"):
         data = prepared(scene, steps.building)
         _ = data.factors
+    if data.assembly.altered:
+        console.print(f"{ALTERED}.", style="yellow")
     with steps.step("the effects, each alone"):
         entries = ledger(scene, steps.condensed)
     with steps.step("loads and gaps"):
@@ -214,10 +217,13 @@ def _show(record: dict[str, Any], entries: list[Entry], known: Reference, consol
         console.print(f"Skipped: {line}.", style="dim")
     error = record["judged_error_mm"]
     style = "green" if record["verdict"] == "within" else "red"
+    proven = np.isfinite(known.bound_mm)
     if error is None:
-        console.print(
-            f"{record['method']}: every displacement within {known.bound_mm:.1e} mm, proven.", style=style
+        bound = (
+            f"every displacement within {known.bound_mm:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
         )
+        console.print(f"{record['method']}: {bound}.", style=style)
     else:
-        text = f"{record['method']}: {record['status']}, {error:.1e} mm from the answer with a proven bound"
-        console.print(f"{text} ({known.bound_mm:.1e} mm): {record['verdict']} {LIMIT_MM:g} mm.", style=style)
+        bound = f"with a proven bound ({known.bound_mm:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
+        text = f"{record['method']}: {record['status']}, {error:.1e} mm from the answer {bound}"
+        console.print(f"{text}: {record['verdict']} {LIMIT_MM:g} mm.", style=style)

@@ -19,6 +19,7 @@ from harness.results import records
 from harness.results.machine import installed_version, machine
 from harness.results.schema import VERDICTS
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
+from harness.verification.reference import UNPROVEN
 from problems.build import prepared
 from problems.model.scene import JointScene
 
@@ -38,7 +39,8 @@ class Tally:
 
     def add(self, row: dict[str, Any]) -> None:
         self.counts[row["verdict"]] += 1
-        self.worst_bound_mm = max(self.worst_bound_mm, row.get("bound_mm") or 0.0)
+        bound = row.get("bound_mm", 0.0)  # missing without an answer; null in the file where it is infinite
+        self.worst_bound_mm = max(self.worst_bound_mm, np.inf if bound is None else bound)
         error = row.get("displacement_error_mm")
         if error is not None:
             self.compared += 1
@@ -182,7 +184,9 @@ def record_contacts(job: Job, directory: Path) -> int:
 def summary(tally: Tally, asked: int, console: Console) -> int:
     seen = [f"{count} {verdict.replace('_', ' ')}" for verdict, count in tally.counts.items() if count]
     error = f", largest of {tally.compared} checked {tally.worst_error_mm:.1e} mm" if tally.compared else ""
-    console.print(f"{', '.join(seen)}; largest proven error bound {tally.worst_bound_mm:.1e} mm{error}")
+    worst = tally.worst_bound_mm
+    bound = f"largest proven error bound {worst:.1e} mm" if np.isfinite(worst) else f"some bounds {UNPROVEN}"
+    console.print(f"{', '.join(seen)}; {bound}{error}")
     missing = asked - sum(tally.counts.values())
     if missing:
         console.print(f"Not solved: {missing}. Run the same command again.", style="red")

@@ -10,6 +10,10 @@ so ‖e‖_K ≤ ‖r‖_{K⁻¹} + √(sᵀλ), and with 0 < κ ≤ λmin(K)
 
 Nothing is assumed about the active set: weakly active contacts (λ_i = s_i = 0) need no special treatment.
 With enclosures of r and s, and x, λ as sums of two float64, both terms are far below the rounding of x.
+
+Where reading has altered a user's numbers, the bound is for the given problem: r and s are enclosed for its
+K + ΔK, A + ΔA, f + Δf, g + Δg, and κ − ‖ΔK‖₂ replaces κ. K + ΔK need not be symmetric: all this holds with
+‖e‖²_K = eᵀ(K + ΔK)e, and the λmin that counts is that of its symmetric part.
 """
 
 from __future__ import annotations
@@ -23,14 +27,18 @@ from scipy.sparse.linalg import splu
 
 from problems.forms.assembly import Assembly, LoadCase, Vector
 
-from .exact_residual import DoubleDouble, Enclosure, U, forces, gaps
+from .exact_residual import ETA, DoubleDouble, Enclosure, U, forces, gaps
+from .length import length
 
 MAX_REPAIRS = 20
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """x (n,) feasible, λ (m,) ≥ 0, max|x.hi − x*| ≤ bound_mm, and the contacts proven closed or open."""
+    """x (n,) feasible, λ (m,) ≥ 0, max|x.hi − x*| ≤ bound_mm, and the contacts proven closed or open.
+
+    bound_mm is infinite, never NaN, where nothing can be proven.
+    """
 
     x: DoubleDouble
     lam: DoubleDouble
@@ -39,6 +47,7 @@ class Certificate:
     open: NDArray[np.bool_]
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def certify(
     assembly: Assembly,
     load: LoadCase,
@@ -52,14 +61,21 @@ def certify(
     lam = DoubleDouble(np.where(negative, 0.0, lam.hi), np.where(negative, 0.0, lam.lo))
     x, s, feasible = _repaired(assembly, load.g, x, active)
     r = forces(assembly, load.f, x, lam)
+    if assembly.altered:
+        kappa = kappa * (1 - 2 * U) - 1.01 * assembly.altered.norm_K
+    undecided = np.zeros(assembly.m, dtype=bool)
     if not (feasible and kappa > 0):
-        unproven = np.zeros(assembly.m, dtype=bool)
-        return Certificate(x, lam, np.inf, unproven, unproven)
+        return Certificate(x, lam, np.inf, undecided, undecided)
     inflation = 1 + 4 * (assembly.n + 2) * U  # for rounding in sums of that many positive terms
-    norm = float(np.linalg.norm(abs(r.value) + r.error)) * inflation
-    slack = float((s.value + s.error) @ (lam.hi + abs(lam.lo))) * inflation
-    error = (norm / np.sqrt(kappa) + np.sqrt(max(slack, 0.0))) / np.sqrt(kappa) * inflation
-    return Certificate(x, lam, error + float(abs(x.lo).max(initial=0)), *_proven(assembly, lam, s, r, error))
+    norm = float(length(abs(r.value) + r.error)) * inflation
+    opening, pressing = s.value + s.error, lam.hi + abs(lam.lo)
+    slack = float(opening @ pressing) * inflation + ETA * np.count_nonzero(opening * (pressing > 0))
+    error = (norm / np.sqrt(kappa) + np.sqrt(slack)) / np.sqrt(kappa) * inflation
+    bound = (error + float(abs(x.lo).max(initial=0))) * inflation
+    if not np.isfinite(bound):
+        return Certificate(x, lam, np.inf, undecided, undecided)
+    decided = (undecided, undecided) if assembly.altered else _proven(assembly, lam, s, r, error)
+    return Certificate(x, lam, bound, *decided)
 
 
 def _repaired(
@@ -74,7 +90,7 @@ def _repaired(
         if factor is not None and d.any():
             x = x.plus(A @ factor.solve(d))
             s = gaps(assembly, g, x)
-        overlapping = s.value - s.error < 0
+        overlapping = ~(s.value - s.error >= 0)
         if not overlapping.any():
             return x, s, True
         d = np.where(overlapping, s.value - 2.0 ** (k + 1) * s.error, 0.0)
@@ -97,7 +113,9 @@ def _proven(
     rows = sp.csr_array(A)
     single = np.flatnonzero(np.diff(rows.indptr) == 1)
     entry = rows.indptr[single]
-    uncertainty = 1.01 * (np.sqrt(diagonal * trace)[single] * error + abs(r.value[single]) + r.error[single])
+    uncertainty = 1.01 * (
+        (np.sqrt(diagonal) * np.sqrt(trace))[single] * error + abs(r.value[single]) + r.error[single]
+    )
     of_contact = rows.indices[entry]
     certain = lam.hi[of_contact] - abs(lam.lo[of_contact]) > uncertainty / abs(rows.data[entry])
     is_closed = np.zeros(assembly.m, dtype=bool)

@@ -7,6 +7,8 @@ transformations: two_sum and two_product return the rounding error beside the re
 cut into slices of so few bits that BLAS multiplies them exactly (Ozaki, Ogita, Oishi and Rump, Numer.
 Algorithms 59:95–118, 2012), and the terms are added with their rounding errors (Ogita, Rump and Oishi, SIAM
 J. Sci. Comput. 26:1955–1988, 2005): |Σ computed − Σ| ≤ u|Σ| + γ²_k Σ|terms|, u = 2⁻⁵³, γ_k = ku/(1 − ku).
+Where they underflow, two_product is off by at most 5η, η = 2⁻¹⁰⁷⁴ (ibid.), and any other product by η/2;
+additions are exact there. Both are counted. What overflows ends as infinity or NaN, which bounds nothing.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ import scipy.sparse as sp
 from problems.forms.assembly import Assembly, Matrix, Vector
 
 U = 2.0**-53
+ETA = 2.0**-1074  # the smallest positive number
+SMALLEST_SCALE = 2.0**-960  # bounds are multiplied by no factor below it, lest they underflow to nothing
 ROWS_AT_A_TIME = 16  # they and what is computed from them stay in the processor's cache
 K_SLICES, X_SLICES = 2, 3
 
@@ -51,7 +55,7 @@ def two_sum(a: Vector, b: Vector) -> tuple[Vector, Vector]:
 
 
 def two_product(a: Vector, b: Vector) -> tuple[Vector, Vector]:
-    """(p, e) with p = fl(ab) and p + e = ab exactly, barring under- and overflow."""
+    """(p, e) with p = fl(ab) and p + e = ab, exactly but for 5η where it underflows; no bound on overflow."""
     p = a * b
     (a1, a2), (b1, b2) = _halves(a), _halves(b)
     return p, a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
@@ -79,7 +83,7 @@ class ErrorFreeSum:
 
     def enclosed(self) -> Enclosure:
         value = self.hi + self.lo
-        error = U * abs(value) + gamma(self.terms) ** 2 * self.size + self.error
+        error = U * abs(value) + gamma(self.terms) ** 2 * self.size + ETA * (self.size > 0) + self.error
         return Enclosure(value, 1.01 * error)
 
 
@@ -89,7 +93,7 @@ def gamma(k: int) -> float:
 
 
 def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
-    """r = f − Kx − Aλ with its error bound, N."""
+    """r = f − Kx − Aλ with its error bound, N: that of the given problem, where reading has altered it."""
     total = ErrorFreeSum(assembly.n)
     total.add(f)
     _subtract_sparse(total, slice(None), sp.csr_array(assembly.A), lam)
@@ -99,15 +103,23 @@ def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) ->
             _subtract_sparse(total, rows, sp.csr_array(K), part)
         else:
             _subtract_dense(total, rows, K, part)
+    if assembly.altered:
+        total.error += assembly.altered.of_forces(_size(x), _size(lam))
     return total.enclosed()
 
 
 def gaps(assembly: Assembly, g: Vector, x: DoubleDouble) -> Enclosure:
-    """s = g − Aᵀx with its error bound, mm."""
+    """s = g − Aᵀx with its error bound, mm: that of the given problem, where reading has altered it."""
     total = ErrorFreeSum(assembly.m)
     total.add(g)
     _subtract_sparse(total, slice(None), sp.csr_array(assembly.A.T), x)
+    if assembly.altered:
+        total.error += assembly.altered.of_gaps(_size(x))
     return total.enclosed()
+
+
+def _size(v: DoubleDouble) -> Vector:
+    return abs(v.hi) + abs(v.lo)
 
 
 def _subtract_sparse(total: ErrorFreeSum, rows: slice, A: sp.csr_array, v: DoubleDouble) -> None:
@@ -119,8 +131,9 @@ def _subtract_sparse(total: ErrorFreeSum, rows: slice, A: sp.csr_array, v: Doubl
         entry = A.indptr[those] + k
         for part in (v.hi, v.lo):
             term, rounding = np.zeros((2, size))
-            pair = two_product(-A.data[entry], part[A.indices[entry]])
-            term[first + those], rounding[first + those] = pair
+            factor = part[A.indices[entry]]
+            term[first + those], rounding[first + those] = two_product(-A.data[entry], factor)
+            total.error[first + those] += 5 * ETA * (factor != 0)
             total.add(term)
             total.add(rounding)
 
@@ -131,6 +144,8 @@ def _subtract_dense(total: ErrorFreeSum, rows: slice, K: Matrix, x: DoubleDouble
     Slices of b bits give n products of 2b bits; their sum has at most 53 bits if 2(b − 1) + log₂ n ≤ 53,
     whatever the order of summation.
     """
+    if not (x.hi.any() or x.lo.any()):
+        return
     n = len(K)
     bits = (53 - int(np.ceil(np.log2(max(n, 2))))) // 2 + 1
     slices, rest = [], x.hi
@@ -151,7 +166,8 @@ def _subtract_dense(total: ErrorFreeSum, rows: slice, K: Matrix, x: DoubleDouble
             piece, remainder = cut(remainder, exponents - k * bits, bits)
             products[2 + k * X_SLICES : 2 + (k + 1) * X_SLICES, chunk] = (piece @ exact).T
         products[-1, chunk] = remainder @ x.hi
-        error[chunk] = gamma(n) * np.exp2(exponents[:, 0]) * (left + 2.0 ** (-K_SLICES * bits) * length)
+        scale = gamma(n) * np.maximum(np.exp2(exponents[:, 0]), SMALLEST_SCALE)
+        error[chunk] = scale * (left + 2.0 ** (-K_SLICES * bits) * length + ETA) + len(products) * n * ETA
     for product in products:
         term = np.zeros(len(total.hi))
         term[rows] = -product

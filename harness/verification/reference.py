@@ -38,6 +38,7 @@ from .principal_pivoting import contact_set
 MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
 STOPPED = "the search for the contact set was stopped"
+UNPROVEN = "could not be proven"
 ENOUGH = 1e-20  # relative to x: a smaller correction is the last
 
 
@@ -120,6 +121,7 @@ def _code() -> str:
     return fingerprint([Path(__file__)], within=["harness/verification"])
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def refined_active_set(prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
     """The active set, refined and certified."""
     p = prepared.dual_load(load)
@@ -139,7 +141,12 @@ def refined_active_set(prepared: Prepared, load: LoadCase, limit_s: float | None
         active = active ^ wrong
     proof = certify(prepared.assembly, load, x, lam, active, proven_lambda_min(prepared))
     undecided = int((~(proof.closed | proof.open)).sum())
-    route = "proven" + (f", {undecided} contacts weakly active" if undecided else "")
+    if not np.isfinite(proof.bound_mm):
+        route = UNPROVEN
+    elif prepared.assembly.altered:
+        route = "proven; what reading has rounded or symmetrised is counted"
+    else:
+        route = "proven" + (f", {undecided} contacts weakly active" if undecided else "")
     if stopped:
         route += f", {STOPPED} after {limit_s:g} s"
     return Reference(proof.x.hi, proof.lam.hi, active, proof.bound_mm, route)

@@ -9,6 +9,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .alteration import Alteration
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
@@ -25,12 +27,14 @@ class Assembly:
         a single 1 for a part against a rigid tool.
     nodes : (n, 2) coordinates of the unknowns in mm, or None if they are unknown.
     parts : a name for each block.
+    altered : how far these, and a user's f and g, may be from what was given; None if nothing was altered.
     """
 
     blocks: tuple[Matrix, ...]
     A: sp.csc_array
     nodes: Matrix | None = None
     parts: tuple[str, ...] = ()
+    altered: Alteration | None = None
 
     @property
     def n(self) -> int:

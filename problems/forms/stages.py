@@ -19,6 +19,7 @@ from .prepared import Prepared
 
 Progress = Callable[[str, float], None]
 LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
+SMALLEST_EIGENVALUE = 1e-300  # N/mm: below it K⁻¹ overflows
 
 
 class Stored(Prepared):
@@ -99,6 +100,9 @@ class Stored(Prepared):
         least, largest = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
         if largest > LARGEST_CONDITION * least:
             raise indefinite(self.source_of("K"), "cond(K)", largest / least if least > 0 else np.inf)
+        if least < SMALLEST_EIGENVALUE:
+            allowed = f"at least {SMALLEST_EIGENVALUE:g} N/mm: use another unit of force"
+            raise InputError.one(self.source_of("K"), "smallest eigenvalue of K", least, allowed)
         facts = {
             "cond_K": largest / least,
             "lambda_min": least,

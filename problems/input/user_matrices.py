@@ -12,8 +12,10 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from problems.errors import Fault, InputError
+from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase, Matrix
 
+U = 2.0**-53  # relative rounding error of float64
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
 
 
@@ -22,7 +24,9 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
         nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
-    K is split into its diagonal blocks. Raises InputError with all faults.
+    K is split into its diagonal blocks. What does not fit into float64 is rounded, and K that is not quite
+    symmetric is replaced by (K + Kᵀ)/2; `Assembly.altered` bounds the differences. Raises InputError with all
+    faults.
     """
     where = {key: str(path) for key, path in files.items()}
     if "problem" in files:
@@ -68,14 +72,53 @@ def checked(data: Mapping[str, Any], where: Mapping[str, str]) -> tuple[Assembly
     untouched = np.flatnonzero(abs(A).sum(axis=0) == 0)
     if untouched.size:
         raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must involve an unknown")
-    asymmetry = abs(K - K.T).max() / max(abs(K).max(), np.finfo(float).tiny)
+    skew = abs(K - K.T).max()
+    asymmetry = skew / max(abs(K).max(), np.finfo(float).tiny)
     if asymmetry > SYMMETRY:
         raise InputError.one(where["K"], "max|K − Kᵀ| / max|K|", float(asymmetry), f"must be ≤ {SYMMETRY:g}")
-    return _blocks((K + K.T) / 2, A, f, g, nodes)
+    off_K, off_A, off_f, off_g = (
+        _rounding(data[key], v) for key, v in {"K": K, "A": A, "f": f, "g": g}.items()
+    )
+    K.eliminate_zeros()
+    if skew:
+        given, K = K, sp.csr_array(K / 2 + K.T / 2)
+        off_K = off_K + abs(K - given)
+        off_K = off_K.maximum(off_K.T)
+    sums = (off_K.sum(1), off_A.sum(1), off_A.sum(0), off_f.sum(1), off_g.sum(1))
+    above = 1 + 2 * max(n, m, 4) * U  # for rounding in these sums themselves
+    altered = Alteration(*(above * np.asarray(each, dtype=float).ravel() for each in sums))
+    return _blocks(K, A, f, g, nodes, altered if altered else None)
+
+
+def _rounding(given: Any, read: Any) -> sp.csr_array:
+    """|given − read| from above, where `read` is what was given in float64; f and g as columns."""
+    shape = (read.shape[0], read.shape[1] if read.ndim == 2 else 1)
+    if not sp.issparse(given):
+        if given.dtype.kind == "b" or given.dtype in (np.float16, np.float32, np.float64):
+            return sp.csr_array(shape)
+        given = np.asarray(given).reshape(shape)
+    values = sp.coo_array(given)
+    exact, rounded = values.data, values.data.astype(float)
+    lost = np.zeros(len(exact))
+    if exact.dtype.kind == "f":  # extended precision, if the machine has it
+        difference = abs(exact - rounded.astype(exact.dtype))
+        lost[difference > 0] = np.nextafter(difference[difference > 0].astype(float), np.inf)
+    elif exact.dtype.kind in "iu":
+        with np.errstate(invalid="ignore"):
+            same = (abs(rounded) < 2.0**63) & (rounded.astype(exact.dtype) == exact)
+        lost[~same] = U * abs(rounded[~same])
+    count, size, off = (
+        sp.csr_array(sp.coo_array((v, values.coords), shape=shape))
+        for v in (lost * 0 + 1, abs(rounded), lost)
+    )
+    count.data -= 1  # entries that are given several times are added
+    off = sp.csr_array(off + 2 * U * count.multiply(size))
+    off.eliminate_zeros()
+    return off
 
 
 def _blocks(
-    K: sp.csr_array, A: sp.csr_array, f: Matrix, g: Matrix, nodes: Matrix | None
+    K: sp.csr_array, A: sp.csr_array, f: Matrix, g: Matrix, nodes: Matrix | None, altered: Alteration | None
 ) -> tuple[Assembly, LoadCase]:
     """Split K into diagonal blocks; the unknowns of one block must be contiguous in x."""
     count, label = connected_components(K, directed=False)
@@ -85,7 +128,7 @@ def _blocks(
     ends = np.append(starts[1:], K.shape[0])
     blocks = tuple(K[a:b, a:b].toarray(order="F") for a, b in zip(starts, ends, strict=True))
     names = tuple(f"part {k + 1}" for k in range(len(blocks)))
-    return Assembly(blocks, sp.csc_array(A), nodes, names), LoadCase(f, g)
+    return Assembly(blocks, sp.csc_array(A), nodes, names, altered), LoadCase(f, g)
 
 
 def _read_npz(path: Path) -> dict[str, Any]:

@@ -54,8 +54,15 @@ def _summary(series: Series) -> str:
         f"{counted(facts['threads'], 'thread')}) on {facts['machine']}: {counts}."
     ]
     if len(cases):
-        bound = significant(cases["bound_mm"].max())
-        lines.append(f"Every answer is proven to be within {bound} mm of the exact one.")
+        proven = int(cases["bound_mm"].notna().sum())
+        bound = significant(cases["bound_mm"].max()) if proven else None
+        if proven == len(cases):
+            lines.append(f"Every answer is proven to be within {bound} mm of the exact one.")
+        else:
+            others = f"; of {counted(proven, 'other')} it is at most {bound} mm" if proven else ""
+            lines.append(
+                f"The error of {counted(len(cases) - proven, 'answer')} could not be bounded{others}."
+            )
         checked = cases["displacement_error_mm"].dropna()
         if len(checked):
             lines.append(

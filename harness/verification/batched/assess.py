@@ -14,7 +14,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.problem import stacked
 
 from .bound import Bound, gaps
-from .residual import refined, residual, split
+from .residual import SAFE, refined, residual, split
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Assessment:
     duality_gap: float
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def assess(
     bound: Bound,
     loads: Sequence[LoadCase],
@@ -67,7 +68,8 @@ def assess(
         answer = given - prepared.solve_K(removed) if removed.any() else given
     moved = answer - given
     rounding = np.finfo(float).eps * abs(given).max(axis=0)
-    bounds = bounds + abs(moved).max(axis=0) + rounding
+    bounds = SAFE * (bounds + abs(moved).max(axis=0) + rounding)  # `moved` itself is rounded
+    bounds = np.where(np.isfinite(bounds), bounds, np.inf)
     if moved.any():
         r = r - assembly.multiply_K(moved) - removed
     gap = g - A.T @ answer

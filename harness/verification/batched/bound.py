@@ -13,6 +13,11 @@ with κ ≤ λmin(K), σ² ≤ λmin(AᵀA), λmax(K) ≤ ‖K‖_∞ and the la
 
 So the bound is proportional to the residual, where that of `certificate` is to its square root, and plain
 float64 suffices for λ and s. Weakly active contacts need no special treatment.
+
+Where reading has altered a user's numbers, the bound is for the given problem, K + ΔK, A + ΔA, f + Δf and
+g + Δg. Its answer x* is that for K, A + ΔA and g + Δg under the force f + Δf − ΔK x*, so that with e = x − x*
+and the residuals of the given problem (see `Alteration`) ΔK e adds to r. As ‖ΔK e‖₂/√κ ≤ (‖ΔK‖₂/κ) ‖e‖_K, the
+bound is divided by 1 − ‖ΔK‖₂/κ; σ − ‖ΔA‖₂ replaces σ.
 """
 
 from __future__ import annotations
@@ -24,8 +29,9 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from harness.verification.definite import smallest_eigenvalue
-from harness.verification.exact_residual import gamma
+from harness.verification.definite import SMALLEST, smallest_eigenvalue
+from harness.verification.exact_residual import ETA, exponent, gamma
+from harness.verification.length import length
 from harness.verification.reference import proven_lambda_min
 from problems.forms.assembly import Assembly, Matrix, Vector
 from problems.forms.prepared import Prepared
@@ -57,30 +63,36 @@ class Bound:
         """(k,) mm for columns r (n, k), s (m, k), λ (m, k) ≥ 0; r and s known to within their errors."""
         if not (self.kappa > 0 and self.sigma2 > 0):
             return np.full(r.shape[1], np.inf)
-        force = np.linalg.norm(abs(r) + error, axis=0)
+        altered = self.prepared.assembly.altered
+        certain = 1 - SAFE * altered.norm_K / self.kappa if altered else 1.0
+        if certain <= 0:
+            return np.full(r.shape[1], np.inf)
+        force = length(abs(r) + error)
         closed = lam > 0
         delta = np.where(closed, -s, np.maximum(-s, 0.0))
         uncertainty = np.where(closed | (s < s_error), s_error, 0.0)
-        distance = self._translation(delta, np.linalg.norm(uncertainty, axis=0))
-        return SAFE * np.sqrt(self.compliance) * (force / np.sqrt(self.kappa) + distance)
+        distance = self._translation(delta, length(uncertainty))
+        bounds = SAFE * np.sqrt(self.compliance) * (force / np.sqrt(self.kappa) + distance) / certain
+        return np.where(np.isfinite(bounds), bounds, np.inf)
 
     def _translation(self, delta: Matrix, uncertainty: Vector) -> Vector:
         """(k,) ‖d‖_K of a d with Aᵀd = δ (m, k), δ uncertain by that much in its 2-norm."""
         assembly = self.prepared.assembly
         A, n = assembly.A, assembly.n
         z = self.prepared.solve_K(A @ sla.cho_solve((self.factor, False), delta, check_finite=False))
-        length = np.linalg.norm(z, axis=0)
-        # |fl(zᵀKz) − zᵀKz| ≤ γ_2n |z|ᵀ|K||z| ≤ γ_2n ‖K‖_∞ ‖z‖²
-        energy = (
-            np.maximum((z * assembly.multiply_K(z)).sum(axis=0), 0.0)
-            + gamma(2 * n) * self.stiffest * length**2
-        )
+        scale = np.exp2(exponent(abs(z).max(axis=0, initial=0.0)))
+        w = z / scale  # so that its squares do not underflow
+        # |fl(wᵀKw) − wᵀKw| ≤ γ_2n |w|ᵀ|K||w| ≤ γ_2n ‖K‖_∞ ‖w‖², and η for each product that underflows
+        energy = np.maximum((w * assembly.multiply_K(w)).sum(axis=0), 0.0)
+        size = length(w)
+        energy = energy + gamma(2 * n) * self.stiffest * size**2 + 2 * n * n * ETA * (size > 0)
         left = delta - A.T @ z
         depth = int(np.diff(A.indptr).max(initial=0)) + 2
-        rounding = np.linalg.norm(gamma(depth) * (abs(delta) + abs(A).T @ abs(z)), axis=0)
-        return np.sqrt(energy) + (np.linalg.norm(left, axis=0) + rounding + uncertainty) * np.sqrt(
-            self.stiffest / self.sigma2
-        )
+        rounding = gamma(depth) * (abs(delta) + abs(A).T @ abs(z)) + depth * ETA
+        if assembly.altered:
+            rounding = rounding + np.multiply.outer(assembly.altered.A_columns, abs(z).max(axis=0))
+        missed = length(left) + length(rounding) + uncertainty
+        return scale * np.sqrt(energy) + missed * np.sqrt(self.stiffest / self.sigma2)
 
 
 def gaps(assembly: Assembly, g: Matrix, x: Split) -> tuple[Matrix, Matrix]:
@@ -88,8 +100,11 @@ def gaps(assembly: Assembly, g: Matrix, x: Split) -> tuple[Matrix, Matrix]:
     A = assembly.A
     s = (g - A.T @ x.head) - A.T @ x.tail
     depth = 2 * int(np.diff(A.indptr).max(initial=0)) + 3
-    size = abs(g) + abs(A).T @ (abs(x.head) + abs(x.tail))
-    return s, SAFE * gamma(depth) * size
+    x_size = abs(x.head) + abs(x.tail)
+    error = gamma(depth) * (abs(g) + abs(A).T @ x_size) + depth * ETA
+    if assembly.altered:
+        error = error + assembly.altered.of_gaps(x_size)
+    return s, SAFE * error
 
 
 def independence(assembly: Assembly) -> float:
@@ -103,6 +118,11 @@ def independence(assembly: Assembly) -> float:
         if len(group) > 1:
             block = np.asfortranarray(G[group][:, group].toarray())
             least = min(least, smallest_eigenvalue(block, float(np.linalg.eigvalsh(block)[0])))
-    # The entries of AᵀA are themselves rounded.
-    uncertainty = SAFE * gamma(assembly.n) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
-    return max(least - uncertainty, 0.0)
+    # The entries of AᵀA are rounded themselves, and so is the difference.
+    uncertainty = (
+        SAFE * gamma(assembly.n + 1) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
+    )
+    sigma2 = least - uncertainty
+    if assembly.altered and sigma2 > 0:  # (σ − ‖ΔA‖₂)² ≥ σ² − 2σ‖ΔA‖₂
+        sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A
+    return float(sigma2) if sigma2 >= SMALLEST else 0.0

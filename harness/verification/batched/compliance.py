@@ -31,10 +31,10 @@ def largest_compliance(prepared: Prepared, kappa: float) -> float:
 def _of_block(K: Matrix, U: Matrix, kappa: float) -> float:
     X, info = lapack.dtrtri(U)
     error = gamma(2 * (len(K) + 1))
-    c = SAFE * error / (1 - error) * float(np.trace(K))
+    relative = SAFE * error / (1 - error) * (float(np.trace(K)) / kappa) if kappa > 0 else np.inf  # c/κ
     length, size = (float(np.linalg.norm(np.triu(each))) for each in (X, U))
     epsilon = SAFE * gamma(3 * len(K)) * length * size
     if info != 0 or not kappa > 0 or epsilon >= 0.5:
         return np.inf
     row = float(np.sqrt((np.triu(X) ** 2).sum(axis=1).max())) + epsilon / (1 - epsilon) * length
-    return SAFE * (1 + c / kappa) * row**2
+    return SAFE * (1 + relative) * row**2

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.verification.exact_residual import ROWS_AT_A_TIME, cut, exponent, gamma
+from harness.verification.exact_residual import ETA, ROWS_AT_A_TIME, SMALLEST_SCALE, cut, exponent, gamma
 from problems.forms.assembly import Assembly, Matrix
 
 SAFE = 1.01  # for the rounding of the bounds themselves
@@ -58,7 +58,10 @@ def residual(assembly: Assembly, f: Matrix, x: Split, lam: Matrix) -> tuple[Matr
             r[rows] -= product
             size[rows] += abs(product)
     depth = int(np.diff(A.indptr).max(initial=0)) + 5
-    return r, SAFE * (error + gamma(depth) * size)
+    error += gamma(depth) * size + depth * ETA
+    if assembly.altered:
+        error += assembly.altered.of_forces(abs(x.head) + abs(x.tail), abs(lam))
+    return r, SAFE * error
 
 
 def refined(
@@ -70,8 +73,11 @@ def refined(
     """
     moved, n = x.plus(d), assembly.n
     Kd = assembly.multiply_K(d)
-    error_of_d = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(moved.tail).max(axis=0)
-    return moved, r - Kd, SAFE * (error + stiffest * error_of_d + gamma(1) * (abs(r) + abs(Kd)))
+    error_of_d = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(moved.tail).max(axis=0) + ETA
+    error = error + stiffest * error_of_d + gamma(1) * (abs(r) + abs(Kd)) + (n + 1) * ETA
+    if assembly.altered:
+        error = error + np.multiply.outer(assembly.altered.K, abs(d).max(axis=0))
+    return moved, r - Kd, SAFE * error
 
 
 def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matrix]:
@@ -88,5 +94,6 @@ def _products(K: Matrix, head: Matrix, tail: Matrix) -> tuple[list[Matrix], Matr
         for product, left, right in zip(products, (K1, K2, whole), (head, head, tail), strict=True):
             product[chunk] = left @ right
         sums = [abs(each).sum(axis=1, keepdims=True) for each in (K2, whole)]
-        rounding[chunk] = SAFE * gamma(n) * (sums[0] * head_size + sums[1] * tail_size)
+        scaled = [gamma(n) * np.maximum(each, SMALLEST_SCALE) for each in sums]
+        rounding[chunk] = SAFE * (scaled[0] * head_size + scaled[1] * tail_size + 4 * n * ETA)
     return products, rounding

@@ -1,0 +1,18 @@
+"""The list of mutants keeps up with the source: each text is there once, and what replaces it is Python."""
+
+from __future__ import annotations
+
+import pytest
+from mutate_proofs import MUTANTS, QUICK, ROOT, Mutant
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: f"{mutant.file}:{mutant.old.strip()}")
+def test_a_mutant_is_one_change_of_the_source(mutant: Mutant) -> None:
+    source = (ROOT / mutant.file).read_text("utf-8")
+    assert source.count(mutant.old) == 1
+    assert mutant.new != mutant.old
+    compile(source.replace(mutant.old, mutant.new), mutant.file, "exec")
+
+
+def test_the_tests_that_kill_them_are_there() -> None:
+    assert all((ROOT / name).is_file() for name in QUICK)

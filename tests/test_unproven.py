@@ -1,0 +1,104 @@
+"""Where no bound can be proven, nothing says that one was: no console, no file, no report."""
+
+from __future__ import annotations
+
+import json
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from harness.scene.solve import solve
+from harness.series.run import Tally, summary
+from problems.build import prepared
+from problems.errors import InputError
+from problems.forms.alteration import ALTERED
+from problems.scene import read_scene
+from report.results.series import FIGURES, Series
+from report.writers.series import _summary
+
+K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
+
+
+def write(folder: Path, stiffness: np.ndarray, f: float) -> str:
+    np.savez(folder / "mine.npz", K=stiffness, A=np.eye(3), f=np.full(3, f), g=np.zeros(3))
+    return str(folder / "mine.npz")
+
+
+def said(folder: Path, f: float, solver: str | None = None) -> tuple[int, str]:
+    console = Console(file=StringIO(), width=200)
+    code = solve(write(folder, K, f), solver, 1e-9, folder / "out", console)
+    assert isinstance(console.file, StringIO)
+    return code, console.file.getvalue()
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_solve_says_that_a_bound_could_not_be_proven(tmp_path: Path) -> None:
+    code, text = said(tmp_path, 1.7e308)
+    assert code == 1
+    assert "a bound could not be proven" in text
+    assert "nan" not in text
+    assert ", proven" not in text
+    record = json.loads((tmp_path / "out" / "solution.json").read_text())
+    assert (record["error_bound_mm"], record["verdict"]) == (None, "cannot_be_judged")
+    assert record["route"] == "could not be proven"
+    assert "No bound on the error could be proven." in (tmp_path / "out" / "answer.md").read_text("utf-8")
+
+
+def test_solve_says_what_was_proven(tmp_path: Path) -> None:
+    code, text = said(tmp_path, 1.0)
+    assert code == 0
+    assert "mm, proven." in text
+    assert ALTERED not in text
+
+
+def test_solve_says_that_reading_has_altered_something(tmp_path: Path) -> None:
+    off = K.copy()
+    off[0, 1] = np.nextafter(-1.0, 0.0)
+    console = Console(file=StringIO(), width=200)
+    assert solve(write(tmp_path, off, 1.0), None, 1e-9, tmp_path / "out", console) == 0
+    assert isinstance(console.file, StringIO)
+    assert ALTERED in console.file.getvalue()
+
+
+@pytest.mark.parametrize("scale", [1e-305, 1e-311])
+def test_a_stiffness_whose_inverse_overflows_is_refused(tmp_path: Path, scale: float) -> None:
+    """1e-311 N/mm was "within 0.0 mm, proven", 1.7e-13 mm off."""
+    made = prepared(read_scene(write(tmp_path, K * scale, scale)))
+    with pytest.raises(InputError, match="smallest eigenvalue of K"):
+        _ = made.factors
+
+
+def test_a_series_says_how_many_bounds_are_missing() -> None:
+    """An infinite bound is null in the rows of a series."""
+    console = Console(file=StringIO(), width=200)
+    tally = Tally({"within": 1, "outside": 0, "cannot_be_judged": 0, "no_answer": 1})
+    tally.add({"verdict": "within", "bound_mm": 1e-9})
+    tally.add({"verdict": "no_answer"})
+    summary(tally, 4, console)
+    tally.add({"verdict": "cannot_be_judged", "bound_mm": None})
+    assert tally.worst_bound_mm == np.inf
+    summary(tally, 5, console)
+    assert isinstance(console.file, StringIO)
+    first, *_, last = (line for line in console.file.getvalue().splitlines() if "bound" in line)
+    assert "largest proven error bound 1.0e-09 mm" in first
+    assert "some bounds could not be proven" in last
+
+
+@pytest.mark.parametrize(
+    ("bounds", "sentence"),
+    [
+        ([1e-9, 2e-9], "Every answer is proven to be within 2.00e-9 mm of the exact one."),
+        ([1e-9, np.nan], "The error of 1 answer could not be bounded; of 1 other it is at most 1.00e-9 mm."),
+        ([np.nan, np.nan], "The error of 2 answers could not be bounded."),
+    ],
+)
+def test_the_report_of_a_series_says_how_many_bounds_are_missing(bounds: list[float], sentence: str) -> None:
+    cases = pd.DataFrame({"case": [0, 1], **{name: [1e-3, 1e-3] for name in FIGURES}, "bound_mm": bounds})
+    identity = {"solver": "newton", "form": "dual", "tolerance": 1e-9, "limit_mm": 1e-7}
+    facts = {"title": "t", "cases": 2, "threads": 1, "machine": "m", "identity": identity, "scene": "s"}
+    series = Series(facts, {"within": 2}, cases, np.zeros((2, 3), np.float32), None, np.zeros((0, 2)), [])
+    assert sentence in _summary(series)
