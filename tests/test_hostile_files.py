@@ -178,3 +178,44 @@ def test_loads_without_their_points_are_not_guessed(tmp_path: Path) -> None:
     loads = cards(tmp_path / "loads.pch", F=frame(np.ones((12, 1)), [*range(1, 12), 20]))
     with pytest.raises(InputError, match="F, point 20"):
         import_([str(loads), *(str(tmp_path / f"{x}.mtx") for x in "KAg")], tmp_path / "out.npz", QUIET)
+
+
+# --- own matrices -------------------------------------------------------------------------------------
+
+
+FAR = np.linspace(-1, 1, 24).reshape(12, 2) * 1e308
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"K": np.zeros((0, 0)), "A": np.zeros((0, 0)), "f": np.zeros(0), "g": np.zeros(0)}, "at least one"),
+        ({"K": np.zeros((2, 2, 2))}, "must be matrices"),
+        ({"nodes": np.full((12, 2), np.nan)}, "nodes"),
+        ({"nodes": FAR}, "nodes"),
+        ({"A": own_matrices()["A"] * 1e200}, "choose other units"),
+        ({"A": own_matrices()["A"] * 1e-200}, "choose other units"),
+        ({"A": own_matrices()["A"] * 1e-320}, "choose other units"),
+        *(({"K": own_matrices()["K"] * 10.0**k}, "choose other units") for k in (-311, -309, -290, 300)),
+        ({"K": own_matrices()["K"] * 1e-250, "A": own_matrices()["A"] * 1e-250}, "choose other units"),
+    ],
+)
+def test_matrices_beyond_double_precision_are_refused(changes: Any, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.npz"
+    np.savez(path, **own_matrices(**changes))
+    for words in (
+        ["validate", path],
+        ["import", path, "--out", tmp_path / "x.npz"],
+        ["solve", path, "--out", tmp_path],
+    ):
+        done = invoke(*words)
+        assert done.exit_code == 2
+        assert said in done.output
+        assert str(path) in done.output
+
+
+@pytest.mark.parametrize(("K", "A"), [(1e45, 1e-45), (1e-45, 1e45), (1e-45, 1e-45)])
+def test_matrices_at_the_ends_of_the_range_raise_nothing(K: float, A: float, tmp_path: Path) -> None:
+    data = own_matrices()
+    np.savez(tmp_path / "own.npz", **(data | {"K": data["K"] * K, "A": data["A"] * A}))
+    assert invoke("solve", tmp_path / "own.npz", "--out", tmp_path / "x").exit_code in (0, 1)
