@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,10 +17,12 @@ from problems.errors import Fault, InputError
 from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
-from problems.input.user_matrices import read_matrices
+from problems.input.user_matrices import checked
+from problems.model.scene import MatricesScene
 from problems.scene import read_scene
 
 from .few_digits import digits_sentence
+from .into_place import into_place
 
 
 def export(source: str, format: str, out: Path, console: Console) -> None:
@@ -26,10 +30,10 @@ def export(source: str, format: str, out: Path, console: Console) -> None:
     if format not in formats.names():
         raise InputError.one("--format", "format", format, f"one of {', '.join(formats.names())}")
     scene = read_scene(source)
-    data = prepared(scene)
-    load = load_case(scene)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    formats.write(format, out, matrices(data, load))
+    own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
+    with into_place(out, [Path(source), *own]) as new:
+        data = prepared(scene)
+        formats.write(format, new, matrices(data, load_case(scene)))
     console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.description(format)}.")
 
 
@@ -44,48 +48,79 @@ def matrices(data: Prepared, load: LoadCase) -> formats.Data:
 def import_(files: list[str], out: Path, console: Console) -> None:
     """Read K, A, f, g from files, check them, and write them as one .npz, which is a scene.
 
-    files : paths, or NAME=PATH if the matrix has another name in its file. Raises InputError.
+    files : paths, or NAME=PATH if the matrix has another name in its file; their order does not matter.
+    Raises InputError, with what is at `out` unchanged.
     """
-    data: formats.Data = {}
-    for file in files:
-        name, _, path = file.rpartition("=")
-        found = formats.read(Path(path))
-        if name:
-            found = {name: _named(found, name, path)}
-        if strange := [key for key in found if key not in formats.NAMES]:
-            allowed = "K, A, f, g or nodes; say K=FILE where the file has another name"
-            raise InputError([Fault(path, "matrix", key, allowed) for key in strange])
-        data |= found
-    if missing := [name for name in "KAfg" if name not in data]:
-        raise InputError([Fault(", ".join(files), name, None, "is in none of the files") for name in missing])
-    sparse = {name: sp.csr_array(data[name]) for name in "KA"}
-    work = out.with_name(f".{out.stem}.tmp.npz")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        formats.write("npz", work, data | sparse)
-        read_matrices({"problem": work})  # shapes, numbers, symmetry
-        work.replace(out)
-    finally:
-        work.unlink(missing_ok=True)
+    if out.suffix != ".npz":
+        raise InputError.one("--out", "path", str(out), "must end in .npz, which makes it a scene")
+    given = [(name, Path(path)) for name, _, path in (file.rpartition("=") for file in files)]
+    with into_place(out, [path for _, path in given]) as new:
+        data, origin = _read_all(given)
+        checked(data, {name: str(path) for name, path in origin.items()})
+        formats.write("npz", new, data | {name: sp.csr_array(data[name]) for name in "KA"})
+        _refuse_unusable(new, origin)
     _print_facts(out, console)
 
 
-def _named(found: formats.Data, name: str, path: str) -> object:
+def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Path]]:
+    """K, A, f, g and perhaps nodes, and the file that each comes from; what is named overrides the rest."""
+    data: formats.Data = {}
+    origin: dict[str, Path] = {}
+    faults: list[Fault] = []
+    for named in (False, True):
+        of_rank: dict[str, Path] = {}
+        for name, path in given:
+            if bool(name) != named:
+                continue
+            found = formats.read(path)
+            if name:
+                found = {name: _named(found, name, path)}
+            for key in found:
+                if key not in formats.NAMES:
+                    allowed = "K, A, f, g or nodes; say K=FILE where the file has another name"
+                    faults.append(Fault(str(path), "matrix", key, allowed))
+                elif key in of_rank:
+                    allowed = f"is in {of_rank[key]} too; say {key}=FILE for the one that counts"
+                    faults.append(Fault(str(path), "matrix", key, allowed))
+            data |= {key: _vector(values) if key in ("f", "g") else values for key, values in found.items()}
+            of_rank |= dict.fromkeys(found, path)
+        origin |= of_rank
+    for name, matrix, axis in (("f", "K", 0), ("g", "A", 1)):
+        if name not in data and matrix in data and formats.omits_zeros(origin[matrix]):
+            data[name], origin[name] = np.zeros(data[matrix].shape[axis]), origin[matrix]
+    files = ", ".join(str(path) for _, path in given)
+    faults += [Fault(files, name, None, "is in none of the files") for name in "KAfg" if name not in data]
+    if faults:
+        raise InputError(faults)
+    return data, origin
+
+
+def _vector(values: Any) -> Any:
+    return np.ravel(values.toarray() if sp.issparse(values) else values)
+
+
+def _named(found: formats.Data, name: str, path: Path) -> object:
     """The matrix meant by NAME=PATH: the one of this name, or the only one in the file."""
     if name not in found and len(found) != 1:
         raise InputError.one(path, "matrices", list(found), f"a matrix {name}, or one matrix alone")
     return found.get(name, next(iter(found.values())))
 
 
+def _refuse_unusable(path: Path, origin: dict[str, Path]) -> None:
+    """Raise InputError, naming the matrix's own file, if K is indefinite or A's columns are dependent."""
+    try:
+        _ = prepared(read_scene(str(path))).Q
+    except InputError as error:
+        own = [
+            replace(fault, where=str(origin["A" if fault.key[0] == "A" else "K"])) for fault in error.faults
+        ]
+        raise InputError(own) from error
+
+
 def _print_facts(out: Path, console: Console) -> None:
     """Print size, definiteness, condition and digits of what was read."""
     scene = read_scene(str(out))
-    try:
-        data = prepared(scene)
-        _ = data.Q
-    except InputError:
-        out.unlink()
-        raise
+    data = prepared(scene)
     load = load_case(scene)
     blocks = " + ".join(str(len(K)) for K in data.assembly.blocks)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")

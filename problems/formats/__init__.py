@@ -5,6 +5,7 @@
     write(path, data)
     read(path)           the matrices of a file
     accepts(path)        whether a file's content is of this format; only if another format shares a suffix
+    OMITS_ZEROS          True if f and g that are zero everywhere are not written; else it may be missing
 
 Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known. Libraries are
 imported when a file is read or written.
@@ -58,6 +59,11 @@ def read(path: Path) -> Data:
         raise InputError.one(
             path, "file", f"{type(error).__name__}: {error}", "a readable matrix file"
         ) from error
+
+
+def omits_zeros(path: Path) -> bool:
+    """Whether an f or g that a readable file lacks may be zero."""
+    return getattr(module_of(path), "OMITS_ZEROS", False)
 
 
 def module_of(path: Path) -> ModuleType:

@@ -15,7 +15,10 @@ from problems.errors import Fault, InputError
 from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase, Matrix
 
+from .bounded import LARGEST
+
 U = 2.0**-53  # relative rounding error of float64
+SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
 
 
@@ -58,6 +61,8 @@ def checked(data: Mapping[str, Any], where: Mapping[str, str]) -> tuple[Assembly
     nodes = np.asarray(data["nodes"], dtype=float) if "nodes" in data else None
 
     n, m = K.shape[0], A.shape[1]
+    if n == 0:
+        raise InputError.one(where["K"], "K.shape", K.shape, "at least one unknown")
     shapes = {"K": (K.shape, (n, n)), "A": (A.shape, (n, m)), "f": (f.shape, (n,)), "g": (g.shape, (m,))}
     if nodes is not None:
         shapes["nodes"] = (nodes.shape, (n, 2))
@@ -67,11 +72,19 @@ def checked(data: Mapping[str, Any], where: Mapping[str, str]) -> tuple[Assembly
     for key, values in {"K": K.data, "A": A.data, "f": f, "g": g}.items():
         if not np.isfinite(values).all():
             faults.append(Fault(where[key], key, "NaN or infinity", "every entry must be finite"))
+    if nodes is not None and not (abs(nodes) <= LARGEST).all():
+        faults.append(Fault(where["nodes"], "nodes", "NaN or too far away", f"mm, at most {LARGEST:g}"))
     if faults:
         raise InputError(faults)
     untouched = np.flatnonzero(abs(A).sum(axis=0) == 0)
     if untouched.size:
         raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must involve an unknown")
+    for key, sizes in {"K": [abs(K).max()], "A": abs(A).max(axis=0).toarray() if m else []}.items():
+        if wrong := [float(size) for size in sizes if not 1 / SCALE <= size <= SCALE]:
+            allowed = f"must be between {1 / SCALE:g} and {SCALE:g}: choose other units"
+            faults.append(Fault(where[key], f"max|{key}|", wrong[0], allowed))
+    if faults:
+        raise InputError(faults)
     skew = abs(K - K.T).max()
     asymmetry = skew / max(abs(K).max(), np.finfo(float).tiny)
     if asymmetry > SYMMETRY:

@@ -1,0 +1,221 @@
+"""Files that are damaged, foreign, missing or in the way: refused by name or mended, and nothing is lost."""
+
+from __future__ import annotations
+
+from io import StringIO
+from itertools import permutations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+from small import make_load, make_prepared
+from typer.testing import CliRunner, Result
+
+from harness.cli.app import app
+from harness.scene.exchange import import_, matrices
+from problems import formats
+from problems.errors import InputError
+
+QUIET = Console(file=StringIO())
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    root = tmp_path_factory.mktemp("cache")
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(root))
+    return root
+
+
+def own_matrices(**changes: Any) -> formats.Data:
+    """K (12, 12), A (12, 7), f, g as dense arrays."""
+    data = make_prepared(3, 5, tools=2)
+    found = matrices(data, make_load(3, data)[0])
+    return found | {name: found[name].toarray() for name in "KA"} | changes
+
+
+def invoke(*words: object) -> Result:
+    done = CliRunner().invoke(app, [str(word) for word in words])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done
+
+
+# --- import and export --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_a_refused_import_leaves_what_is_there(own: bool, tmp_path: Path) -> None:
+    """The input itself, and another file."""
+    bad = tmp_path / "bad.npz"
+    np.savez(bad, **own_matrices(K=-np.eye(12)))
+    out = bad if own else tmp_path / "mine.npz"
+    if not own:
+        out.write_bytes(b"precious")
+    before = out.read_bytes()
+    assert invoke("import", bad, "--out", out).exit_code == 2
+    assert out.read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
+
+
+def test_a_refusal_names_the_matrixs_own_file(tmp_path: Path) -> None:
+    np.savez(tmp_path / "bad.npz", **own_matrices(K=-np.eye(12)))
+    assert (
+        str(tmp_path / "bad.npz")
+        in invoke("import", tmp_path / "bad.npz", "--out", tmp_path / "o.npz").output
+    )
+
+
+def test_an_import_never_replaces_an_input(tmp_path: Path) -> None:
+    np.savez(tmp_path / "mine.npz", **own_matrices())
+    before = (tmp_path / "mine.npz").read_bytes()
+    (tmp_path / "link.npz").symlink_to("mine.npz")
+    for name in ("mine.npz", "link.npz"):
+        assert "one of the files" in invoke("import", tmp_path / "mine.npz", "--out", tmp_path / name).output
+    assert (tmp_path / "mine.npz").read_bytes() == before
+
+
+def test_an_import_without_suffix_is_refused_before_it_writes(tmp_path: Path) -> None:
+    np.savez(tmp_path / "mine.npz", **own_matrices())
+    done = invoke("import", tmp_path / "mine.npz", "--out", tmp_path / "noext")
+    assert done.exit_code == 2
+    assert "must end in .npz" in done.output
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.npz"]
+
+
+@pytest.mark.parametrize("form", formats.names())
+def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path: Path) -> None:
+    own = tmp_path / "mine.npz"
+    np.savez(own, **own_matrices())
+    before = own.read_bytes()
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    formats.write("mtx", folder, own_matrices())
+    assert Path("/dev/null").is_char_device()
+    for out in ("/dev/null", own):
+        done = invoke("export", own, "--format", form, "--out", out)
+        assert done.exit_code == 2, done.output
+        assert "--out" in done.output
+    if form not in ("mtx", "abaqus"):
+        assert invoke("export", own, "--format", form, "--out", folder).exit_code == 2
+    assert Path("/dev/null").is_char_device()
+    assert own.read_bytes() == before
+
+
+def test_an_export_into_the_folder_of_its_own_matrices_is_refused(tmp_path: Path) -> None:
+    formats.write("mtx", tmp_path, own_matrices())
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[matrices]\n" + "".join(f'{name} = "{name}.mtx"\n' for name in "KAfg"))
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert invoke("export", scene, "--format", "mtx", "--out", tmp_path).exit_code == 2
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+# --- DMIG ---------------------------------------------------------------------------------------------
+
+
+def cards(path: Path, **frames: pd.DataFrame) -> Path:
+    from pyyeti import nastran
+
+    nastran.wtdmig(str(path), frames)
+    return path
+
+
+def frame(values: Any, points: Any = None, columns: Any = None) -> pd.DataFrame:
+    values = np.asarray(values, dtype=float)
+    points = points or range(1, len(values) + 1)
+    index = pd.MultiIndex.from_product([points, [0]], names=["id", "dof"])
+    return pd.DataFrame(values, index=index, columns=columns or range(1, values.shape[1] + 1))
+
+
+def stiffness(K: Any) -> pd.DataFrame:
+    made = frame(K)
+    made.columns = made.index
+    return made
+
+
+def test_an_absent_matrix_replaces_no_given_one_in_any_order(tmp_path: Path) -> None:
+    data = own_matrices()
+    formats.write("mtx", tmp_path, data)
+    files = [cards(tmp_path / "konly.pch", K=stiffness(data["K"])), *(tmp_path / f"{x}.mtx" for x in "Afg")]
+    for order in list(permutations(map(str, files)))[::5]:
+        import_(list(order), tmp_path / "out.npz", QUIET)
+        with np.load(tmp_path / "out.npz") as found:
+            np.testing.assert_array_equal(found["f"], data["f"])
+            np.testing.assert_array_equal(found["g"], data["g"])
+
+
+def test_a_matrix_in_two_files_is_refused(tmp_path: Path) -> None:
+    data = own_matrices()
+    formats.write("mtx", tmp_path / "m", data)
+    np.savez(tmp_path / "all.npz", **data)
+    for files in permutations([str(tmp_path / "all.npz"), str(tmp_path / "m" / "f.mtx")]):
+        with pytest.raises(InputError, match="too; say f=FILE"):
+            import_(list(files), tmp_path / "out.npz", QUIET)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"F": frame([[1.0], [2.0]], [1, 99])}, "F, point 99, component 0"),
+        ({"G": frame([[1.0], [2.0]], [1, 8])}, "G, point 8, component 0"),
+        ({"A": frame(np.vstack([np.eye(12, 7), np.ones(7)]))}, "A, point 13, component 0"),
+    ],
+)
+def test_a_row_at_a_point_that_is_not_there_is_named(changed: Any, said: str, tmp_path: Path) -> None:
+    data = own_matrices()
+    whole = {"K": stiffness(data["K"]), "A": frame(data["A"]), "F": frame(data["f"][:, None])}
+    path = cards(tmp_path / "p.pch", **(whole | changed))
+    with pytest.raises(InputError) as error:
+        import_([str(path)], tmp_path / "out.npz", QUIET)
+    assert said in str(error.value)
+
+
+def test_loads_without_their_points_are_not_guessed(tmp_path: Path) -> None:
+    data = own_matrices()
+    formats.write("mtx", tmp_path, data)
+    loads = cards(tmp_path / "loads.pch", F=frame(np.ones((12, 1)), [*range(1, 12), 20]))
+    with pytest.raises(InputError, match="F, point 20"):
+        import_([str(loads), *(str(tmp_path / f"{x}.mtx") for x in "KAg")], tmp_path / "out.npz", QUIET)
+
+
+# --- own matrices -------------------------------------------------------------------------------------
+
+
+FAR = np.linspace(-1, 1, 24).reshape(12, 2) * 1e308
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"K": np.zeros((0, 0)), "A": np.zeros((0, 0)), "f": np.zeros(0), "g": np.zeros(0)}, "at least one"),
+        ({"K": np.zeros((2, 2, 2))}, "must be matrices"),
+        ({"nodes": np.full((12, 2), np.nan)}, "nodes"),
+        ({"nodes": FAR}, "nodes"),
+        ({"A": own_matrices()["A"] * 1e200}, "choose other units"),
+        ({"A": own_matrices()["A"] * 1e-200}, "choose other units"),
+        ({"A": own_matrices()["A"] * 1e-320}, "choose other units"),
+        *(({"K": own_matrices()["K"] * 10.0**k}, "choose other units") for k in (-311, -309, -290, 300)),
+        ({"K": own_matrices()["K"] * 1e-250, "A": own_matrices()["A"] * 1e-250}, "choose other units"),
+    ],
+)
+def test_matrices_beyond_double_precision_are_refused(changes: Any, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.npz"
+    np.savez(path, **own_matrices(**changes))
+    for words in (
+        ["validate", path],
+        ["import", path, "--out", tmp_path / "x.npz"],
+        ["solve", path, "--out", tmp_path],
+    ):
+        done = invoke(*words)
+        assert done.exit_code == 2
+        assert said in done.output
+        assert str(path) in done.output
+
+
+@pytest.mark.parametrize(("K", "A"), [(1e45, 1e-45), (1e-45, 1e45), (1e-45, 1e-45)])
+def test_matrices_at_the_ends_of_the_range_raise_nothing(K: float, A: float, tmp_path: Path) -> None:
+    data = own_matrices()
+    np.savez(tmp_path / "own.npz", **(data | {"K": data["K"] * K, "A": data["A"] * A}))
+    assert invoke("solve", tmp_path / "own.npz", "--out", tmp_path / "x").exit_code in (0, 1)
