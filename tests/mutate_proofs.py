@@ -4,8 +4,8 @@
     python tests/mutate_proofs.py batched    those whose file or text contains a word
 
 Each mutant of `mutants.py` is made in a copy of the tree, where its tests are run until one fails: it is
-killed. If it survives, a term of a bound is not tested. Exits with 1 if one survives, or if a text is not found
-exactly once, which `test_mutants.py` checks too.
+killed. If it survives, a term of a bound is not tested. Exits with 1 if one survives, or if a text is not
+found exactly once, which `test_mutants.py` checks too.
 """
 
 from __future__ import annotations

@@ -79,6 +79,17 @@ def test_certificate_a_gap_that_may_be_negative_proves_nothing(monkeypatch: pyte
     assert bound_of(diagonal(1.0), 1.0, 10.0, doubled(array(1.0)), doubled(array(0.0)), 1.0) == np.inf
 
 
+def test_certificate_a_pulling_force_proves_nothing() -> None:
+    """λ = −1 holds the spring at the stop in balance, but x* = 0."""
+    assert bound_of(diagonal(1.0), 0.0, 1.0, doubled(array(1.0)), doubled(array(-1.0)), 1.0) >= 1
+
+
+def test_certificate_a_residual_that_overflows_proves_nothing() -> None:
+    """The contact is at the other spring: its gap is known."""
+    made = diagonal(4.0, 1.0, A=[[0.0], [1.0]])
+    assert bound_of(made, 1.0, 1.0, doubled(array(1.6e308, 0.0)), doubled(array(0.0)), 1.0) == np.inf
+
+
 def test_certificate_nothing_is_divided_by_a_stiffness_of_zero() -> None:
     with np.errstate(divide="raise"):
         assert bound_of(diagonal(1.0), 1.0, 10.0, doubled(array(1.0)), doubled(array(0.0)), 0.0) == np.inf

@@ -110,7 +110,7 @@ def test_residual_what_the_slices_of_K_leave_is_in_doubt(seed: int) -> None:
     assert violations(found, exact) == 0
     assert abs(exact[0]) > Fraction(U * abs(float(found.value[0])))
     bits = (53 - int(np.ceil(np.log2(n)))) // 2 + 1
-    assert found.error[0] >= gamma(n) * 2.0 ** (-2 * bits) * abs(x).sum()
+    assert found.error[0] >= gamma(n) * 2.0 ** (1 - 2 * bits) * abs(x).sum()  # 1 < 2¹
 
 
 def test_residual_products_that_underflow_count() -> None:
