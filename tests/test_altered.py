@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
-from test_proof_terms import diagonal
+from springs import diagonal
 
 from harness.verification.batched.assess import assess
 from harness.verification.batched.bound import Bound, independence

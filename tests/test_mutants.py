@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from mutate_proofs import MUTANTS, QUICK, ROOT, Mutant
+from mutants import MUTANTS, TESTS, Mutant
+from mutate_proofs import ROOT
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: f"{mutant.file}:{mutant.old.strip()}")
@@ -14,5 +15,7 @@ def test_a_mutant_is_one_change_of_the_source(mutant: Mutant) -> None:
     compile(source.replace(mutant.old, mutant.new), mutant.file, "exec")
 
 
-def test_the_tests_that_kill_them_are_there() -> None:
-    assert all((ROOT / name).is_file() for name in QUICK)
+@pytest.mark.parametrize("file", TESTS)
+def test_the_tests_that_kill_them_are_there(file: str) -> None:
+    assert any(mutant.file == file for mutant in MUTANTS)
+    assert all((ROOT / f"tests/test_{name}.py").is_file() for name in TESTS[file])

@@ -1,0 +1,246 @@
+"""The mutants of `mutate_proofs.py`: a file, a text that occurs in it exactly once, and what replaces it.
+
+Each leaves out, halves or weakens a term of a bound. Where a proof changes, its mutants change with it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+CERTIFICATE = "harness/verification/certificate.py"
+EXACT = "harness/verification/exact_residual.py"
+LENGTH = "harness/verification/length.py"
+DEFINITE = "harness/verification/definite.py"
+JUDGE = "harness/verification/judge.py"
+REFERENCE = "harness/verification/reference.py"
+BLOCK = "harness/verification/batched/bound.py"
+COMPLIANCE = "harness/verification/batched/compliance.py"
+RESIDUAL = "harness/verification/batched/residual.py"
+ASSESS = "harness/verification/batched/assess.py"
+KKT = "solvers/kkt.py"
+ALTERATION = "problems/forms/alteration.py"
+READ = "problems/input/user_matrices.py"
+
+
+class Mutant(NamedTuple):
+    file: str
+    old: str
+    new: str
+
+
+MUTANTS = [
+    # ‖e‖ ≤ (‖r‖/√κ + √(sᵀλ))/√κ, and the rounding of x
+    Mutant(CERTIFICATE, "(norm / np.sqrt(kappa) + np.sqrt(slack))", "(norm / np.sqrt(kappa))"),
+    Mutant(
+        CERTIFICATE,
+        "(norm / np.sqrt(kappa) + np.sqrt(slack))",
+        "(norm / np.sqrt(kappa) + np.sqrt(slack) / 2)",
+    ),
+    Mutant(CERTIFICATE, "(norm / np.sqrt(kappa) + np.sqrt(slack))", "np.sqrt(slack)"),
+    Mutant(
+        CERTIFICATE,
+        "(norm / np.sqrt(kappa) + np.sqrt(slack))",
+        "(norm / np.sqrt(kappa) / 2 + np.sqrt(slack))",
+    ),
+    Mutant(CERTIFICATE, "(norm / np.sqrt(kappa) + np.sqrt(slack))", "(norm + np.sqrt(slack))"),
+    Mutant(CERTIFICATE, "np.sqrt(slack)) / np.sqrt(kappa)", "np.sqrt(slack))"),
+    Mutant(CERTIFICATE, "np.sqrt(slack)) / np.sqrt(kappa)", "np.sqrt(slack)) / kappa"),
+    Mutant(CERTIFICATE, "(error + float(abs(x.lo).max(initial=0)))", "error"),
+    Mutant(
+        CERTIFICATE,
+        "(error + float(abs(x.lo).max(initial=0)))",
+        "(error + float(abs(x.lo).max(initial=0)) / 2)",
+    ),
+    Mutant(CERTIFICATE, "length(abs(r.value) + r.error)", "length(abs(r.value))"),
+    Mutant(CERTIFICATE, "length(abs(r.value) + r.error)", "length(r.error)"),
+    Mutant(CERTIFICATE, "length(abs(r.value) + r.error)", "length(r.value + r.error)"),
+    Mutant(CERTIFICATE, "float(length(abs(r.value) + r.error))", "float((abs(r.value) + r.error).max())"),
+    Mutant(CERTIFICATE, "opening, pressing = s.value + s.error,", "opening, pressing = s.value,"),
+    Mutant(CERTIFICATE, "lam.hi + abs(lam.lo)\n    slack", "lam.hi\n    slack"),
+    Mutant(CERTIFICATE, " + ETA * np.count_nonzero(opening * (pressing > 0))", ""),
+    Mutant(CERTIFICATE, "~(s.value - s.error >= 0)", "~(s.value >= 0)"),
+    Mutant(CERTIFICATE, "~(s.value - s.error >= 0)", "s.value - s.error < 0"),
+    Mutant(CERTIFICATE, "if not (feasible and kappa > 0):", "if not kappa > 0:"),
+    Mutant(CERTIFICATE, "if not (feasible and kappa > 0):", "if not feasible:"),
+    Mutant(CERTIFICATE, "np.where(negative, 0.0, lam.hi)", "lam.hi"),
+    Mutant(CERTIFICATE, "if not np.isfinite(bound):", "if False:"),
+    Mutant(CERTIFICATE, " - 1.01 * assembly.altered.norm_K", ""),
+    Mutant(CERTIFICATE, "1.01 * norms * error", "1.01 * error"),
+    Mutant(CERTIFICATE, "(np.sqrt(diagonal) * np.sqrt(trace))[single] * error + ", ""),
+    Mutant(CERTIFICATE, "error + abs(r.value[single]) +", "error +"),
+    # Residuals in twice the working precision
+    Mutant(EXACT, "error = U * abs(value) + gamma", "error = gamma"),
+    Mutant(EXACT, "error = U * abs(value) + gamma", "error = U / 2 * abs(value) + gamma"),
+    Mutant(EXACT, "gamma(self.terms) ** 2 * self.size + ", ""),
+    Mutant(EXACT, "gamma(self.terms) ** 2 * self.size", "gamma(self.terms) ** 2 / 2 * self.size"),
+    Mutant(EXACT, " * (self.size > 0) + self.error", " * (self.size > 0)"),
+    Mutant(EXACT, "self.lo += rounding", "pass"),
+    Mutant(EXACT, "            total.add(rounding)\n", ""),
+    Mutant(EXACT, "            total.error[first + those] += 5 * ETA * (factor != 0)\n", ""),
+    Mutant(EXACT, "scale * (left + 2.0", "scale * (2.0"),
+    Mutant(EXACT, "scale * (left + 2.0", "scale * (left / 2 + 2.0"),
+    Mutant(EXACT, "(left + 2.0 ** (-K_SLICES * bits) * length + ETA)", "(left + ETA)"),
+    Mutant(EXACT, "2.0 ** (-K_SLICES * bits) * length", "2.0 ** (-K_SLICES * bits) / 2 * length"),
+    Mutant(EXACT, " + len(products) * n * ETA", ""),
+    Mutant(EXACT, "    total.error[rows] += 1.01 * error\n", ""),
+    Mutant(EXACT, "np.column_stack([rest, x.lo])", "np.column_stack([rest, 0 * x.lo])"),
+    Mutant(EXACT, "np.maximum(np.exp2(exponents[:, 0]), SMALLEST_SCALE)", "np.exp2(exponents[:, 0])"),
+    Mutant(
+        EXACT, "        total.error += assembly.altered.of_forces(_size(x), _size(lam))\n", "        pass\n"
+    ),
+    Mutant(EXACT, "        total.error += assembly.altered.of_gaps(_size(x))\n", "        pass\n"),
+    Mutant(LENGTH, "np.linalg.norm(v / scale, axis=0)\n", "np.linalg.norm(v, axis=0) / scale\n"),
+    Mutant(LENGTH, " + ETA * (norm > 0)", ""),
+    # λmin(K) ≥ s − γ ‖|R|ᵀ|R|‖₂ − u (max(B_ii) + s)
+    Mutant(DEFINITE, "gamma(2 * (len(K) + 1)) * _norm(R) + ", ""),
+    Mutant(DEFINITE, "gamma(2 * (len(K) + 1))", "gamma(len(K) + 1)"),
+    Mutant(DEFINITE, "_norm(R) + U * (largest + abs(s))", "_norm(R)"),
+    Mutant(DEFINITE, "U * (largest + abs(s))", "U * abs(s)"),
+    Mutant(DEFINITE, "U * (largest + abs(s))", "U * largest"),
+    Mutant(DEFINITE, "1.01 * (gamma(2", "1.00 * (gamma(2"),
+    Mutant(DEFINITE, "max())\n        R, info", "min())\n        R, info"),
+    Mutant(DEFINITE, "if info == 0:", "if True:"),
+    Mutant(DEFINITE, "(w / v).max()", "(w / v).min()"),
+    Mutant(DEFINITE, "np.abs(R, out=R)", "pass"),
+    Mutant(DEFINITE, "if bound >= SMALLEST:", "if bound > 0:"),
+    Mutant(DEFINITE, "scale = 2.0 ** -float(exponent(np.diag(K).max()))", "scale = 1.0"),
+    Mutant(
+        REFERENCE, "return min(smallest_eigenvalue(_dense(K), estimate) for K in blocks)", "return estimate"
+    ),
+    Mutant(REFERENCE, "return min(smallest_eigenvalue(", "return max(smallest_eigenvalue("),
+    Mutant(REFERENCE, "if not np.isfinite(proof.bound_mm):", "if False:"),
+    # √D (‖r‖/√κ + ‖z‖_K + ‖δ − Aᵀz‖ √(‖K‖/σ²))
+    Mutant(BLOCK, "(force / np.sqrt(self.kappa) + distance)", "distance"),
+    Mutant(BLOCK, "(force / np.sqrt(self.kappa) + distance)", "(force / np.sqrt(self.kappa) / 2 + distance)"),
+    Mutant(BLOCK, "(force / np.sqrt(self.kappa) + distance)", "(force + distance)"),
+    Mutant(BLOCK, "(force / np.sqrt(self.kappa) + distance)", "(force / np.sqrt(self.kappa))"),
+    Mutant(BLOCK, "(force / np.sqrt(self.kappa) + distance)", "(force / np.sqrt(self.kappa) + distance / 2)"),
+    Mutant(BLOCK, "SAFE * np.sqrt(self.compliance) *", "SAFE *"),
+    Mutant(BLOCK, "SAFE * np.sqrt(self.compliance) *", "SAFE * self.compliance *"),
+    Mutant(BLOCK, "length(abs(r) + error)", "length(abs(r))"),
+    Mutant(BLOCK, "length(abs(r) + error)", "length(error)"),
+    Mutant(BLOCK, "np.where(closed, -s, np.maximum(-s, 0.0))", "np.maximum(-s, 0.0)"),
+    Mutant(BLOCK, "np.where(closed, -s, np.maximum(-s, 0.0))", "np.where(closed, -s, 0.0)"),
+    Mutant(BLOCK, "np.where(closed | (s < s_error), s_error, 0.0)", "np.where(closed, s_error, 0.0)"),
+    Mutant(BLOCK, "np.where(closed | (s < s_error), s_error, 0.0)", "np.where(s < 0, s_error, 0.0)"),
+    Mutant(BLOCK, "if not (self.kappa > 0 and self.sigma2 > 0):", "if not self.sigma2 > 0:"),
+    Mutant(BLOCK, "if not (self.kappa > 0 and self.sigma2 > 0):", "if not self.kappa > 0:"),
+    Mutant(BLOCK, " + distance) / certain", " + distance)"),
+    Mutant(BLOCK, "np.where(np.isfinite(bounds), bounds, np.inf)", "bounds"),
+    Mutant(BLOCK, "scale * np.sqrt(energy) + missed", "missed"),
+    Mutant(BLOCK, "scale * np.sqrt(energy) + missed", "scale * np.sqrt(energy) / 2 + missed"),
+    Mutant(BLOCK, " + missed * np.sqrt(self.stiffest / self.sigma2)", ""),
+    Mutant(BLOCK, "np.sqrt(self.stiffest / self.sigma2)", "np.sqrt(self.stiffest)"),
+    Mutant(BLOCK, "np.sqrt(self.stiffest / self.sigma2)", "np.sqrt(1 / self.sigma2)"),
+    Mutant(BLOCK, "length(left) + length(rounding) + uncertainty", "length(rounding) + uncertainty"),
+    Mutant(BLOCK, "length(left) + length(rounding) + uncertainty", "length(left) + uncertainty"),
+    Mutant(BLOCK, "length(left) + length(rounding) + uncertainty", "length(left) + length(rounding)"),
+    Mutant(
+        BLOCK,
+        "length(left) + length(rounding) + uncertainty",
+        "length(left) / 2 + length(rounding) + uncertainty",
+    ),
+    Mutant(
+        BLOCK,
+        "length(left) + length(rounding) + uncertainty",
+        "length(left) + length(rounding) / 2 + uncertainty",
+    ),
+    Mutant(
+        BLOCK,
+        "length(left) + length(rounding) + uncertainty",
+        "length(left) + length(rounding) + uncertainty / 2",
+    ),
+    Mutant(BLOCK, "gamma(2 * n) * self.stiffest * size**2 + ", ""),
+    Mutant(BLOCK, "gamma(2 * n) * self.stiffest * size**2", "gamma(n) * self.stiffest * size**2"),
+    Mutant(BLOCK, "scale = np.exp2(exponent(abs(z).max(axis=0, initial=0.0)))", "scale = 1.0"),
+    Mutant(BLOCK, "outer(assembly.altered.A_columns, abs(z)", "outer(0 * assembly.altered.A_columns, abs(z)"),
+    Mutant(BLOCK, "gamma(depth) * (abs(g) + abs(A).T @ x_size) + depth", "depth"),
+    Mutant(BLOCK, "gamma(depth) * (abs(g) + abs(A).T @ x_size)", "gamma(depth) * (abs(A).T @ x_size)"),
+    Mutant(BLOCK, "gamma(depth) * (abs(g) + abs(A).T @ x_size)", "gamma(depth) * abs(g)"),
+    Mutant(BLOCK, "(abs(g) + abs(A).T @ x_size) + depth * ETA", "(abs(g) + abs(A).T @ x_size)"),
+    Mutant(BLOCK, "        error = error + assembly.altered.of_gaps(x_size)\n", "        pass\n"),
+    Mutant(BLOCK, "sigma2 = least - uncertainty", "sigma2 = least"),
+    Mutant(BLOCK, "least = min(least, smallest_eigenvalue(", "least = max(least, smallest_eigenvalue("),
+    Mutant(
+        BLOCK, "        sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A\n", "        pass\n"
+    ),
+    # max (K⁻¹)_ii ≤ (1 + c/κ) (row + ε ‖X‖_F)²
+    Mutant(COMPLIANCE, "SAFE * (1 + relative) * row**2", "SAFE * row**2"),
+    Mutant(COMPLIANCE, "SAFE * (1 + relative) * row**2", "SAFE * (1 + relative / 2) * row**2"),
+    Mutant(COMPLIANCE, "SAFE * (1 + relative) * row**2", "SAFE * (1 + relative) * row"),
+    Mutant(COMPLIANCE, " + epsilon / (1 - epsilon) * length", ""),
+    Mutant(COMPLIANCE, "gamma(3 * len(K))", "gamma(len(K))"),
+    Mutant(COMPLIANCE, "or epsilon >= 0.5", ""),
+    Mutant(COMPLIANCE, "gamma(2 * (len(K) + 1))", "gamma(len(K) + 1)"),
+    # The residual of a block
+    Mutant(RESIDUAL, "error += gamma(depth) * size + depth * ETA", "error += depth * ETA"),
+    Mutant(RESIDUAL, "error += gamma(depth) * size + depth * ETA", "error += gamma(depth) * size"),
+    Mutant(RESIDUAL, "abs(f) + abs(A) @ abs(lam)", "abs(f)"),
+    Mutant(RESIDUAL, "abs(f) + abs(A) @ abs(lam)", "abs(A) @ abs(lam)"),
+    Mutant(
+        RESIDUAL, "        error += assembly.altered.of_forces(", "        1 * assembly.altered.of_forces("
+    ),
+    Mutant(RESIDUAL, "gamma(n) * abs(d).max(axis=0) + gamma(1)", "gamma(1)"),
+    Mutant(
+        RESIDUAL, "gamma(n) * abs(d).max(axis=0) + gamma(1)", "gamma(n) / 2 * abs(d).max(axis=0) + gamma(1)"
+    ),
+    Mutant(RESIDUAL, "+ gamma(1) * abs(moved.tail).max(axis=0) + ETA", "+ ETA"),
+    Mutant(RESIDUAL, "error = error + stiffest * error_of_d", "error = stiffest * error_of_d"),
+    Mutant(RESIDUAL, "error + stiffest * error_of_d + gamma", "error + gamma"),
+    Mutant(RESIDUAL, " + gamma(1) * (abs(r) + abs(Kd))", ""),
+    Mutant(RESIDUAL, " + (n + 1) * ETA\n", "\n"),
+    Mutant(RESIDUAL, "outer(assembly.altered.K,", "outer(0 * assembly.altered.K,"),
+    Mutant(RESIDUAL, "(scaled[0] * head_size + scaled[1]", "(scaled[1]"),
+    Mutant(RESIDUAL, "(scaled[0] * head_size + scaled[1] * tail_size", "(scaled[0] * head_size"),
+    Mutant(RESIDUAL, " + 4 * n * ETA)", ")"),
+    # The distance of an answer from the point that the bound is for
+    Mutant(ASSESS, "SAFE * (bounds + abs(moved)", "1.0 * (bounds + abs(moved)"),
+    Mutant(ASSESS, "(bounds + abs(moved).max(axis=0) + rounding)", "(bounds + rounding)"),
+    Mutant(
+        ASSESS,
+        "(bounds + abs(moved).max(axis=0) + rounding)",
+        "(bounds + abs(moved).max(axis=0) / 2 + rounding)",
+    ),
+    Mutant(ASSESS, "(bounds + abs(moved).max(axis=0) + rounding)", "(bounds + abs(moved).max(axis=0))"),
+    Mutant(ASSESS, "(bounds + abs(moved).max(axis=0) + rounding)", "(abs(moved).max(axis=0) + rounding)"),
+    Mutant(ASSESS, "bounds = np.where(np.isfinite(bounds), bounds, np.inf)", "pass"),
+    Mutant(JUDGE, "REFERENCE_SHARE * limit_mm", "limit_mm"),
+    Mutant(JUDGE, "REFERENCE_SHARE * limit_mm", "2 * REFERENCE_SHARE * limit_mm"),
+    Mutant(JUDGE, "if not reference.bound_mm <= ", "if reference.bound_mm > "),
+    Mutant(KKT, "max(float((-y).max(initial=0.0)), float(", "max(float("),
+    Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "0.0"),
+    Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "float(y[lam > 0].min(initial=0.0))"),
+    Mutant(KKT, "(abs(p) + abs(Q) @ lam)", "abs(p)"),
+    Mutant(KKT, "(abs(p) + abs(Q) @ lam)", "(abs(Q) @ lam)"),
+    Mutant(KKT, "4 * EPS", "8 * EPS"),
+    # What reading has altered
+    Mutant(ALTERATION, "outer(self.f, np.ones_like(x_size)) + ", ""),
+    Mutant(ALTERATION, " + outer(self.K, x_size)", ""),
+    Mutant(ALTERATION, " + outer(self.A_rows, lam_size)", ""),
+    Mutant(ALTERATION, "outer(self.g, np.ones_like(x_size)) +", "outer(0 * self.g, np.ones_like(x_size)) +"),
+    Mutant(ALTERATION, " + np.multiply.outer(self.A_columns, x_size)", ""),
+    Mutant(ALTERATION, "max(self.A_rows.max(initial=0.0), ", "max("),
+    Mutant(ALTERATION, ", self.A_columns.max(initial=0.0))", ", 0.0)"),
+    Mutant(READ, "off_K + abs(K - given)", "abs(K - given)"),
+    Mutant(READ, "off_K + abs(K - given)", "off_K"),
+    Mutant(READ, "lost[~same] = U * abs(rounded[~same])", "lost[~same] = U / 4 * abs(rounded[~same])"),
+    Mutant(READ, "off + 2 * U * count.multiply(size)", "off"),
+    Mutant(READ, "(abs(rounded) < 2.0**63) & ", ""),
+]
+
+#: Which tests must fail.
+TESTS = {
+    CERTIFICATE: ("terms_certificate", "terms_residual", "altered", "certificate"),
+    EXACT: ("terms_residual", "exact_residual", "altered"),
+    LENGTH: ("terms_residual",),
+    DEFINITE: ("terms_definite", "certificate"),
+    REFERENCE: ("terms_verdict", "altered"),
+    BLOCK: ("terms_batched", "altered"),
+    COMPLIANCE: ("terms_batched",),
+    RESIDUAL: ("terms_batched", "altered", "series_bound"),
+    ASSESS: ("terms_batched",),
+    JUDGE: ("terms_verdict", "harness_judge"),
+    KKT: ("terms_verdict",),
+    ALTERATION: ("altered",),
+    READ: ("altered",),
+}
