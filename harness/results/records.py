@@ -27,8 +27,11 @@ OUTDATED = "measurements.outdated.jsonl"
 
 
 def to_line(row: Row) -> str:
-    """One line of strict JSON: non-finite numbers become null."""
-    return json.dumps(_plain(row), ensure_ascii=False, allow_nan=False)
+    """One line of strict JSON: non-finite numbers become null, and lone surrogates, as in a file name that is
+    not UTF-8, their JSON escapes.
+    """
+    text = json.dumps(_plain(row), ensure_ascii=False, allow_nan=False)
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _plain(value: Any) -> Any:

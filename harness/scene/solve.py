@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from harness.planning.estimate import refuse_what_cannot_fit
 from harness.results.machine import resident_mib
@@ -59,7 +60,7 @@ class Steps:
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
         start = time.perf_counter()
-        with self.console.status(name):
+        with self.console.status(Text(name)):
             yield
         self.seconds[name] = time.perf_counter() - start
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 WIDTH_OF_A_LOG = 160
 MOST_FAULTS = 100  # shown at once
+LONGEST_LINE = 200  # characters of a file quoted in a message
 
 
 def option(metavar: str, help: str, **limits: Any) -> Any:
@@ -44,18 +45,23 @@ def error_reporting(
     interrupted: str = "Interrupted. The rows so far are kept: run the same command again to continue.",
 ) -> Iterator[Console]:
     """A console; each user error becomes a red line and an exit code, not a traceback."""
-    from rich.console import Console
-
     from problems.errors import InputError
 
-    errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    from .plain_console import PlainConsole
+
+    errors = PlainConsole(stderr=True, soft_wrap=True)
     try:
-        yield Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else WIDTH_OF_A_LOG)
+        yield PlainConsole(width=None if sys.stdout.isatty() else WIDTH_OF_A_LOG)
     except InputError as error:
         for fault in error.faults[:MOST_FAULTS]:
             errors.print(str(fault), style="red")
         if (more := len(error.faults) - MOST_FAULTS) > 0:
             errors.print(f"… and {more} more", style="red")
+        raise typer.Exit(WRONG_USAGE) from None
+    except UnicodeEncodeError as error:
+        where = error.object.count("\n", 0, error.start)
+        line = error.object.split("\n")[where][:LONGEST_LINE]
+        errors.print(f"{line}: a name that is not UTF-8 cannot be written: rename the file", style="red")
         raise typer.Exit(WRONG_USAGE) from None
     except OSError as error:
         errors.print(f"{error}{safe}", style="red")

@@ -70,7 +70,7 @@ class Display:
         self.sizes = sizes
         self.timed: dict[tuple[str, str], tuple[int, float]] = {}
         self.progress = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),

@@ -12,6 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
+from report.document.escape import LONGEST_LABEL
+
 from . import style
 from .maps import Array
 
@@ -52,7 +54,7 @@ def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int) 
     room = (style.WIDTH - LEFT - RIGHT - (columns - 1) * BESIDE) / columns
     width = min(room, TALLEST / ratio)
     height = width * ratio
-    over = LETTER * max(map(len, titles))  # a title may be wider than its map
+    over = LETTER * min(max(map(len, titles)), LONGEST_LABEL)  # a title may be wider than its map
     across, down = max(width + BESIDE, over), max(height, LOWEST) + BELOW  # from a map to the next
     wide = LEFT + (columns - 1) * across + max(width + RIGHT, over)
     long = (rows - 1) * down + height

@@ -19,6 +19,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.results.schema import LADDERS
+from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
 
 from .cells import cells_of
@@ -53,10 +54,10 @@ class Results:
 
     def scene_arrays(self, scene: str) -> dict[str, NDArray[np.float64]] | None:
         """The arrays of a scene's file; empty if it is damaged, None without a file or contact nodes."""
-        path = self.directory / "scenes" / (scene.replace("/", "_") + ".npz")
-        if not path.exists():
-            return None
+        path = self.directory / "scenes" / (plain(scene).replace("/", "_") + ".npz")
         try:
+            if not path.exists():
+                return None
             with np.load(path) as file:
                 arrays = {name: file[name] for name in file.files}
         except (OSError, ValueError, BadZipFile):
@@ -107,8 +108,8 @@ def read(directory: Path) -> Results:
 def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dict[str, Any]:
     """The content of a file; empty if there is none, and with a warning if it is damaged."""
     try:
-        content = parse(path.read_text("utf-8")) if path.is_file() else {}
-    except ValueError:
+        content = quoted(parse(path.read_text("utf-8"))) if path.is_file() else {}
+    except (ValueError, RecursionError):
         content = None
     if isinstance(content, dict):
         return content
@@ -119,13 +120,13 @@ def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dic
 def _json_lines(path: Path) -> tuple[list[dict[str, Any]], list[str]]:
     records: list[dict[str, Any]] = []
     warnings: list[str] = []
-    lines = path.read_text("utf-8").splitlines() if path.is_file() else []
+    lines = path.read_text("utf-8", "replace").split("\n") if path.is_file() else []
     for number, line in enumerate(lines, start=1):
         if not line.strip():
             continue
         try:
-            record = json.loads(line)
-        except json.JSONDecodeError:
+            record = quoted(json.loads(line))
+        except (ValueError, RecursionError):
             record = None
         if isinstance(record, dict):
             records.append(record)

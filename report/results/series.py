@@ -6,6 +6,7 @@ The gaps stay on disk, so that memory grows with the number of cases only by a f
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+
+from report.document.escape import quoted
 
 Array = NDArray[np.float64]
 
@@ -35,16 +38,18 @@ class Series:
 
 def read(directory: Path) -> Series:
     """Raises FileNotFoundError if the directory has no series."""
-    facts = json.loads((directory / "series.json").read_text("utf-8"))
-    counts: dict[str, int] = {}
-    kept: list[tuple[Any, ...]] = []
+    facts = quoted(json.loads((directory / "series.json").read_text("utf-8")))
+    rows: dict[int, tuple[Any, ...] | None] = {}
+    verdicts: dict[int, str] = {}
     swept: list[str] = []
-    for row in _rows(directory / "cases.jsonl"):
-        counts[row["verdict"]] = counts.get(row["verdict"], 0) + 1
-        if row["case"] >= facts["cases"] or row.get("max_gap_mm") is None:
-            continue
-        swept = swept or [key for key in row if "." in key]
-        kept.append((row["case"], *(row.get(name) for name in FIGURES), *(row[key] for key in swept)))
+    for row in _rows(directory / "cases.jsonl"):  # of equal cases the last
+        case = row["case"]
+        verdicts[case], rows[case] = row["verdict"], None
+        if case < facts["cases"] and row.get("max_gap_mm") is not None:
+            swept = swept or [key for key in row if "." in key]
+            rows[case] = (case, *(row.get(name) for name in FIGURES), *(row[key] for key in swept))
+    kept = [row for row in rows.values() if row]
+    swept = quoted(swept)
     cases = pd.DataFrame(kept, columns=["case", *FIGURES, *swept], dtype=float)
     cases = cases.astype({"case": int}).sort_values("case").reset_index(drop=True)
     with np.load(directory / "contacts.npz") as arrays:
@@ -54,7 +59,7 @@ def read(directory: Path) -> Series:
     path = directory / "gaps.f4"
     stored = path.stat().st_size // (4 * m) if path.exists() else 0
     gaps = np.memmap(path, np.float32, "r", shape=(stored, m)) if stored else np.zeros((0, m), np.float32)
-    return Series(facts, counts, cases, gaps, nodes, fasteners, swept)
+    return Series(facts, quoted(Counter(verdicts.values())), cases, gaps, nodes, fasteners, swept)
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:

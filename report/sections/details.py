@@ -9,6 +9,7 @@ import pandas as pd
 
 from harness.results.schema import VERDICTS
 from report.document.blocks import Block, Column, Place, Section, Table, Text, number, word
+from report.document.escape import file_name
 from report.document.numbers import MISSING, power, significant, whole
 from report.results.reader import Results
 
@@ -64,8 +65,7 @@ def _table(scene: str, cells: pd.DataFrame) -> Table:
     active, m = cells["active"].max(), cells["m"].max()
     share = f" ({100 * active / m:.0f} % of {m:.0f})" if active == active and m > 0 else ""
     title = f"**Scene {scene}**" + (f": {active:.0f} active contacts{share}" if active == active else "")
-    name = "scene-" + scene.replace("/", "_")
-    return Table(name, title, ordered[["label", *FIGURES]], columns)
+    return Table(f"scene-{file_name(scene)}", title, ordered[["label", *FIGURES]], columns)
 
 
 def _iterations(row: Mapping[str, Any]) -> str:

@@ -7,11 +7,12 @@ from pathlib import Path
 
 from report.analysis.checks import warnings
 from report.document.blocks import Block, Figure, Section, Table
+from report.document.escape import csv_frame, picture
 from report.figures import style
 from report.results.reader import Results, read
 
 from .discovery import sections
-from .pages import template
+from .pages import rendered
 
 
 def write(directory: Path) -> Path:
@@ -29,9 +30,8 @@ def write(directory: Path) -> Path:
         for i, part in enumerate(results.by_machine()):
             parts.append((part, [_save(section, target, i) for section in _made(part)]))
     path = target / "report.md"
-    path.write_text(
-        template("report.md.j2").render(results=results, parts=parts, warnings=warnings(results)), "utf-8"
-    )
+    page = rendered("report.md.j2", results=results, parts=parts, warnings=warnings(results))
+    path.write_text(page, "utf-8")
     return path
 
 
@@ -53,8 +53,8 @@ def save_block(block: Block, target: Path, prefix: str = "") -> Block:
     match block:
         case Table():
             block = replace(block, name=prefix + block.name)
-            block.data.to_csv(target / f"{block.name}.csv", index=False)
+            csv_frame(block.data).to_csv(target / f"{block.name}.csv", index=False)
         case Figure():
             block = replace(block, name=prefix + block.name)
-            block.drawing.savefig(target / f"{block.name}.png", dpi=style.DPI)
+            picture(block.drawing).savefig(target / f"{block.name}.png", dpi=style.DPI)
     return block

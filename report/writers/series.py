@@ -11,13 +11,14 @@ from matplotlib.colors import Normalize
 
 from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number
+from report.document.escape import csv_frame, file_name
 from report.document.numbers import counted, listed, significant, tidy_power
 from report.figures import style
 from report.figures.maps import draw
 from report.results.series import Series, read
 
 from .markdown import save_block
-from .pages import template
+from .pages import rendered
 
 MAPPED = (0.5, 0.95, 0.99)
 LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))
@@ -41,7 +42,7 @@ def write(directory: Path) -> Path:
         saved = [Section(s.title, [save_block(block, target) for block in s.blocks]) for s in sections]
     path = target / "report.md"
     title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
-    path.write_text(template("series.md.j2").render(title=title, sections=saved), "utf-8")
+    path.write_text(rendered("series.md.j2", title=title, sections=saved), "utf-8")
     return path
 
 
@@ -178,10 +179,10 @@ def _convergence(series: Series, target: Path) -> Figure:
 
 
 def _swept(series: Series, key: str, target: Path) -> Figure:
-    name = f"sweep-{key}"
+    name = f"sweep-{file_name(key)}"
     found = series.cases.groupby(key)[["max_gap_mm", "mean_gap_mm"]].agg(["min", "median", "max"])
     found.columns = ["_".join(pair) for pair in found.columns.to_flat_index()]
-    found.reset_index().to_csv(target / f"{name}.csv", index=False)
+    csv_frame(found.reset_index()).to_csv(target / f"{name}.csv", index=False)
     drawing = style.figure(3.2)
     axes: Axes = drawing.subplots()
     for figure, label, (colour, line) in zip(

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from report.document.escape import csv_cell, picture, quoted
 from report.figures import style
 from report.figures.answer import answer_figures, pair_name
 from report.figures.maps import Array
 
-from .pages import template
+from .pages import rendered
 from .vtu import write_vtu
 
 Columns = dict[str, list[Any]]
@@ -25,7 +26,7 @@ Rows = list[dict[str, Any]]
 
 def write(directory: Path) -> Path:
     """Write answer.md and its files into DIRECTORY and return its path."""
-    record = json.loads((directory / "solution.json").read_text("utf-8"))
+    record = quoted(json.loads((directory / "solution.json").read_text("utf-8")))
     with np.load(directory / "solution.npz") as saved:
         arrays = {name: saved[name] for name in saved.files}
     _write_csv(directory / "nodes.csv", _nodes(record, arrays))
@@ -34,15 +35,13 @@ def write(directory: Path) -> Path:
     figures = answer_figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
-            drawing.savefig(directory / f"{name}.png", dpi=style.DPI)
+            picture(drawing).savefig(directory / f"{name}.png", dpi=style.DPI)
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
     path = directory / "answer.md"
     parts, pairs = _summary(record, arrays)
-    page = template("solution.md.j2").render(
-        record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu
-    )
+    page = rendered("solution.md.j2", record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu)
     path.write_text(page, "utf-8")
     return path
 
@@ -75,7 +74,7 @@ def _write_csv(path: Path, columns: Columns) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+        writer.writerows(map(csv_cell, row) for row in zip(*columns.values(), strict=True))
 
 
 def _summary(record: dict[str, Any], arrays: dict[str, Array]) -> tuple[Rows, Rows]:

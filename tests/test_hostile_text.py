@@ -1,0 +1,257 @@
+"""Titles, names and messages that a hostile user wrote: text in every file and picture, and nothing else."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.text import Text
+from rich.table import Table
+from synthetic_results import no_answer, row, write_rows
+from typer import Typer
+from typer.testing import CliRunner
+
+from harness.results.records import to_line
+from harness.terminal.console import error_reporting
+from harness.terminal.plain_console import PlainConsole
+from harness.terminal.progress import Display
+from report.document import escape
+from report.figures import style
+from report.figures.answer import answer_figures
+from report.results import series
+from report.writers.markdown import write
+from report.writers.series import write as write_series
+from report.writers.solution import write as write_solution
+
+HOSTILE = "<b>x</b>|![i](http://e)`c`$a_b$ *e*\n# h\x1b[31m\u202e\ud800"
+LITERAL = r"&lt;b&gt;x&lt;/b&gt;\|\!\[i\](http://e)&#96;c&#96;\$a_b\$ \*e\* \# h�\[31m��"
+FORMULAS = ['=cmd|"/c calc"!A1', "+1+1", "-2+3", "@SUM(A1)", " =1"]
+
+
+@pytest.fixture(autouse=True)
+def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(style, "DPI", 40)
+
+
+def results(folder: Path, name: str) -> Path:
+    """A results directory in which every text is the same."""
+    scenes = [f"4386/{active:04d}" for active in (100, 1000)]
+    texts = {"variant": name, "solver_version": name, "machine": name, "message": name, "commit": name}
+    rows = [row(scene, solver, **texts) for scene in scenes for solver in (name, "ipm")]
+    rows += [row(scene, "gi", **texts | no_answer("crashed")) for scene in scenes]
+    odd = row(scenes[0]) | {"scene": name, "solver": name}
+    write_rows(folder, [*rows, odd])
+    problems = [
+        {"scene": scene, "title": name, "n": 4386, "m": 2193, "active": 9} for scene in (*scenes, name)
+    ]
+    (folder / "problems.jsonl").write_text("".join(json.dumps(p) + "\n" for p in problems))
+    suite = {"name": name, "title": name, "description": name}
+    lines = [f"{key} = {json.dumps(value, ensure_ascii=True)}\n" for key, value in suite.items()]
+    (folder / "suite.toml").write_text("".join(lines).replace(r"\ud800", "x"))
+    (folder / "machine.json").write_text(json.dumps({"machine": name, "blas": [name]}))
+    return folder
+
+
+def solution(folder: Path, name: str) -> Path:
+    """The files of `solve`, with one text for everything that has a name."""
+    parts = [
+        {
+            "name": name,
+            "start": 6 * k,
+            "stop": 6 * k + 6,
+            "outline": [0, 20, 0, 10],
+            "clamped": [],
+            "supports": [],
+        }
+        for k in range(2)
+    ]
+    record = {
+        "title": name, "method": name, "status": name, "verdict": "within", "n": 12, "m": 6, "qp": True,
+        "closest_mm": 0.1, "judged_error_mm": 1e-9, "error_bound_mm": 1e-9, "parts": parts,
+        "pairs": [{"pair": [name, name], "start": 0, "stop": 6}], "marks": {name: [[1.0, 2.0]]},
+        "ledger": [{"effect": name, "adds": name, "amount": name, "seconds": 1.0, "mib": 1.0}],
+        "digits": None, "skipped": [name], "steps": {name: 1.0}, "peak_rss_mib": 100.0,
+    }  # fmt: skip
+    (folder / "solution.json").write_text(json.dumps(record))
+    nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 20.0)])
+    np.savez(
+        folder / "solution.npz", x=np.arange(12.0), lam=np.eye(6)[0], gap_before=np.ones(6),
+        gap_after=np.zeros(6), A_data=np.ones(6), A_indices=np.arange(6), A_indptr=np.arange(7),
+        nodes=np.vstack([nodes, nodes]), contact_nodes=nodes,
+    )  # fmt: skip
+    return folder
+
+
+def series_of(folder: Path, name: str) -> Path:
+    """A series with one text for every name, and with a case that has three rows."""
+    identity = {"solver": "newton", "form": "dual", "tolerance": 1e-11}
+    facts = {"scene": name, "title": name, "cases": 4, "threads": 1, "machine": name, "identity": identity}
+    (folder / "series.json").write_text(json.dumps(facts))
+    numbers = {"setup_s": 0.1, "solve_s": 0.1, "form_s": 0.1, "max_gap_mm": 0.5, "mean_gap_mm": 0.1}
+    rows = [{"case": k, "verdict": "within", "bound_mm": 1e-9, **numbers} for k in (0, 1, 1, 2, 3, 1)]
+    rows[1]["verdict"] = "outside"
+    (folder / "cases.jsonl").write_text("".join(json.dumps(line) + "\n" for line in rows))
+    np.ones((4, 6), np.float32).tofile(folder / "gaps.f4")
+    nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 20.0)])
+    np.savez(folder / "contacts.npz", m=6, contact_nodes=nodes, fasteners=nodes[:2])
+    return folder
+
+
+MADE: list[Any] = [(results, write), (solution, write_solution), (series_of, write_series)]
+
+
+@pytest.mark.parametrize(("made", "written"), MADE)
+def test_a_page_shows_hostile_text_as_it_is(made: Any, written: Any, tmp_path: Path) -> None:
+    page = written(made(tmp_path, HOSTILE)).read_text("utf-8")
+    assert LITERAL in page
+    for raw in ("<b>", "![i]", "`c`", "$a_b$", "*e*", "\n# h", "\x1b", "\u202e"):
+        assert raw not in page
+    assert not any("\ue000" <= character <= "\uf8ff" for character in page)
+    widths = {
+        line.replace(r"\|", "").count("|") for line in page.splitlines() if LITERAL in line and line[0] == "|"
+    }
+    assert 1 not in widths
+
+
+@pytest.mark.parametrize(("made", "written"), MADE)
+@pytest.mark.parametrize(
+    "name", ["a" * 20_000, "$x_{$ \\frac{1}{0} $" * 9, "a\nb|c", "=1", "|", "_", "\ud800"]
+)
+def test_any_text_is_drawn_in_seconds(made: Any, written: Any, name: str, tmp_path: Path) -> None:
+    begun = time.perf_counter()
+    page = written(made(tmp_path, name))
+    assert time.perf_counter() - begun < 20
+    heading = page.read_text("utf-8").splitlines()[0]
+    assert len(heading) < 400
+
+
+def test_a_picture_takes_no_text_for_mathematics(tmp_path: Path) -> None:
+    record = escape.quoted(json.loads((solution(tmp_path, "$a$ \\alpha$") / "solution.json").read_text()))
+    with np.load(tmp_path / "solution.npz") as file:
+        figures = answer_figures(record, dict(file))
+    for drawing in figures.values():
+        escape.picture(drawing)
+        shown = [text for text in drawing.findobj(Text) if "alpha" in text.get_text()]
+        assert shown
+        for text in shown:
+            words, math = text._preprocess_math(text.get_text())
+            assert not math
+            assert "$a$ \\alpha$" in words
+
+
+def test_labels_of_ticks_and_of_legends_are_spelled_out() -> None:
+    drawing = style.figure(2.0)
+    axes = drawing.subplots()
+    axes.plot([0, 1], [0, 1], label=escape.quoted("$p$"))
+    axes.set_yticks([0, 1], [escape.quoted("$q$"), "b" * 500], fontsize=5)
+    axes.set(xscale="log", xlim=(1, 100))
+    drawing.legend()
+    escape.picture(drawing).savefig(io.BytesIO())
+    texts = [text.get_text() for text in drawing.findobj(Text)]
+    assert {r"\$p\$", r"\$q\$", "b" * 79 + "…"} <= set(texts)
+    assert "$\\mathdefault{10^{1}}$" in texts
+    assert axes.get_yticklabels()[0].get_fontsize() == 5
+
+
+@pytest.mark.parametrize("formula", FORMULAS)
+def test_a_spreadsheet_runs_no_formula(formula: str, tmp_path: Path) -> None:
+    target = write(results(tmp_path, formula)).parent
+    cells = [cell for path in target.glob("*.csv") for line in csv.reader(path.open()) for cell in line]
+    assert f"'{formula}" in cells
+    assert formula not in cells
+    target = write_solution(solution(tmp_path, formula)).parent
+    assert next(csv.DictReader((target / "nodes.csv").open()))["part"] == f"'{formula}"
+
+
+def test_numbers_in_a_csv_file_are_untouched() -> None:
+    frame = pd.DataFrame({"text": ["-1.5", "+2", "-", "–"], "number": [-1.0, 2.0, None, -4.0]})
+    found = escape.csv_frame(frame)
+    assert found["text"].tolist() == ["-1.5", "+2", "'-", "–"]
+    pd.testing.assert_series_equal(found["number"], frame["number"])
+
+
+def test_a_text_comes_back_whole_from_its_quotation() -> None:
+    legible = "".join(map(chr, range(0x20, 0x7F))) + "\n_a_ b_c Ünïcode"
+    assert escape.plain(escape.quoted(legible)) == legible
+    assert (
+        escape.quoted("11308/2800 ipm-fast (dual), n_x = 1e-7: 50 %")
+        == "11308/2800 ipm-fast (dual), n_x = 1e-7: 50 %"
+    )
+
+
+def test_long_texts_stay_distinct_and_file_names_short() -> None:
+    first, second = (escape.quoted("a" * 20_000 + end) for end in "xy")
+    assert first != second
+    assert len(first) < 1100
+    names = {escape.file_name(escape.quoted(text)) for text in ("a b", "a_b", "a|b", "../../x", "a" * 300)}
+    assert len(names) == 5
+    assert all(len(name) < 70 and "/" not in name for name in names)
+    assert escape.file_name("4386/0052") == "4386_0052"
+
+
+def test_of_the_rows_of_one_case_the_last_counts(tmp_path: Path) -> None:
+    found = series.read(series_of(tmp_path, "made"))
+    assert found.counts == {"within": 4}
+    assert found.cases["case"].tolist() == [0, 1, 2, 3]
+    assert "4 of 4 cases" in write_series(tmp_path).read_text("utf-8")
+
+
+def test_a_line_separator_in_a_title_does_not_tear_its_row(tmp_path: Path) -> None:
+    line = json.dumps(row() | {"message": "a\u2028b\x85c"}, ensure_ascii=False)
+    (tmp_path / "measurements.jsonl").write_text(line + "\n", "utf-8")
+    assert "could not be read" not in write(tmp_path).read_text("utf-8")
+
+
+def test_no_control_character_reaches_the_terminal() -> None:
+    screen = io.StringIO()
+    console = PlainConsole(file=screen, force_terminal=True, width=80)
+    table = Table("[/b]", title="\x1b]0;t\x07[/b]")
+    table.add_row("\x1b[2J[/b]\udcff")
+    console.print(table)
+    console.print("a\x1b[2J\x9b2J\r[/b]\udcff", style="red")
+    written = screen.getvalue()
+    for sequence in ("\x1b[2J", "\x1b]0", "\x07", "\x9b", "\r", "\udcff"):
+        assert sequence not in written
+    assert "\x1b[31ma�[2J" in written
+    assert "[/b]" in written
+
+
+def test_a_cell_with_control_characters_is_as_wide_as_it_is_shown() -> None:
+    screen = io.StringIO()
+    table = Table("name")
+    table.add_row("\x1b[31m:smile: end")
+    PlainConsole(file=screen, width=80).print(table)
+    assert "│ �[31m:smile: end │" in screen.getvalue()
+
+
+def test_a_name_that_no_file_can_hold_is_named() -> None:
+    app = Typer()
+
+    @app.command()
+    def command() -> None:
+        with error_reporting():
+            "one\nscene a\udcff\nthree".encode()
+
+    outcome = CliRunner().invoke(app)
+    assert outcome.exit_code == 2
+    assert "scene a�: a name that is not UTF-8" in outcome.output
+
+
+def test_markup_in_the_name_of_a_scene_is_text_beside_the_bar() -> None:
+    screen = io.StringIO()
+    with Display(PlainConsole(file=screen, force_terminal=True, width=120), [], 0, {}) as display:
+        display.doing("[/b][red]")
+    assert "[/b][red]" in screen.getvalue()
+
+
+def test_a_file_name_that_is_not_utf8_is_kept_in_a_row() -> None:
+    line = to_line({"scene": "a\udcff.toml"})
+    line.encode()
+    assert json.loads(line) == {"scene": "a\udcff.toml"}
