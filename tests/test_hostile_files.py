@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from io import StringIO
 from itertools import permutations
 from pathlib import Path
@@ -16,8 +18,12 @@ from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
 from harness.scene.exchange import import_, matrices
+from harness.verification.reference import reference
 from problems import formats
+from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.scene import read_scene
+from problems.storage import cache
 
 QUIET = Console(file=StringIO())
 
@@ -178,6 +184,96 @@ def test_loads_without_their_points_are_not_guessed(tmp_path: Path) -> None:
     loads = cards(tmp_path / "loads.pch", F=frame(np.ones((12, 1)), [*range(1, 12), 20]))
     with pytest.raises(InputError, match="F, point 20"):
         import_([str(loads), *(str(tmp_path / f"{x}.mtx") for x in "KAg")], tmp_path / "out.npz", QUIET)
+
+
+# --- the cache ----------------------------------------------------------------------------------------
+
+ENTRY = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
+
+
+def altered(path: Path, at: int = -40) -> None:
+    """One bit of a file changed; its size and its time of modification are not."""
+    before, content = path.stat(), bytearray(path.read_bytes())
+    content[at] ^= 1
+    path.chmod(0o644)
+    path.write_bytes(content)
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+@pytest.mark.parametrize("opened_before", [True, False])
+def test_an_altered_file_of_the_cache_is_named(opened_before: bool, own_cache: Path) -> None:
+    cache.store("key", ENTRY, {})
+    if opened_before:
+        assert cache.load("key")
+    altered(own_cache / "key" / "one.npy")
+    with pytest.raises(InputError, match=r"one\.npy.*delete"):
+        cache.load("key")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("1e-09", "0.0"),
+        lambda text: text.replace("one.npy", "../x.npy"),
+        lambda text: "[" * 100_000,
+        lambda text: "[]",
+        lambda text: '{"files": [], "facts": 1, "hash": 2}',
+        lambda text: '{"hash": null}',
+        lambda text: "1" * 5000,
+        lambda text: "\udcff",
+    ],
+)
+def test_an_altered_manifest_is_named_with_what_to_do(change: Any, own_cache: Path) -> None:
+    cache.store("key", ENTRY, {"bound_mm": 1e-9})
+    path = own_cache / "key" / cache.MANIFEST
+    text = path.read_text()
+    assert change(text) != text
+    path.chmod(0o644)
+    path.write_text(change(text), errors="surrogateescape")
+    with pytest.raises(InputError, match=r"manifest\.json.*delete"):
+        cache.load("key")
+
+
+def test_an_entry_without_hashes_is_made_again(own_cache: Path) -> None:
+    cache.store("key", ENTRY, {"old": True})
+    path = own_cache / "key" / cache.MANIFEST
+    manifest = json.loads(path.read_text())
+    path.chmod(0o644)
+    path.write_text(json.dumps({name: manifest[name] for name in ("files", "facts")}))
+    assert cache.load_or_make("key", lambda: (ENTRY, {"old": False}))[1] == {"old": False}
+    assert {path.name for path in own_cache.iterdir() if path.is_dir()} == {"key"}
+
+
+def test_the_files_of_the_cache_are_read_only(own_cache: Path) -> None:
+    cache.store("key", ENTRY, {})
+    assert {path.stat().st_mode & 0o777 for path in (own_cache / "key").iterdir()} == {0o444}
+
+
+def test_a_file_is_read_once_per_process(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cache.store("key", ENTRY, {})
+    cache.load("key")
+    monkeypatch.setattr(cache, "_sha256", lambda path: pytest.fail(str(path)))
+    cache.load("key")
+
+
+def test_no_stage_of_a_scene_is_opened_altered(own_cache: Path) -> None:
+    """Every matrix, factor and reference that a scene has in the cache, one after another."""
+    scene = read_scene("gallery/installed-fasteners")
+
+    def open_all() -> None:
+        data = prepared(scene)
+        assert data.Q.size
+        assert data.factors
+        reference(data, load_case(scene))
+
+    open_all()
+    for path in sorted(own_cache.rglob("*.npy")):
+        whole = path.read_bytes()
+        altered(path)
+        with pytest.raises(InputError, match=path.name):
+            open_all()
+        path.write_bytes(whole)
+    open_all()
 
 
 # --- own matrices -------------------------------------------------------------------------------------
