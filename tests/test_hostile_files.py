@@ -14,10 +14,12 @@ import pandas as pd
 import pytest
 from rich.console import Console
 from small import make_load, make_prepared
+from strip import write_strip
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
 from harness.scene.exchange import import_, matrices
+from harness.series import store
 from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
@@ -315,3 +317,127 @@ def test_matrices_at_the_ends_of_the_range_raise_nothing(K: float, A: float, tmp
     data = own_matrices()
     np.savez(tmp_path / "own.npz", **(data | {"K": data["K"] * K, "A": data["A"] * A}))
     assert invoke("solve", tmp_path / "own.npz", "--out", tmp_path / "x").exit_code in (0, 1)
+
+
+# --- a series -----------------------------------------------------------------------------------------
+
+COUNT = 12
+
+
+@pytest.fixture
+def series(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The directory of a finished series of COUNT cases; its report is not drawn."""
+    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    write_strip(tmp_path)
+    assert solve_series(tmp_path / "out").exit_code == 0
+    return tmp_path / "out"
+
+
+def solve_series(out: Path, *more: object) -> Result:
+    words = ["series", out.parent / "strip.toml", "--threads", 1, "--check", 0, "--out", out]
+    return invoke(*words, *([] if "--cases" in more else ["--cases", COUNT]), *more)
+
+
+def rows_of(directory: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (directory / store.CASES).read_text().splitlines()]
+
+
+def write_rows(directory: Path, rows: list[Any]) -> None:
+    (directory / store.CASES).write_text("".join(json.dumps(row) + "\n" for row in rows))
+
+
+def no_gaps(directory: Path) -> None:
+    (directory / store.GAPS).unlink()
+
+
+def short_gaps(directory: Path) -> None:
+    os.truncate(directory / store.GAPS, 5 * 45 * 4 + 7)
+
+
+def other_gaps(directory: Path) -> None:
+    gaps = np.fromfile(directory / store.GAPS, np.float32)
+    gaps[3 * 45] += 1e-6
+    gaps.tofile(directory / store.GAPS)
+
+
+def two_rows(directory: Path) -> None:
+    rows = rows_of(directory)
+    write_rows(directory, rows + rows[:10])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", [0, 5])
+@pytest.mark.parametrize(
+    ("damage", "lost"), [(no_gaps, COUNT), (short_gaps, COUNT - 5), (other_gaps, 1), (two_rows, 10)]
+)
+def test_gaps_that_are_lost_are_solved_again(damage: Any, lost: int, more: int, series: Path) -> None:
+    wanted = np.fromfile(series / store.GAPS, np.float32)
+    damage(series)
+    if damage is not two_rows:
+        refused = invoke("report", series)
+        assert refused.exit_code == 2
+        assert "gaps.f4" in refused.output
+    done = solve_series(series, "--cases", COUNT + more)
+    assert done.exit_code == 0, done.output
+    assert f"{lost} rows removed" in done.output
+    assert f"{COUNT + more} within" in done.output
+    assert sorted(row["case"] for row in rows_of(series)) == list(range(COUNT + more))
+    found = np.fromfile(series / store.GAPS, np.float32)
+    assert found.size == (COUNT + more) * 45
+    np.testing.assert_allclose(found[: wanted.size], wanted, atol=1e-7)
+    assert invoke("report", series).exit_code == 0
+
+
+@pytest.mark.slow
+def test_rows_of_an_unknown_series_are_not_taken_for_this_one(series: Path) -> None:
+    (series / store.SERIES).unlink()
+    before = (series / store.CASES).read_bytes()
+    refused = solve_series(series, "--sd", 0.123)
+    assert refused.exit_code == 2
+    assert "name another directory" in refused.output
+    assert (series / store.CASES).read_bytes() == before
+    assert solve_series(series).exit_code == 0
+
+
+@pytest.mark.slow
+def test_rows_of_another_series_among_its_own_are_named(series: Path) -> None:
+    other = series.parent / "other"
+    solve_series(other, "--sd", 0.123)
+    write_rows(series, rows_of(series)[:6] + rows_of(other)[6:])
+    refused = solve_series(series)
+    assert refused.exit_code == 2
+    assert "case 6" in refused.output
+    assert "another series" in refused.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        *((store.SERIES, text) for text in (b"", b"[]", b"[" * 100_000, b'{"identity": 1}', b"\xff")),
+        *(("contacts.npz", text) for text in (b"", b"PK\x03\x04")),
+        *((store.CASES, text) for text in (b"[" * 100_000 + b"\n", b"[]\n", b"1\n", b'{"case": "a"}\n')),
+        (store.CASES, b'{"case": 0, "verdict": {}}\n'),
+        (store.CASES, b'{"case": -1, "verdict": "within"}\n'),
+        (store.CASES, b'{"case": 0, "verdict": "within", "max_gap_mm": "x"}\n'),
+    ],
+)
+def test_a_damaged_file_of_a_series_is_named(name: str, content: bytes, series: Path) -> None:
+    (series / name).write_bytes(content)
+    refused = invoke("report", series)
+    assert refused.exit_code == 2
+    assert name in refused.output
+    mended = name == "contacts.npz"
+    assert solve_series(series).exit_code == (0 if mended else 2)
+    assert invoke("report", series).exit_code == (0 if mended else 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["contacts.npz", store.GAPS])
+def test_a_missing_file_of_a_series_is_named_and_made_again(name: str, series: Path) -> None:
+    (series / name).unlink()
+    refused = invoke("report", series)
+    assert refused.exit_code == 2
+    assert name in refused.output
+    assert solve_series(series).exit_code == 0
+    assert invoke("report", series).exit_code == 0
