@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from io import StringIO
 from itertools import permutations
 from pathlib import Path
@@ -12,12 +14,18 @@ import pandas as pd
 import pytest
 from rich.console import Console
 from small import make_load, make_prepared
+from strip import write_strip
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
 from harness.scene.exchange import import_, matrices
+from harness.series import store
+from harness.verification.reference import reference
 from problems import formats
+from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.scene import read_scene
+from problems.storage import cache
 
 QUIET = Console(file=StringIO())
 
@@ -180,6 +188,96 @@ def test_loads_without_their_points_are_not_guessed(tmp_path: Path) -> None:
         import_([str(loads), *(str(tmp_path / f"{x}.mtx") for x in "KAg")], tmp_path / "out.npz", QUIET)
 
 
+# --- the cache ----------------------------------------------------------------------------------------
+
+ENTRY = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
+
+
+def altered(path: Path, at: int = -40) -> None:
+    """One bit of a file changed; its size and its time of modification are not."""
+    before, content = path.stat(), bytearray(path.read_bytes())
+    content[at] ^= 1
+    path.chmod(0o644)
+    path.write_bytes(content)
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+@pytest.mark.parametrize("opened_before", [True, False])
+def test_an_altered_file_of_the_cache_is_named(opened_before: bool, own_cache: Path) -> None:
+    cache.store("key", ENTRY, {})
+    if opened_before:
+        assert cache.load("key")
+    altered(own_cache / "key" / "one.npy")
+    with pytest.raises(InputError, match=r"one\.npy.*delete"):
+        cache.load("key")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("1e-09", "0.0"),
+        lambda text: text.replace("one.npy", "../x.npy"),
+        lambda text: "[" * 100_000,
+        lambda text: "[]",
+        lambda text: '{"files": [], "facts": 1, "hash": 2}',
+        lambda text: '{"hash": null}',
+        lambda text: "1" * 5000,
+        lambda text: "\udcff",
+    ],
+)
+def test_an_altered_manifest_is_named_with_what_to_do(change: Any, own_cache: Path) -> None:
+    cache.store("key", ENTRY, {"bound_mm": 1e-9})
+    path = own_cache / "key" / cache.MANIFEST
+    text = path.read_text()
+    assert change(text) != text
+    path.chmod(0o644)
+    path.write_text(change(text), errors="surrogateescape")
+    with pytest.raises(InputError, match=r"manifest\.json.*delete"):
+        cache.load("key")
+
+
+def test_an_entry_without_hashes_is_made_again(own_cache: Path) -> None:
+    cache.store("key", ENTRY, {"old": True})
+    path = own_cache / "key" / cache.MANIFEST
+    manifest = json.loads(path.read_text())
+    path.chmod(0o644)
+    path.write_text(json.dumps({name: manifest[name] for name in ("files", "facts")}))
+    assert cache.load_or_make("key", lambda: (ENTRY, {"old": False}))[1] == {"old": False}
+    assert {path.name for path in own_cache.iterdir() if path.is_dir()} == {"key"}
+
+
+def test_the_files_of_the_cache_are_read_only(own_cache: Path) -> None:
+    cache.store("key", ENTRY, {})
+    assert {path.stat().st_mode & 0o777 for path in (own_cache / "key").iterdir()} == {0o444}
+
+
+def test_a_file_is_read_once_per_process(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cache.store("key", ENTRY, {})
+    cache.load("key")
+    monkeypatch.setattr(cache, "_sha256", lambda path: pytest.fail(str(path)))
+    cache.load("key")
+
+
+def test_no_stage_of_a_scene_is_opened_altered(own_cache: Path) -> None:
+    """Every matrix, factor and reference that a scene has in the cache, one after another."""
+    scene = read_scene("gallery/installed-fasteners")
+
+    def open_all() -> None:
+        data = prepared(scene)
+        assert data.Q.size
+        assert data.factors
+        reference(data, load_case(scene))
+
+    open_all()
+    for path in sorted(own_cache.rglob("*.npy")):
+        whole = path.read_bytes()
+        altered(path)
+        with pytest.raises(InputError, match=path.name):
+            open_all()
+        path.write_bytes(whole)
+    open_all()
+
+
 # --- own matrices -------------------------------------------------------------------------------------
 
 
@@ -219,3 +317,127 @@ def test_matrices_at_the_ends_of_the_range_raise_nothing(K: float, A: float, tmp
     data = own_matrices()
     np.savez(tmp_path / "own.npz", **(data | {"K": data["K"] * K, "A": data["A"] * A}))
     assert invoke("solve", tmp_path / "own.npz", "--out", tmp_path / "x").exit_code in (0, 1)
+
+
+# --- a series -----------------------------------------------------------------------------------------
+
+COUNT = 12
+
+
+@pytest.fixture
+def series(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The directory of a finished series of COUNT cases; its report is not drawn."""
+    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    write_strip(tmp_path)
+    assert solve_series(tmp_path / "out").exit_code == 0
+    return tmp_path / "out"
+
+
+def solve_series(out: Path, *more: object) -> Result:
+    words = ["series", out.parent / "strip.toml", "--threads", 1, "--check", 0, "--out", out]
+    return invoke(*words, *([] if "--cases" in more else ["--cases", COUNT]), *more)
+
+
+def rows_of(directory: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (directory / store.CASES).read_text().splitlines()]
+
+
+def write_rows(directory: Path, rows: list[Any]) -> None:
+    (directory / store.CASES).write_text("".join(json.dumps(row) + "\n" for row in rows))
+
+
+def no_gaps(directory: Path) -> None:
+    (directory / store.GAPS).unlink()
+
+
+def short_gaps(directory: Path) -> None:
+    os.truncate(directory / store.GAPS, 5 * 45 * 4 + 7)
+
+
+def other_gaps(directory: Path) -> None:
+    gaps = np.fromfile(directory / store.GAPS, np.float32)
+    gaps[3 * 45] += 1e-6
+    gaps.tofile(directory / store.GAPS)
+
+
+def two_rows(directory: Path) -> None:
+    rows = rows_of(directory)
+    write_rows(directory, rows + rows[:10])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", [0, 5])
+@pytest.mark.parametrize(
+    ("damage", "lost"), [(no_gaps, COUNT), (short_gaps, COUNT - 5), (other_gaps, 1), (two_rows, 10)]
+)
+def test_gaps_that_are_lost_are_solved_again(damage: Any, lost: int, more: int, series: Path) -> None:
+    wanted = np.fromfile(series / store.GAPS, np.float32)
+    damage(series)
+    if damage is not two_rows:
+        refused = invoke("report", series)
+        assert refused.exit_code == 2
+        assert "gaps.f4" in refused.output
+    done = solve_series(series, "--cases", COUNT + more)
+    assert done.exit_code == 0, done.output
+    assert f"{lost} rows removed" in done.output
+    assert f"{COUNT + more} within" in done.output
+    assert sorted(row["case"] for row in rows_of(series)) == list(range(COUNT + more))
+    found = np.fromfile(series / store.GAPS, np.float32)
+    assert found.size == (COUNT + more) * 45
+    np.testing.assert_allclose(found[: wanted.size], wanted, atol=1e-7)
+    assert invoke("report", series).exit_code == 0
+
+
+@pytest.mark.slow
+def test_rows_of_an_unknown_series_are_not_taken_for_this_one(series: Path) -> None:
+    (series / store.SERIES).unlink()
+    before = (series / store.CASES).read_bytes()
+    refused = solve_series(series, "--sd", 0.123)
+    assert refused.exit_code == 2
+    assert "name another directory" in refused.output
+    assert (series / store.CASES).read_bytes() == before
+    assert solve_series(series).exit_code == 0
+
+
+@pytest.mark.slow
+def test_rows_of_another_series_among_its_own_are_named(series: Path) -> None:
+    other = series.parent / "other"
+    solve_series(other, "--sd", 0.123)
+    write_rows(series, rows_of(series)[:6] + rows_of(other)[6:])
+    refused = solve_series(series)
+    assert refused.exit_code == 2
+    assert "case 6" in refused.output
+    assert "another series" in refused.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        *((store.SERIES, text) for text in (b"", b"[]", b"[" * 100_000, b'{"identity": 1}', b"\xff")),
+        *(("contacts.npz", text) for text in (b"", b"PK\x03\x04")),
+        *((store.CASES, text) for text in (b"[" * 100_000 + b"\n", b"[]\n", b"1\n", b'{"case": "a"}\n')),
+        (store.CASES, b'{"case": 0, "verdict": {}}\n'),
+        (store.CASES, b'{"case": -1, "verdict": "within"}\n'),
+        (store.CASES, b'{"case": 0, "verdict": "within", "max_gap_mm": "x"}\n'),
+    ],
+)
+def test_a_damaged_file_of_a_series_is_named(name: str, content: bytes, series: Path) -> None:
+    (series / name).write_bytes(content)
+    refused = invoke("report", series)
+    assert refused.exit_code == 2
+    assert name in refused.output
+    mended = name == "contacts.npz"
+    assert solve_series(series).exit_code == (0 if mended else 2)
+    assert invoke("report", series).exit_code == (0 if mended else 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["contacts.npz", store.GAPS])
+def test_a_missing_file_of_a_series_is_named_and_made_again(name: str, series: Path) -> None:
+    (series / name).unlink()
+    refused = invoke("report", series)
+    assert refused.exit_code == 2
+    assert name in refused.output
+    assert solve_series(series).exit_code == 0
+    assert invoke("report", series).exit_code == 0

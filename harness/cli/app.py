@@ -154,12 +154,13 @@ def report(
     """
     with error_reporting() as console:
         from harness.results import records
-        from harness.series.store import SERIES
+        from harness.series.store import SERIES, refuse_damaged
         from problems.errors import InputError
 
         if (directory / SERIES).is_file():
             from report.writers.series import write as write_series
 
+            refuse_damaged(directory)
             console.print(f"Report: {write_series(directory)}")
             return
         path = directory / records.MEASUREMENTS

@@ -21,7 +21,7 @@ from harness.results.schema import VERDICTS
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
-from problems.model.scene import JointScene
+from problems.model.scene import JointScene, Scene
 
 from . import store
 from .on_worker import solve_on_worker
@@ -57,14 +57,20 @@ def run(
     """
     with records.locked(directory, ()):
         store.open_series(directory, identity(job) | facts, metadata(job))
-        done = store.solved(directory, job.cases)
+        key = store.series_key(identity(job) | facts)
+        done, removed = store.solved(directory, job.cases, key, contact_count(job.scene))
+        if removed:
+            again = "their gaps were missing or damaged, or they were there twice"
+            console.print(f"{removed} rows removed: {again}", style="yellow")
         remaining = np.flatnonzero(~done).tolist()
         console.print(
             f"{job.scene.name}: {len(done)} cases, {len(done) - len(remaining)} already in {directory}"
         )
         if remaining:
             with results_of(job, remaining, scheduler, console) as results:
-                solve_remaining(job, len(remaining), results, directory, console)
+                solve_remaining(job, len(remaining), results, directory, key, console)
+        elif not store.contacts_in(directory):
+            record_contacts(job, directory)
         tally = Tally(dict.fromkeys(VERDICTS, 0))
         for row in store.rows(directory):
             if row["case"] < job.cases.count:
@@ -103,15 +109,15 @@ def on_workers(
 
 
 def solve_remaining(
-    job: Job, count: int, results: Iterator[list[Result]], directory: Path, console: Console
+    job: Job, count: int, results: Iterator[list[Result]], directory: Path, key: str, console: Console
 ) -> None:
-    """Write the results; only this process does."""
+    """Write the results; only this process does. key : of the series."""
     m = record_contacts(job, directory)
     begun, made = time.monotonic(), 0
     with display(console) as progress:
         task = progress.add_task(job.scene.name, total=count, rate="")
         for some in results:
-            store.append(directory, some, m)
+            store.append(directory, some, m, key)
             made += len(some)
             rate = f"{made / (time.monotonic() - begun):.3g} cases/s"
             progress.update(task, completed=made, rate=rate)
@@ -177,8 +183,16 @@ def record_contacts(job: Job, directory: Path) -> int:
         arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(job.scene, JointScene):
         arrays["fasteners"] = job.scene.marks()
-    np.savez(directory / "contacts.npz", **arrays)  # type: ignore[arg-type]
+    new = directory / f"new-{store.CONTACTS}"
+    np.savez(new, **arrays)  # type: ignore[arg-type]
+    new.replace(directory / store.CONTACTS)
     return assembly.m
+
+
+def contact_count(scene: Scene) -> int:
+    """m, without opening the assembly unless only its files say it."""
+    size = scene.expected_size
+    return prepared(scene).assembly.m if size is None else size[1]
 
 
 def summary(tally: Tally, asked: int, console: Console) -> int:

@@ -1,8 +1,10 @@
 """The files of a series: rows and gaps that survive an abrupt end, and the identity of the series.
 
-cases.jsonl   one row per case, in the order of completion
+cases.jsonl   one row per case, in the order of completion; with the key of its series and the CRC-32 of
+              its gaps
 gaps.f4       the final gaps, float32 (relative rounding error at most 6e-8), case k at the bytes
               4km … 4(k + 1)m. A case's gaps are written and synced before its row.
+contacts.npz  where the contacts and the fasteners are, and m
 series.json   the identity of the series: the same command resumes it, another one is refused.
 """
 
@@ -10,7 +12,9 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -18,22 +22,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.results import records
+from harness.results.schema import VERDICTS
 from problems.errors import Fault, InputError
 from problems.load_cases.base import LoadCases
+from problems.storage.cache import digest
 
 from .session import Result
 
-CASES, GAPS, SERIES = "cases.jsonl", "gaps.f4", "series.json"
+CASES, GAPS, CONTACTS, SERIES = "cases.jsonl", "gaps.f4", "contacts.npz", "series.json"
+CRC = "gaps_crc32"  # the field of a row
+UNITS = ("_mm", "_s")  # of the fields that are numbers
+AGAIN = "run the same `series` command again"
+DELETE = f"delete it, and {AGAIN}"
+MAX_CASES = 10**9
 CHUNK = 2**20  # bytes
 MAX_FAULTS = 10  # named at once
 BYTES = np.dtype(np.float32).itemsize
 
 
+def series_key(identity: dict[str, Any]) -> str:
+    """What each row names its series by."""
+    return digest(json.loads(json.dumps(identity)))[:12]
+
+
 def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> None:
-    """Write series.json. Raises InputError if DIRECTORY holds another series, naming each difference."""
+    """Write series.json. Raises InputError if DIRECTORY holds another series, naming each difference, or rows
+    of which nothing says whether they belong to this one.
+    """
     path = directory / SERIES
     if path.is_file():
-        before = json.loads(path.read_text("utf-8"))["identity"]
+        before = read_series(directory)["identity"]
         faults = [
             Fault(str(path), key, before.get(key), f"now {value!r}: name another directory with --out")
             for key, value in json.loads(json.dumps(identity)).items()
@@ -41,48 +59,162 @@ def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]
         ]
         if faults:
             raise InputError(faults)
+    else:
+        for row in rows(directory):
+            if row.get("series") != series_key(identity):
+                allowed = (
+                    f"not known to be of this series without {SERIES}: name another directory with --out"
+                )
+                raise InputError.one(directory / CASES, f"case {row['case']}", row.get("series"), allowed)
     content = {"identity": identity, **facts}
     records.replace_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
 
-def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
-    """(count,) which cases have a row. A torn last line is cut off.
+def read_series(directory: Path) -> dict[str, Any]:
+    """The content of series.json. Raises InputError if it is damaged."""
+    path = directory / SERIES
+    try:
+        content = json.loads(path.read_text("utf-8"))
+        whole = isinstance(content["identity"], dict) and isinstance(content["cases"], int)
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError.one(path, "content", str(error)[:80], DELETE) from error
+    if not whole:
+        raise InputError.one(path, "content", "not what was written", DELETE)
+    return dict(content)
 
-    Raises InputError if a row has other parameters than its case now, as after a change of a table.
+
+def solved(directory: Path, cases: LoadCases, key: str, m: int) -> tuple[NDArray[np.bool_], int]:
+    """(count,) which cases have a row and its gaps, and the number of rows that were removed because their
+    gaps are missing or damaged, or because another row is of the same case. A torn last line is cut off.
+
+    Raises InputError if a row is of another series, or has other parameters than its case now, as after a
+    change of a table.
     """
-    done, faults = np.zeros(cases.count, dtype=bool), []
-    path = directory / CASES
-    if path.exists():
-        _cut_torn_line(path)
-        for row in rows(directory):
-            if row["case"] >= cases.count:
-                continue
-            done[row["case"]] = True
-            for key, value in cases.parameters(row["case"]).items():
-                if row[key] != value:
-                    allowed = f"is now {value!r}: name another directory with --out"
-                    faults.append(Fault(str(path), f"case {row['case']}, {key}", row[key], allowed))
-    if faults:
-        raise InputError(faults[:MAX_FAULTS])
-    return done
-
-
-def rows(directory: Path) -> Iterator[dict[str, Any]]:
-    """The rows one by one; none if there is no file. Raises InputError at a line that is not JSON."""
+    done, faults, removed = np.zeros(cases.count, dtype=bool), [], 0
     path = directory / CASES
     if not path.exists():
-        return
+        return done, 0
+    _cut_torn_line(path)
+    new = path.with_name(path.name + ".new")
+    with new.open("wb") as kept, GapFile(directory, m) as gaps:
+        for line, row in _lines(path):
+            case = row["case"]
+            if row.get("series", key) != key:
+                allowed = "of another series: name another directory with --out"
+                faults.append(Fault(str(path), f"case {case}", row["series"], allowed))
+            if case < cases.count:
+                if done[case] or not gaps.whole(row):
+                    removed += 1
+                    continue
+                done[case] = True
+                for name, value in cases.parameters(case).items():
+                    if row.get(name) != value:
+                        allowed = f"is now {value!r}: name another directory with --out"
+                        faults.append(Fault(str(path), f"case {case}, {name}", row.get(name), allowed))
+            kept.write(line)
+        kept.flush()
+        os.fsync(kept.fileno())
+    if removed and not faults:
+        new.replace(path)
+    new.unlink(missing_ok=True)
+    if faults:
+        raise InputError(faults[:MAX_FAULTS])
+    return done, removed
+
+
+def refuse_damaged(directory: Path) -> None:
+    """Raise InputError, naming file and case, unless the series can be reported on."""
+    facts = read_series(directory)
+    m = contacts_in(directory)
+    if not m:
+        raise InputError.one(directory / CONTACTS, "content", "missing or damaged", AGAIN)
+    with GapFile(directory, m) as gaps:
+        wrong = [
+            Fault(str(directory / GAPS), f"case {row['case']}", "missing or damaged", AGAIN)
+            for row in rows(directory)
+            if row["case"] < facts["cases"] and not gaps.whole(row, older=True)
+        ]
+    if wrong:
+        raise InputError(wrong[:MAX_FAULTS])
+
+
+def contacts_in(directory: Path) -> int:
+    """m, as contacts.npz has it; 0 if it is missing or damaged."""
+    try:
+        with np.load(directory / CONTACTS) as arrays:
+            m = int(arrays["m"])
+            nodes = arrays.get("contact_nodes", np.zeros((m, 2)))
+            fasteners = arrays.get("fasteners", np.zeros((0, 2)))
+    except Exception:  # numpy, zipfile and zlib raise kinds of their own
+        return 0
+    whole = nodes.shape == (m, 2) and fasteners.ndim == 2 and fasteners.shape[1] == 2
+    return m if whole and nodes.dtype.kind == fasteners.dtype.kind == "f" else 0
+
+
+class GapFile:
+    """gaps.f4, to compare with the rows."""
+
+    def __init__(self, directory: Path, m: int) -> None:
+        self.path, self.size = directory / GAPS, m * BYTES
+
+    def __enter__(self) -> GapFile:
+        self.file = self.path.open("rb") if self.path.is_file() else BytesIO()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.file.close()
+
+    def whole(self, row: records.Row, older: bool = False) -> bool:
+        """Whether a row's gaps are there and are those that were written with it.
+
+        older : a row without a checksum, as older versions wrote them, only has to have gaps.
+        """
+        if row["verdict"] == "no_answer":
+            return True
+        self.file.seek(row["case"] * self.size)
+        found = self.file.read(self.size)
+        return len(found) == self.size and ((older and CRC not in row) or row.get(CRC) == zlib.crc32(found))
+
+
+def rows(directory: Path) -> Iterator[records.Row]:
+    """The rows one by one; none if there is no file. Raises InputError at a line that is no row."""
+    path = directory / CASES
+    if path.exists():
+        yield from (row for _, row in _lines(path))
+
+
+def _lines(path: Path) -> Iterator[tuple[bytes, records.Row]]:
+    """The lines that end, and the rows in them."""
     with path.open("rb") as file:
         for number, line in enumerate(file, start=1):
+            if not line.endswith(b"\n"):
+                return
             try:
-                yield json.loads(line)
-            except ValueError as error:
+                row = json.loads(line)
+            except (ValueError, RecursionError) as error:
                 what = line[:80].decode(errors="replace")
                 raise InputError.one(path, f"line {number}", what, "not a JSON object") from error
+            if not isinstance(row, dict):
+                raise InputError.one(path, f"line {number}", row, "not a JSON object")
+            for name in ("case", "verdict", *row):
+                if not _valid(name, row.get(name)):
+                    raise InputError.one(
+                        path, f"line {number}, {name}", row.get(name), "not what was written"
+                    )
+            yield line, row
 
 
-def append(directory: Path, results: Sequence[Result], m: int) -> None:
-    """Gaps first, then rows, each synced."""
+def _valid(name: str, value: object) -> bool:
+    match name:
+        case "case":
+            return type(value) is int and 0 <= value < MAX_CASES
+        case "verdict":
+            return value in VERDICTS
+    return not name.endswith(UNITS) or value is None or type(value) in (int, float)
+
+
+def append(directory: Path, results: Sequence[Result], m: int, key: str) -> None:
+    """Gaps first, then rows, each synced. key : of the series."""
     with_gaps = [(result.row["case"], result.gap) for result in results if result.gap is not None]
     if with_gaps:
         descriptor = os.open(directory / GAPS, os.O_WRONLY | os.O_CREAT, 0o644)
@@ -93,7 +225,11 @@ def append(directory: Path, results: Sequence[Result], m: int) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-    records.append(directory / CASES, *(result.row for result in results))
+    checked = [
+        result.row | {"series": key} | ({} if result.gap is None else {CRC: zlib.crc32(result.gap.tobytes())})
+        for result in results
+    ]
+    records.append(directory / CASES, *checked)
 
 
 def _cut_torn_line(path: Path) -> None:
