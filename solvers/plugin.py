@@ -33,7 +33,7 @@ def load_plugin(path: Path) -> type[Solver]:
     except SyntaxError as error:
         message = f"is not Python: {error.msg}"
         raise InputError.one(path, f"line {error.lineno}", (error.text or "").strip(), message) from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         line = traceback.extract_tb(error.__traceback__)[-1].lineno
         message = f"importing the file failed with {type(error).__name__}: {error}"
         raise InputError.one(path, f"line {line}", type(error).__name__, message) from error

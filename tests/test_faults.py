@@ -21,7 +21,7 @@ import pytest
 import tiny
 from rich.console import Console
 
-from harness.measurement import process as measure
+from harness.measurement import limited
 from harness.measurement import row as rows_module
 from harness.measurement.run import run
 from harness.planning.suite import read_suite
@@ -249,7 +249,7 @@ def test_a_clock_that_jumps_ends_no_run_and_loses_no_row(
 
     monkeypatch.setattr(time, "time", leaping)
     monkeypatch.setattr(rows_module, "datetime", Leaping)
-    assert measure.time is time
+    assert limited.time is time
     suite = suite_of(folder / "clock", "hang", "gives_up", "hang")
     out = folder / "clock" / "out"
     start = time.monotonic()

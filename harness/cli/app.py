@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import signal
 from enum import StrEnum
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from harness.terminal.console import Plugin, ReferenceLimit, Scheduler, error_reporting, option
-from harness.terminal.exit_codes import DONE, FAILED
 
 from . import scene as scene_commands
 from . import series as series_command
@@ -218,8 +216,16 @@ def list_(what: Listed) -> None:
 def check(
     solver: Annotated[list[str] | None, option("NAME", "A solver by name. Repeatable.")] = None,
     plugin: Plugin = None,
+    time_limit: Annotated[
+        float, option("SECONDS", "Time limit for each test problem in each form.", min=0.001)
+    ] = 60.0,
+    memory_limit: Annotated[
+        int, option("MIB", "Memory limit, over all processes of the solver.", min=1)
+    ] = 8192,
 ) -> None:
     """Test solvers on small problems with known answers, and say what is wrong with them.
+
+    Each solver runs in a process of its own, stopped at its time or memory limit.
 
     \b
     Examples:
@@ -229,20 +235,13 @@ def check(
     \b
     Exit codes: 0 nothing found, 1 faults found, 2 wrong usage or bad input.
     """
-    with error_reporting() as console:
-        from harness.conformance.check import run as check_solver
-        from solvers.registry import make_solver, modules
+    with error_reporting(interrupted="Interrupted.") as console:
+        from harness.conformance.isolated import run as run_checks
+        from solvers.registry import modules
 
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         names = solver or ([plugin.stem] if plugin else list(modules()))
-        faulty = False
-        for name in names:
-            make_solver(name, {}, plugin)
-            findings = check_solver(partial(make_solver, name, {}, plugin))
-            faulty |= bool(findings)
-            console.print(f"{name}: {len(findings) or 'no'} faults", style="red" if findings else "green")
-            for finding in findings:
-                console.print(f"  {finding}", highlight=False, markup=False)
-        raise typer.Exit(FAILED if faulty else DONE)
+        raise typer.Exit(run_checks(names, plugin, time_limit, memory_limit, console))
 
 
 def main() -> None:

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 
-import numpy as np
-
+from harness.measurement.answers import Refused, error_text, shown, vector
 from harness.measurement.solver_session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
@@ -22,22 +21,35 @@ LOOSE = 1e-1  # a tolerance at which an iterative solver stops earlier than at T
 
 
 def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] | None = None) -> list[Finding]:
-    """All that is wrong with the solver in these forms (None: all that it takes)."""
+    """All that is wrong with the solver in these forms (None: all that it takes), in this process.
+
+    A solver that ends the process or hangs is for isolated.py.
+    """
+    return first_of_each(findings(solver_factory, forms))
+
+
+def findings(
+    factory: Callable[[], Solver],
+    forms: Sequence[Form] | None = None,
+    begin: Callable[[str], None] = lambda test: None,
+) -> Iterator[Finding]:
+    """All that is wrong, as it is found. begin : called with each form and problem before its test."""
     try:
-        taken = solver_factory().forms
-    except Exception as error:
-        return [_raised("any", "constructor", error)]
-    if not taken or any(form not in FORMS for form in taken):
+        taken = factory().forms
+    except (Exception, SystemExit) as error:
+        yield _raised("any", "constructor", error)
+        return
+    if not isinstance(taken, tuple | list) or not taken or any(form not in FORMS for form in taken):
         fix = 'Set it to a tuple of "primal" and "dual", e.g. forms = ("dual",)'
-        return [Finding("any", "forms", f"forms is {taken!r}", fix)]
-    found: list[Finding] = []
+        yield Finding("any", "forms", f"forms is {shown(taken)}", fix)
+        return
     for form in [form for form in taken if forms is None or form in forms]:
         try:
             for known in known_problems():
-                found += _check_problem(solver_factory, known, form)
+                begin(f"{form}, {known.name}")
+                yield from _check_problem(factory, known, form)
         except _Raised as raised:
-            found.append(raised.finding)
-    return _first_of_each(found)
+            yield raised.finding
 
 
 def _check_problem(factory: Callable[[], Solver], known: KnownProblem, form: Form) -> Iterator[Finding]:
@@ -132,7 +144,7 @@ class _Steps:
     def _lap(self, name: str) -> Iterator[None]:
         try:
             yield
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise _Raised(_raised(self.problem.form, name.removesuffix("_s"), error)) from error
 
     def answer(self, case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
@@ -148,29 +160,29 @@ class _Steps:
         """The answers to all cases at once; None if the solver cannot."""
         if self.session.batch is None:
             return None
-        with self._lap("batched"):
+        with self._lap("batched"), self.session.in_one_process():
             return list(self.session.batch([case.load for case in cases], TOLERANCE))
 
 
-def _raised(form: str, step: str, error: Exception) -> Finding:
+def _raised(form: str, step: str, error: BaseException) -> Finding:
     last = traceback.extract_tb(error.__traceback__)[-1]
-    what = f"raised {type(error).__name__}: {error} ({last.filename}, line {last.lineno})"
-    if "read-only" in str(error):
+    what = f"raised {error_text(error)} ({last.filename}, line {last.lineno})"
+    if "read-only" in what:
         return Finding(form, step, what, "The problem's arrays are shared and read-only: copy, then write")
     return Finding(form, step, what, "A solver that cannot go on returns Answer('failed', None)")
 
 
 def _lam(answer: object, known: KnownProblem) -> Vector | None:
     """λ if it can be compared; anything else has been reported already."""
-    lam = getattr(answer, "lam", None)
-    if not isinstance(lam, np.ndarray) or lam.shape != (known.prepared.assembly.m,):
+    try:
+        return vector("lam", getattr(answer, "lam", None), known.prepared.assembly.m)
+    except Refused:
         return None
-    return lam if np.isfinite(lam).all() else None
 
 
 def _same(one: Answer, two: Answer, known: KnownProblem) -> bool:
     a, b = _lam(one, known), _lam(two, known)
-    return a is not None and b is not None and np.array_equal(a, b)
+    return a is not None and b is not None and bool((a == b).all())
 
 
 def _differ(one: Answer, two: Answer, known: KnownProblem, case: KnownCase) -> bool:
@@ -189,7 +201,7 @@ def _fingerprint(known: KnownProblem) -> list[bytes]:
     return [a.tobytes() for a in (*matrices, assembly.A.data, assembly.A.indices, *loads)]
 
 
-def _first_of_each(found: list[Finding]) -> list[Finding]:
+def first_of_each(found: Iterable[Finding]) -> list[Finding]:
     """The first finding of each kind in each form: one fault shows in many cases."""
     kinds: dict[tuple[str, str], Finding] = {}
     for finding in found:

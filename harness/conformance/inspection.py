@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from numbers import Integral, Real
 from typing import get_args
 
 import numpy as np
 
+from harness.measurement.answers import Refused, checked, is_count, is_seconds, shown
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
@@ -43,12 +43,19 @@ def inspect(answer: Answer, known: KnownProblem, case: KnownCase, form: Form) ->
     if not isinstance(answer, Answer):
         yield finding(f"solve returned {type(answer).__name__}", "Return a solvers.base.Answer")
         return
-    if answer.status not in get_args(Status):
-        yield finding(f"status is {answer.status!r}", f"Use one of {', '.join(get_args(Status))}")
-    yield from _wrong_facts(answer, finding)
+    if not isinstance(answer.status, str) or answer.status not in get_args(Status):
+        yield finding(f"status is {shown(answer.status)}", f"Use one of {', '.join(get_args(Status))}")
+        if not isinstance(answer.status, str):
+            return
+    yield from (facts := list(_wrong_facts(answer, finding)))
     yield from (shape_faults := list(_wrong_arrays(answer, known, form, finding)))
     if shape_faults or answer.lam is None:
         return
+    try:
+        checked(answer, in_form(known.prepared, form))
+    except Refused as error:
+        if not facts and answer.status in get_args(Status):
+            yield finding(f"a measurement refuses it: {error}", "Return plain numbers")
     wrong = list(_wrong_values(answer, answer.lam, known, case, finding))
     yield from wrong
     smallest = float(answer.lam.min())
@@ -62,13 +69,13 @@ NewFinding = Callable[[str, str], Finding]
 def _wrong_facts(answer: Answer, finding: NewFinding) -> Iterator[Finding]:
     for name in ("iterations", "inner_iterations"):
         value = getattr(answer, name)
-        if value is not None and (not isinstance(value, Integral) or value < 0):
-            yield finding(f"{name} is {value!r}", "Give a whole number, or None")
-    if answer.reported_s is not None and not isinstance(answer.reported_s, Real):
-        yield finding(f"reported_s is {answer.reported_s!r}", "Give seconds as a float, or None")
+        if value is not None and not is_count(value):
+            yield finding(f"{name} is {shown(value)}", "Give a whole number, or None")
+    if answer.reported_s is not None and not is_seconds(answer.reported_s):
+        yield finding(f"reported_s is {shown(answer.reported_s)}", "Give seconds as a float, or None")
     try:
         json.dumps(answer.details)
-    except (TypeError, ValueError) as error:
+    except Exception as error:  # also of a class of the user's, or too deep
         yield finding(f"details is not JSON ({error})", "Put only numbers, text, lists and dicts there")
 
 

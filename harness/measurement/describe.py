@@ -1,22 +1,26 @@
 """The forms, versions and faulty options of a suite's solvers, found in a separate process.
 
-A library that prints or crashes while it is imported then does no harm, and the driver imports none.
+A library that prints, crashes or hangs while it is imported then does no harm, and the driver imports none.
 """
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from harness.planning.suite import Suite
 from problems.errors import Fault, InputError
-from problems.forms.names import default_form
+from problems.forms.names import FORMS, default_form
 from solvers.base import Form
 
+from .answers import shown
+from .child import await_end, receive
+from .limited import POLL_S, Limited
 from .solver_code import code_of
+
+IMPORT_S = 60.0  # for the imports of all the solvers
+IMPORT_MIB = 8192
 
 
 @dataclass(frozen=True)
@@ -37,47 +41,48 @@ class Description:
 Solvers = dict[tuple[str, str], Description]
 
 
-def describe(suite: Suite) -> list[Description]:
-    """A description of each of the suite's solver entries. Raises InputError, all faults at once."""
-    from .process import environment
+def describe(suite: Suite, doing: Callable[[str], None] = lambda text: None) -> list[Description]:
+    """A description of each of the suite's solver entries. Raises InputError, all faults at once.
 
-    question = json.dumps({"solvers": [[e.name, e.options] for e in suite.solver], "plugin": suite.plugin})
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "harness.measurement.describe"],
-        input=question,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        env=environment(1),
-    )
-    if done.returncode != 0:
-        names = ", ".join(dict.fromkeys(entry.name for entry in suite.solver))
-        last = (done.stderr.strip().splitlines() or [""])[-1]
-        why = f"importing one of these ended with exit code {done.returncode} {last}".strip()
-        raise InputError.one(suite.plugin or f"suite {suite.name}", "solver", names, why)
-    reply = json.loads(done.stdout.splitlines()[-1])
+    doing : called with what is being imported, again and again.
+    """
+    job = {"solvers": [[e.name, e.options] for e in suite.solver], "plugin": suite.plugin}
+    phases = {"importing the solvers": IMPORT_S}
+    with Limited("harness.measurement.describe", job, 1, phases, IMPORT_MIB) as child:
+        while not child.over():
+            child.listen(POLL_S)
+            doing(f"importing {child.row.get('name', 'the solvers')}")
+        reply = child.outcome()
+    if reply["status"] != "described":
+        last = (reply["stderr"] or "").splitlines()[-1:]
+        why = " ".join([f"importing it: {reply['message']}", *last])
+        raise InputError.one(suite.plugin or f"suite {suite.name}", "solver", reply.get("name"), why)
     if reply["faults"]:
         raise InputError([Fault(**fault) for fault in reply["faults"]])
     return [Description(**found) for found in reply["found"]]
 
 
 def main() -> None:
+    job, events = receive()
     from solvers.registry import in_house, make_solver, solver_version
 
-    question = json.loads(sys.stdin.read())
-    plugin = Path(question["plugin"]) if question["plugin"] else None
+    plugin = Path(job["plugin"]) if job["plugin"] else None
     found, faults = [], []
-    for name, options in question["solvers"]:
+    for name, options in job["solvers"]:
+        events.report(name=name)
         try:
             solver = make_solver(name, options, plugin)
+            forms = solver.forms
+            if not isinstance(forms, tuple | list) or not forms or not all(form in FORMS for form in forms):
+                raise InputError.one(
+                    f"solver {name}", "forms", shown(forms), f"a tuple of {', '.join(FORMS)}"
+                )
             code = code_of(solver)
-            found.append(
-                asdict(Description(list(solver.forms), solver_version(name, plugin), code, in_house(name)))
-            )
+            found.append(asdict(Description(list(forms), solver_version(name, plugin), code, in_house(name))))
         except InputError as error:
             faults += [asdict(fault) for fault in error.faults]
-    print()
-    print(json.dumps({"found": found, "faults": faults}, default=repr))
+    events.report(status="described", found=found, faults=faults)
+    await_end()
 
 
 if __name__ == "__main__":

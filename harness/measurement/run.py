@@ -24,6 +24,7 @@ from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import Display
+from harness.terminal.waiting import waiting
 from harness.verification.reference_problem import (
     ReferenceProblem,
     record,
@@ -45,7 +46,8 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
     InputError before the first measurement if the suite cannot be run; after KeyboardInterrupt the same
     command resumes.
     """
-    descriptions = describe(suite)
+    with waiting(console) as show:
+        descriptions = describe(suite, show)
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.variant): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
+import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.problem import Problem
 from solvers.base import Answer, Batch, Solver, WarmStart
 
-from .answers import Refused, validated
+from .answers import Refused, checked
 
 #: A context around a step of the solver, given the row field of its seconds: times it, or names what failed.
 Lap = Callable[[str], AbstractContextManager[None]]
@@ -51,6 +52,7 @@ class SolverSession:
     ) -> None:
         self.solver, self.problem, self.tolerance, self.lap = solver, problem, tolerance, lap
         self.solved: deque[Solved] = deque(maxlen=most)
+        self.process = os.getpid()
         self.opened = False
         self.state: Any = None
         self.ready: Any = None
@@ -58,9 +60,10 @@ class SolverSession:
 
     def open(self, batched: bool = False) -> None:
         """Convert and prepare. batched : also ask for the solver's way to solve several at once."""
-        with self.lap("convert_s"):
+        protect(self.problem)
+        with self._step("convert_s"):
             converted = self.solver.convert(self.problem)
-        with self.lap("prepare_s"):
+        with self._step("prepare_s"):
             self.state = self.solver.prepare(converted)
             if batched:
                 self.batch = self.solver.batched(self.state)
@@ -75,41 +78,67 @@ class SolverSession:
     def cold(self, load: LoadCase, tolerance: float | None = None) -> Answer:
         """Set up and solve."""
         tolerance = self.tolerance if tolerance is None else tolerance
-        with self.lap("setup_s"):
+        with self._step("setup_s"):
             self.ready = self.solver.setup(self.state, load, tolerance)
         return self._solve(load, tolerance)
 
     def warm(self, load: LoadCase, start: WarmStart) -> Answer:
         """Update for the next load case, and solve."""
-        with self.lap("setup_s"):
+        with self._step("setup_s"):
             self.ready = self.solver.update(self.state, self.ready, load, self.tolerance, start)
         return self._solve(load, self.tolerance)
 
     def next(self, load: LoadCase, near: Solved | None, case: int | None = None) -> Answer:
-        """Solve, from the nearest answer if there is one; the answer is validated and kept."""
+        """Solve, from the nearest answer if there is one; the answer is checked and kept."""
         if near is None:
             found = self.cold(load)
         else:
             gap = self.problem.gap(near.load, near.lam, near.x)
             found = self.warm(load, WarmStart(near.load, near.lam, gap, near.x))
-        answer = validated(found, self.problem)
+        answer = checked(found, self.problem)
         if answer.lam is not None:
             x = answer.x if "x" in self.problem.needs else None
-            self.solved.append(Solved(case, load, np.asarray(answer.lam, dtype=float), x))
+            self.solved.append(Solved(case, load, answer.lam, x))
         return answer
 
     def solve_batch(self, loads: Sequence[LoadCase]) -> list[Answer]:
         """An answer to each load case, validated."""
         assert self.batch is not None
-        answers = list(self.batch(loads, self.tolerance))
+        with self.in_one_process():
+            answers = list(self.batch(loads, self.tolerance))
         if len(answers) != len(loads):
             raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
-        return [validated(answer, self.problem) for answer in answers]
+        return [checked(answer, self.problem) for answer in answers]
 
     def forget(self) -> None:
         """After a failure: set up the next case from the start."""
         self.ready = None
 
+    @contextmanager
+    def in_one_process(self) -> Iterator[None]:
+        """A fork of the solver's that comes back ends."""
+        try:
+            yield
+        finally:
+            if os.getpid() != self.process:
+                os._exit(0)
+
+    @contextmanager
+    def _step(self, name: str) -> Iterator[None]:
+        with self.lap(name), self.in_one_process():
+            yield
+
     def _solve(self, load: LoadCase, tolerance: float) -> Answer:
-        with self.lap("solve_s"):
+        with self._step("solve_s"):
             return self.solver.solve(self.ready, load, tolerance)
+
+
+def protect(problem: Problem) -> None:
+    """Make the arrays that the solver is given read-only."""
+    assembly, stages = problem.assembly, vars(problem.prepared)
+    made = [*assembly.blocks, *stages.get("factors", ()), stages.get("Q"), assembly.A, assembly.nodes]
+    for matrix in made:
+        parts = (matrix.data, matrix.indices, matrix.indptr) if sp.issparse(matrix) else (matrix,)
+        for array in parts:
+            if array is not None:
+                array.flags.writeable = False

@@ -1,30 +1,22 @@
 """The measuring process: one solver on one load case, or on those of a series, and nothing else.
 
-`python -m harness.measurement.worker`, with a job as the first line of stdin; events go back as JSON lines
-on the file descriptor that the job names. Each event is part of the row: the driver merges them, so that
-what a killed worker has reported is kept. An event with `phase` (start, solve, save) starts the clock of
-another limit; one with `status` ends the measurement, or the current case of a series, and with `ended`
-all cases after it too. Then the worker waits to be killed.
+`python -m harness.measurement.worker`, started by process.py. Each event is part of the row: the driver
+merges them, so that what a killed worker has reported is kept. An event with `phase` (start, solve, save)
+starts the clock of another limit; one with `status` ends the measurement, or the current case of a series,
+and with `ended` all cases after it too. Then the worker waits to be killed.
 """
 
 from __future__ import annotations
 
-import ctypes
-import faulthandler
-import json
-import os
-import signal
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import threadpoolctl
 
 from harness.results.machine import blas_kernels, resident_mib
-from harness.results.records import Row, to_line
+from harness.results.records import Row
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
@@ -33,11 +25,12 @@ from problems.scene import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .answers import Refused, figures, save
+from .answers import Refused, error_text, figures, save
+from .child import Events, await_end, receive
 from .solver_session import SolverSession
+from .stored_files import StoredFiles
 from .yardstick import yardstick
 
-LARGEST_EVENT = 2**16  # bytes; a solver's details beyond it are dropped
 PAGE = 4096
 
 
@@ -46,13 +39,10 @@ class Unsupported(Exception):
 
 
 def main() -> None:
-    job = json.loads(sys.stdin.readline())
-    die_with_driver()
-    faulthandler.enable()
-    run = Run(job)
+    job, events = receive()
     try:
-        for outcome in run.outcomes():
-            run.report(**outcome)
+        for outcome in Run(job, events).outcomes():
+            events.report(**outcome)
         end = {}
     except MemoryError as error:
         end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
@@ -61,36 +51,18 @@ def main() -> None:
     except Unsupported as error:
         end = {"status": "unsupported", "message": str(error)}
     except BaseException as error:
-        end = {"status": "failed", "message": f"{type(error).__name__}: {error}"[:2000]}
+        end = {"status": "failed", "message": error_text(error)}
     if end:
-        run.report(**end, answer=None, ended=True)
-    sys.stdin.read()
-    os._exit(0)
-
-
-def die_with_driver() -> None:
-    """Linux: die when the driver dies, and adopt the orphans of child processes."""
-    if sys.platform == "linux":
-        set_death_signal, set_child_subreaper = 1, 36
-        prctl = ctypes.CDLL(None).prctl
-        prctl(set_death_signal, signal.SIGKILL)
-        prctl(set_child_subreaper, 1)
+        events.report(**end, answer=None, ended=True)
+    await_end()
 
 
 class Run:
     """The measurements of one job."""
 
-    def __init__(self, job: Row) -> None:
+    def __init__(self, job: Row, events: Events) -> None:
         self.job = job
-        self.process = os.getpid()
-
-    def report(self, **event: Any) -> None:
-        if os.getpid() != self.process:  # a child that the solver forked and that returned here
-            os._exit(0)
-        line = to_line(event)
-        if len(line) > LARGEST_EVENT:
-            line = to_line(event | {"details": {"dropped": f"{len(line)} bytes"}})
-        os.write(self.job["events"], line.encode() + b"\n")
+        self.report = events.report
 
     @contextmanager
     def lap(self, name: str, before: float = 0.0) -> Iterator[None]:
@@ -109,15 +81,20 @@ class Run:
             problem = in_form(prepared(scene), job["form"])
             cases = list(load_cases(scene, job))
             read_all_pages(problem.arrays)
+            stored = StoredFiles(problem.arrays)
         session = SolverSession(solver, problem, job["tolerance"], self.lap)
         files, size = list(map(Path, job["answers"])), job["batched"]
         if size is None:
             for case, file in zip(cases, files, strict=True):
-                yield self.solved(session, case, file)
+                outcome = self.solved(session, case, file)
+                stored.check()
+                yield outcome
             return
         for start in range(0, len(cases), size):
             some = slice(start, start + size)
-            yield from self.solved_batch(session, cases[some], files[some])
+            outcomes = list(self.solved_batch(session, cases[some], files[some]))
+            stored.check()
+            yield from outcomes
 
     def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Row:
         """Solve one load case and save its answer: the last event."""

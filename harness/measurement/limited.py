@@ -1,0 +1,212 @@
+"""A Python module in a process of its own, watched from outside: its time, its memory, its end.
+
+Whatever the process does (hang, crash, exhaust memory, fork, print without end), the outcome is a dict
+with a `status`, and none of its processes survives.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import signal
+import site
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Self
+
+import psutil
+
+from harness.results.records import Row
+
+from .process_tree import end_children
+
+ROOT = Path(__file__).parents[2]
+POLL_S = 0.05
+STDERR_TAIL = 2000  # bytes
+CHUNK = 2**16  # bytes
+LONGEST_EVENT = 2**24  # bytes
+FINAL_READS = 64  # chunks of what a dead process had written
+SCAN_S = 0.5  # between two searches for processes that it forked
+
+THREAD_VARIABLES = (
+    *("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"),
+    *("VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS", "RAYON_NUM_THREADS"),
+)
+
+
+def environment(threads: int) -> dict[str, str]:
+    """The environment variables of a worker: the thread counts, and where these packages are."""
+    paths = [os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else []
+    if str(ROOT) not in (*site.getsitepackages(), site.getusersitepackages()):
+        paths.insert(0, str(ROOT))
+    count = dict.fromkeys(THREAD_VARIABLES, str(threads))
+    return {**os.environ, **count, "OMP_DYNAMIC": "FALSE", "PYTHONPATH": os.pathsep.join(paths)}
+
+
+class Limited:
+    """A running module (its side: child.py), as a context: on leaving it, all its processes are dead.
+
+    Parameters
+    ----------
+    module : as after `python -m`. job : what it is given; JSON. threads : for linear algebra.
+    phases : the limit on each phase, s; an event with `phase` starts the next one.
+    """
+
+    def __init__(
+        self, module: str, job: Row, threads: int, phases: Mapping[str, float], memory_limit_mib: float
+    ) -> None:
+        self.phases, self.memory_limit_mib = phases, memory_limit_mib
+        self.row: Row = {}  # its events so far, merged
+        self.exceeded: Row = {}  # the status and message of a limit that was exceeded
+        self.stderr = b""
+        self.peak_mib = 0.0
+        self.descendants: set[psutil.Process] = set()
+        self.phase = next(iter(phases))
+        self.phase_started = self.checked_at = self.scanned_at = time.monotonic()
+        events, events_of_child = os.pipe()
+        try:
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-m", module],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                env=environment(threads),
+                pass_fds=(events_of_child,),
+                start_new_session=True,
+            )
+        finally:
+            os.close(events_of_child)
+        self.root = psutil.Process(self.process.pid)
+        self.events = open(events, "rb", buffering=0)  # noqa: SIM115
+        assert self.process.stdin is not None
+        assert self.process.stderr is not None
+        self.pending = b""
+        self.selector = selectors.DefaultSelector()
+        for stream, take in ((self.events, self._take_events), (self.process.stderr, self._take_stderr)):
+            os.set_blocking(stream.fileno(), False)
+            self.selector.register(stream, selectors.EVENT_READ, take)
+        with contextlib.suppress(BrokenPipeError):
+            self.process.stdin.write(json.dumps({**job, "events": events_of_child}).encode() + b"\n")
+            self.process.stdin.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.end()
+
+    def listen(self, seconds: float) -> None:
+        """Receive what it reports, for at most `seconds`."""
+        for key, _ in self.selector.select(seconds):
+            chunk = os.read(key.fd, CHUNK)
+            if chunk:
+                key.data(chunk)
+            else:
+                self.selector.unregister(key.fileobj)
+        if not self.selector.get_map():
+            time.sleep(seconds)
+
+    def _take_events(self, chunk: bytes) -> None:
+        *lines, last = (self.pending + chunk).split(b"\n")
+        self.pending = last[-LONGEST_EVENT:]  # what the solver writes to this descriptor may have no end
+        for line in lines:
+            try:
+                event = json.loads(line)
+            except ValueError:  # the solver wrote to this descriptor
+                continue
+            if isinstance(event, dict):
+                self.take(event)
+
+    def take(self, event: Row) -> None:
+        """An event that arrived."""
+        if event.get("phase") in self.phases:
+            self.phase, self.phase_started = event.pop("phase"), time.monotonic()
+        self.row |= event
+
+    def _take_stderr(self, chunk: bytes) -> None:
+        self.stderr = (self.stderr + chunk)[-STDERR_TAIL:]
+
+    def over(self) -> bool:
+        """Whether it has reported its end, died, or exceeded a limit."""
+        if "status" in self.row:
+            return True
+        now = time.monotonic()
+        if now - self.checked_at < POLL_S:
+            return False
+        self.checked_at = now
+        if self.process.poll() is not None:
+            for _ in range(FINAL_READS):
+                self.listen(0)
+            return True
+        self._check_memory()
+        self._check_time(now - self.phase_started)
+        return bool(self.exceeded)
+
+    def _check_memory(self) -> None:
+        used, limit = self.memory_mib(), self.memory_limit_mib
+        if self.phase != "save":  # then the solver is done
+            self.peak_mib = max(self.peak_mib, used)
+        if used > limit:
+            self.exceeded = {"status": "memory_limit", "message": f"{used:.0f} MiB, more than {limit} MiB"}
+
+    def _check_time(self, seconds: float) -> None:
+        limit = self.phases[self.phase]
+        if seconds > limit:
+            status = "time_limit" if self.phase == "solve" else "failed"
+            self.exceeded = {"status": status, "message": f"{self.phase} took more than {limit:g} s"}
+
+    def memory_mib(self) -> float:
+        """Resident memory of the process tree; pages that a fork shares are counted once."""
+        if time.monotonic() - self.scanned_at > SCAN_S:
+            self._find_descendants()
+        total = 0
+        alone = not self.descendants
+        for process in (self.root, *self.descendants):
+            with contextlib.suppress(psutil.NoSuchProcess, psutil.AccessDenied):
+                total += process.memory_info().rss if alone else process.memory_full_info().pss
+        return total / 2**20
+
+    def _find_descendants(self) -> None:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            self.descendants |= set(self.root.children(recursive=True))
+        self.scanned_at = time.monotonic()
+
+    def outcome(self) -> Row:
+        """What is known: its events, or else why it did not reach its end."""
+        self.end()
+        peak = max(self.row.get("peak_rss_mib") or 0.0, self.peak_mib) or None
+        stderr = self.stderr.decode(errors="replace").strip() or None
+        end = {} if "status" in self.row else self.exceeded or self._exit()
+        return {**self.row, **end, "peak_rss_mib": peak, "stderr": stderr}
+
+    def _exit(self) -> Row:
+        code = self.process.returncode
+        if code < 0:
+            hint = ", perhaps by the system because memory ran out" if code == -signal.SIGKILL else ""
+            return {"status": "crashed", "message": f"killed by {signal.Signals(-code).name}{hint}"}
+        return {"status": "crashed", "message": f"ended with exit code {code} before its answer"}
+
+    def end(self) -> None:
+        """Kill the process and all its descendants, those that left its process group too."""
+        if self.events.closed:
+            return
+        self._find_descendants()
+        if self.process.poll() is None:
+            os.kill(self.process.pid, signal.SIGSTOP)
+            end_children(self.process.pid)
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        for process in self.descendants:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
+        self.process.wait()
+        self.selector.close()
+        for stream in (self.events, self.process.stdin, self.process.stderr):
+            if stream is not None:
+                with contextlib.suppress(BrokenPipeError):  # it died before it read its job
+                    stream.close()
