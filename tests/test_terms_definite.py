@@ -46,12 +46,21 @@ def test_definite_a_matrix_that_completes_by_rounding_is_not_taken_for_definite(
     assert completed > 5
 
 
+@pytest.mark.parametrize(("K", "norm"), [([[1.0, -0.9], [-0.9, 1.0]], 1.9), ([[1.0, 0.0], [0.0, 0.01]], 1.0)])
+def test_definite_the_norm_is_the_largest_and_of_sizes(K: list[list[float]], norm: float) -> None:
+    """‖|R|ᵀ|R|‖₂, where K itself has 1.9 as well; and where the rows of R differ."""
+    s = Fraction(definite.SHARES[0] * 1e-3)
+    assert s - Fraction(smallest_eigenvalue(np.array(K), 1e-3)) >= Fraction(gamma(6)) * Fraction(0.99 * norm)
+
+
 def test_definite_the_rounding_of_the_difference_counts() -> None:
-    """n = 1, K = 1: s − margin is rounded by up to us."""
-    s = definite.SHARES[0]
-    margin = Fraction(s) - Fraction(smallest_eigenvalue(np.ones((1, 1)), 1.0))
-    largest = Fraction(1.0 - s)
-    assert margin >= Fraction(gamma(4)) * largest + Fraction(U) * largest + Fraction(U) * Fraction(s) / 2
+    """n = 1: the theorem's margin is 5u (1 − s), and s − margin is rounded by up to us/2."""
+    for k in range(100):
+        K = 1 + k / 128
+        s = definite.SHARES[0] * K / 2  # K is scaled to below 1
+        margin = Fraction(s) - Fraction(smallest_eigenvalue(np.full((1, 1), K), K)) / 2
+        largest = Fraction(K) / 2 - Fraction(s)
+        assert margin >= (Fraction(gamma(4)) + Fraction(U)) * largest
 
 
 @pytest.mark.parametrize("exponent", [-990, -500, 500, 1000])
