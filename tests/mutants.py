@@ -103,7 +103,6 @@ MUTANTS = [
     Mutant(DEFINITE, "(w / v).max()", "(w / v).min()"),
     Mutant(DEFINITE, "np.abs(R, out=R)", "pass"),
     Mutant(DEFINITE, "if bound >= SMALLEST:", "if bound > 0:"),
-    Mutant(DEFINITE, "scale = 2.0 ** -float(exponent(np.diag(K).max()))", "scale = 1.0"),
     Mutant(
         REFERENCE, "return min(smallest_eigenvalue(_dense(K), estimate) for K in blocks)", "return estimate"
     ),

@@ -61,6 +61,12 @@ def test_block_the_uncertainty_of_a_gap_counts(lam: float) -> None:
     assert e <= found <= 1.02 * e
 
 
+def test_block_nothing_is_divided_by_a_stiffness_of_zero() -> None:
+    with np.errstate(divide="raise", invalid="raise"):
+        for bound in (batched(diagonal(1.0), 0.0, 1.0), batched(diagonal(1.0), 1.0, 1.0, 0.0)):
+            assert bound.bound(ZERO, ZERO, ZERO + 1, ZERO, ZERO)[0] == np.inf
+
+
 def test_block_the_compliance_turns_energy_into_displacement() -> None:
     """Two springs, 1 and 100 N/mm, and the force is on the soft one."""
     made = diagonal(1.0, 100.0)
