@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from springs import diagonal
 
 from harness.verification.batched.bound import Bound, independence
+from harness.verification.batched.bound import gaps as batched_gaps
 from harness.verification.batched.residual import refined, residual, split
 from harness.verification.batched.vouch import vouch
 from harness.verification.certificate import certify
@@ -275,6 +276,7 @@ def test_residuals_are_off_by_each_alteration() -> None:
             (forces(made, zero, x, lam).error, wanted_r),
             (found[:, 0], wanted_r),
             (gaps(made, zero, x).error, wanted_s),
+            (batched_gaps(made, np.zeros((2, 1)), at)[1][:, 0], wanted_s),
         ):
             np.testing.assert_allclose(error, wanted, rtol=0.02, atol=1e-14)
             assert (error >= wanted).all()
