@@ -179,6 +179,15 @@ def test_how_much_was_altered(tmp_path: Path) -> None:
     np.testing.assert_array_equal(load.f, [2.0**60, 2.0**60])
 
 
+def test_rounding_and_asymmetry_add_up(tmp_path: Path) -> None:
+    K = np.array([[2**60 + 1, 5], [6, 2**60]])
+    np.savez(tmp_path / "mine.npz", K=K, A=np.eye(2), f=np.ones(2), g=np.ones(2))
+    altered = read_matrices({"problem": tmp_path / "mine.npz"})[0].altered
+    assert altered is not None
+    assert altered.K[0] >= 1.5
+    assert 0.5 <= altered.K[1] <= 0.51
+
+
 @pytest.mark.skipif(not EXTENDED, reason="no long double here")
 def test_extended_precision_is_altered_by_what_it_loses(tmp_path: Path) -> None:
     data: dict[str, Any] = {"K": np.eye(2) * 4.0, "A": np.eye(2), "f": np.ones(2), "g": np.ones(2)}

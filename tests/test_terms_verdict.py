@@ -52,5 +52,10 @@ def test_kkt_residual_within_rounding_is_solved() -> None:
 
 
 def test_reference_takes_the_least_proven_eigenvalue_of_the_parts() -> None:
+    class Overestimated(Prepared):
+        facts = {"lambda_min": 3.0}  # noqa: RUF012
+
     blocks = (np.full((1, 1), 4.0), np.full((1, 1), 1.0))
-    assert 0.8 <= proven_lambda_min(Prepared(Assembly(blocks, sp.csc_array(np.eye(2))))) < 1.0
+    assembly = Assembly(blocks, sp.csc_array(np.eye(2)))
+    assert 0.8 <= proven_lambda_min(Prepared(assembly)) < 1.0
+    assert 0.2 <= proven_lambda_min(Overestimated(assembly)) < 1.0
