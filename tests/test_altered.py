@@ -161,17 +161,17 @@ def test_what_fits_is_not_altered(tmp_path: Path) -> None:
 
 
 def test_how_much_was_altered(tmp_path: Path) -> None:
-    """2⁶⁰ + 1 is 2⁶⁰, 2⁶³ − 1 is 2⁶³; and the two halves of a difference are what the mean is off by."""
+    """2⁶⁰ + 128 is read as 2⁶⁰, 2⁶³ − 1 as 2⁶³; and the two halves of a difference are what the mean is off by."""
     K = np.eye(2) * 4.0
     K[0, 1], K[1, 0] = 1.0, 1.0 + 2.0**-40
-    f, g = np.array([2**60 + 1, 2**60]), np.array([2**63 - 1, 5], dtype=np.uint64)
+    f, g = np.array([2**60 + 128, 2**60]), np.array([2**63 - 1, 5], dtype=np.uint64)
     np.savez(tmp_path / "mine.npz", K=K, A=np.eye(2, dtype=int), f=f, g=g)
     assembly, load = read_matrices({"problem": tmp_path / "mine.npz"})
     altered = assembly.altered
     assert altered is not None
     np.testing.assert_allclose(altered.K, 2.0**-41, rtol=1e-12)
     assert (altered.K >= 2.0**-41).all()
-    assert altered.f[0] >= 1
+    assert altered.f[0] >= 128
     assert altered.g[0] >= 1
     assert altered.f[1] == altered.g[1] == 0
     assert not altered.A_rows.any()
