@@ -161,7 +161,7 @@ def test_what_fits_is_not_altered(tmp_path: Path) -> None:
 
 
 def test_how_much_was_altered(tmp_path: Path) -> None:
-    """2⁶⁰ + 128 is read as 2⁶⁰, 2⁶³ − 1 as 2⁶³; and the two halves of a difference are what the mean is off by."""
+    """2⁶⁰ + 128 is read as 2⁶⁰, 2⁶³ − 1 as 2⁶³; the mean of two halves is off by half of what they differ."""
     K = np.eye(2) * 4.0
     K[0, 1], K[1, 0] = 1.0, 1.0 + 2.0**-40
     f, g = np.array([2**60 + 128, 2**60]), np.array([2**63 - 1, 5], dtype=np.uint64)
