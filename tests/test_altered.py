@@ -16,6 +16,7 @@ from springs import diagonal
 
 from harness.verification.batched.assess import assess
 from harness.verification.batched.bound import Bound, independence
+from harness.verification.batched.bound import gaps as batched_gaps
 from harness.verification.batched.residual import refined, residual, split
 from harness.verification.certificate import certify
 from harness.verification.exact_residual import DoubleDouble, forces, gaps
@@ -160,22 +161,31 @@ def test_what_fits_is_not_altered(tmp_path: Path) -> None:
 
 
 def test_how_much_was_altered(tmp_path: Path) -> None:
-    """2⁶⁰ + 1 is 2⁶⁰, 2⁶³ − 1 is 2⁶³; and the two halves of a difference are what the mean is off by."""
+    """2⁶⁰ + 128 is read as 2⁶⁰, 2⁶³ − 1 as 2⁶³; the mean of two halves is off by half of what they differ."""
     K = np.eye(2) * 4.0
     K[0, 1], K[1, 0] = 1.0, 1.0 + 2.0**-40
-    f, g = np.array([2**60 + 1, 2**60]), np.array([2**63 - 1, 5], dtype=np.uint64)
+    f, g = np.array([2**60 + 128, 2**60]), np.array([2**63 - 1, 5], dtype=np.uint64)
     np.savez(tmp_path / "mine.npz", K=K, A=np.eye(2, dtype=int), f=f, g=g)
     assembly, load = read_matrices({"problem": tmp_path / "mine.npz"})
     altered = assembly.altered
     assert altered is not None
     np.testing.assert_allclose(altered.K, 2.0**-41, rtol=1e-12)
     assert (altered.K >= 2.0**-41).all()
-    assert altered.f[0] >= 1
+    assert altered.f[0] >= 128
     assert altered.g[0] >= 1
     assert altered.f[1] == altered.g[1] == 0
     assert not altered.A_rows.any()
     assert not altered.A_columns.any()
     np.testing.assert_array_equal(load.f, [2.0**60, 2.0**60])
+
+
+def test_rounding_and_asymmetry_add_up(tmp_path: Path) -> None:
+    K = np.array([[2**60 + 1, 5], [6, 2**60]])
+    np.savez(tmp_path / "mine.npz", K=K, A=np.eye(2), f=np.ones(2), g=np.ones(2))
+    altered = read_matrices({"problem": tmp_path / "mine.npz"})[0].altered
+    assert altered is not None
+    assert altered.K[0] >= 1.5
+    assert 0.5 <= altered.K[1] <= 0.51
 
 
 @pytest.mark.skipif(not EXTENDED, reason="no long double here")
@@ -275,6 +285,7 @@ def test_residuals_are_off_by_each_alteration() -> None:
             (forces(made, zero, x, lam).error, wanted_r),
             (found[:, 0], wanted_r),
             (gaps(made, zero, x).error, wanted_s),
+            (batched_gaps(made, np.zeros((2, 1)), at)[1][:, 0], wanted_s),
         ):
             np.testing.assert_allclose(error, wanted, rtol=0.02, atol=1e-14)
             assert (error >= wanted).all()

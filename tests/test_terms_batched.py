@@ -61,6 +61,12 @@ def test_block_the_uncertainty_of_a_gap_counts(lam: float) -> None:
     assert e <= found <= 1.02 * e
 
 
+def test_block_nothing_is_divided_by_a_stiffness_of_zero() -> None:
+    with np.errstate(divide="raise", invalid="raise"):
+        for bound in (batched(diagonal(1.0), 0.0, 1.0), batched(diagonal(1.0), 1.0, 1.0, 0.0)):
+            assert bound.bound(ZERO, ZERO, ZERO + 1, ZERO, ZERO)[0] == np.inf
+
+
 def test_block_the_compliance_turns_energy_into_displacement() -> None:
     """Two springs, 1 and 100 N/mm, and the force is on the soft one."""
     made = diagonal(1.0, 100.0)
@@ -223,13 +229,25 @@ def test_compliance_the_backward_error_of_the_factor_counts() -> None:
 
 
 def test_compliance_the_error_of_the_inverse_counts() -> None:
-    """ε ‖X‖_F is what any row of X may be off by."""
-    K = np.diag(array(1.0, 2.0**66))
+    """ε ‖X‖_F is what any row of X may be off by: 9 % of 1 here."""
+    K = np.diag(array(1.0, 2.0**94))
     prepared = Prepared(Assembly((np.asfortranarray(K),), sp.csc_array(np.eye(2))))
-    epsilon = gamma(6) * 2.0**33
-    assert largest_compliance(prepared, 1e30) >= (1 + epsilon) ** 2 > 1 + 1e-6
+    epsilon = gamma(6) * 2.0**47
+    assert 1.0099 * (1 + epsilon) ** 2 <= largest_compliance(prepared, 1e30) <= 1.05 * (1 + epsilon) ** 2
     hopeless = Prepared(Assembly((np.diag(array(1.0, 2.0**110)),), sp.csc_array(np.eye(2))))
     assert largest_compliance(hopeless, 1e30) == np.inf
+
+
+def test_compliance_is_the_square_of_a_row() -> None:
+    assert 4.0 <= largest_compliance(Prepared(diagonal(0.25)), 0.25) <= 4.2
+
+
+def test_block_many_products_that_underflow_count() -> None:
+    """Twenty forces in a row, each product just below η/2."""
+    made = diagonal(1.0, A=[[2.0**-537] * 20])
+    lam = np.full((20, 1), 0.98 * 2.0**-538)
+    exact = 20 * Fraction(2.0**-537) * Fraction(0.98 * 2.0**-538)
+    assert Fraction(float(residual(made, ZERO, Split(ZERO, ZERO), lam)[1][0, 0])) >= exact
 
 
 def test_independence_counts_the_rounding_of_its_products() -> None:
@@ -241,3 +259,27 @@ def test_independence_counts_the_rounding_of_its_products() -> None:
     for k in range(1, 100):
         single = independence(Assembly((np.eye(1),), sp.csc_array([[k / 7]])))
         assert Fraction(single) <= Fraction(k / 7) ** 2 <= Fraction(single) * (1 + Fraction(1, 10**15))
+
+
+def test_block_many_products_with_K_that_underflow_count() -> None:
+    n = 12
+    made = Assembly((np.full((n, n), 2.0**-537),), sp.csc_array((n, 0)))
+    x = Split(np.full((n, 1), 0.98 * 2.0**-538), np.zeros((n, 1)))
+    exact = n * Fraction(2.0**-537) * Fraction(0.98 * 2.0**-538)
+    _, error = residual(made, np.zeros((n, 1)), x, np.zeros((0, 1)))
+    assert Fraction(float(error[0, 0])) >= exact
+
+
+@pytest.mark.parametrize("near", [0.0, 1.0])
+def test_block_the_bound_near_by_and_the_rounding_of_the_sum_count(
+    near: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """x = 1/3 as the sum of two parts is rounded, however near to x* the parts are."""
+    monkeypatch.setattr(Bound, "bound", lambda *_: array(near))
+    prepared = Prepared(diagonal(3.0))
+    load = LoadCase(array(1.0), array(10.0))
+    load = replace(load, p=prepared.dual_load(load))
+    found = vouch(Bound.of(prepared), [load], [array(0.0)], [None])[0]
+    rounding = abs(Fraction(float(found.x[0])) - Fraction(1, 3))
+    assert 0 < rounding <= Fraction(found.bound_mm)
+    assert found.bound_mm >= near

@@ -79,9 +79,11 @@ def test_certificate_a_gap_that_may_be_negative_proves_nothing(monkeypatch: pyte
     assert bound_of(diagonal(1.0), 1.0, 10.0, doubled(array(1.0)), doubled(array(0.0)), 1.0) == np.inf
 
 
-def test_certificate_a_pulling_force_proves_nothing() -> None:
-    """λ = −1 holds the spring at the stop in balance, but x* = 0."""
-    assert bound_of(diagonal(1.0), 0.0, 1.0, doubled(array(1.0)), doubled(array(-1.0)), 1.0) >= 1
+def test_certificate_a_pulling_force_makes_up_for_nothing() -> None:
+    """sᵀλ = 2·2 at the first contact, where the error is 2; −4·0.999 at the second must not be taken off."""
+    load = LoadCase(array(10.0, 5.001), array(10.0, 10.0))
+    x, lam, closed = doubled(array(8.0, 6.0)), doubled(array(2.0, -0.999)), np.zeros(2, dtype=bool)
+    assert certify(diagonal(1.0, 1.0), load, x, lam, closed, 1.0).bound_mm >= np.hypot(2.0, 0.999)
 
 
 def test_certificate_a_residual_that_overflows_proves_nothing() -> None:

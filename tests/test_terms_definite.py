@@ -46,12 +46,22 @@ def test_definite_a_matrix_that_completes_by_rounding_is_not_taken_for_definite(
     assert completed > 5
 
 
+@pytest.mark.parametrize(("K", "norm"), [([[1.0, -0.9], [-0.9, 1.0]], 1.9), ([[1.0, 0.0], [0.0, 0.01]], 1.0)])
+def test_definite_the_norm_is_the_largest_and_of_sizes(K: list[list[float]], norm: float) -> None:
+    """‖|R|ᵀ|R|‖₂, where K itself has 1.9 as well; and where the rows of R differ."""
+    s = Fraction(definite.SHARES[0] * 1e-3)
+    theorem = Fraction(gamma(6)) * Fraction(norm) + Fraction(U) * Fraction(1.0 - float(s))
+    assert s - Fraction(smallest_eigenvalue(np.array(K), 1e-3)) >= Fraction(1005, 1000) * theorem
+
+
 def test_definite_the_rounding_of_the_difference_counts() -> None:
-    """n = 1, K = 1: s − margin is rounded by up to us."""
-    s = definite.SHARES[0]
-    margin = Fraction(s) - Fraction(smallest_eigenvalue(np.ones((1, 1)), 1.0))
-    largest = Fraction(1.0 - s)
-    assert margin >= Fraction(gamma(4)) * largest + Fraction(U) * largest + Fraction(U) * Fraction(s) / 2
+    """n = 1: the theorem's margin is 5u (1 − s), and s − margin is rounded by up to us/2."""
+    for k in range(100):
+        K = 1 + k / 128
+        s = definite.SHARES[0] * K
+        margin = Fraction(s) - Fraction(smallest_eigenvalue(np.full((1, 1), K), K))
+        largest = Fraction(K) - Fraction(s)
+        assert margin >= (Fraction(gamma(4)) + Fraction(U)) * largest
 
 
 @pytest.mark.parametrize("exponent", [-990, -500, 500, 1000])
@@ -60,3 +70,4 @@ def test_definite_in_any_unit(exponent: int) -> None:
     usual, scaled = smallest_eigenvalue(K, 1.0), smallest_eigenvalue(np.ldexp(K, exponent), 2.0**exponent)
     assert scaled == np.ldexp(usual, exponent)
     assert smallest_eigenvalue(np.ldexp(K, -1040), 2.0**-1040) == 0.0
+    assert smallest_eigenvalue(np.diag([2.0**-995, 2.0**-1010]), 2.0**-1010) == 0.0

@@ -128,6 +128,17 @@ def test_residual_products_that_underflow_count() -> None:
     assert nothing.error[0] == 0.0
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_residual_a_bound_does_not_underflow_before_it_is_multiplied(seed: int) -> None:
+    """K near 2⁻¹⁰⁶⁰: u times it is no number, but u times it times x of 2⁴⁵⁰ is."""
+    rng, n = np.random.default_rng(seed), 24
+    B = rng.standard_normal((n, n))
+    made = Assembly((np.asfortranarray(np.ldexp(B + B.T, -1060)),), sp.csc_array((n, 1)))
+    at = DoubleDouble(np.zeros(n), np.ldexp(rng.standard_normal(n), 450))
+    found = forces(made, np.zeros(n), at, doubled(np.zeros(1)))
+    assert violations(found, exactly(made, np.zeros(n), at, np.zeros(1))) == 0
+
+
 @pytest.mark.parametrize("scale", [1e-300, 1e-308, 1e-311, 1e-320])
 def test_residual_of_the_smallest_numbers_is_enclosed(scale: float) -> None:
     rng = np.random.default_rng(1)
@@ -165,5 +176,6 @@ def test_length_neither_under_nor_overflows() -> None:
         v = array(3.0, 4.0) * scale
         assert 5 * scale <= length(v) <= 5 * scale * (1 + 1e-15) + ETA
         np.testing.assert_array_equal(length(np.column_stack([v, 0 * v])), [length(v), 0.0])
+    assert length(array(ETA, ETA)) >= 2 * ETA  # √2 η is no number
     assert not np.isfinite(length(array(np.nan))).any()
     assert not np.isfinite(length(array(np.inf))).any()

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from springs import array, diagonal
 
 from harness.verification.judge import REFERENCE_SHARE, judge
-from harness.verification.reference import Reference
-from problems.forms.assembly import LoadCase
+from harness.verification.reference import Reference, proven_lambda_min
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from solvers.kkt import EPS, kkt_status
 
@@ -48,3 +49,13 @@ def test_kkt_residual_within_rounding_is_solved() -> None:
     for share, status in ((0.99, "solved"), (1.01, "inaccurate")):
         y = array(share * 4 * EPS * 2e6)
         assert kkt_status(Q, p, lam, y, 0.0)[0] == status
+
+
+def test_reference_takes_the_least_proven_eigenvalue_of_the_parts() -> None:
+    class Overestimated(Prepared):
+        facts = {"lambda_min": 3.0}  # noqa: RUF012
+
+    blocks = (np.full((1, 1), 4.0), np.full((1, 1), 1.0))
+    assembly = Assembly(blocks, sp.csc_array(np.eye(2)))
+    assert 0.8 <= proven_lambda_min(Prepared(assembly)) < 1.0
+    assert 0.2 <= proven_lambda_min(Overestimated(assembly)) < 1.0
