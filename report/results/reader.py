@@ -61,6 +61,8 @@ class Results:
                 arrays = {name: file[name] for name in file.files}
         except (OSError, ValueError, BadZipFile):
             return {}
+        if any(array.dtype.kind not in "fiu" for array in arrays.values()):
+            return {}
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 
     def on_ladders(self, wanted: bool) -> Results:
@@ -108,7 +110,7 @@ def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dic
     """The content of a file; empty if there is none, and with a warning if it is damaged."""
     try:
         content = parse(path.read_text("utf-8")) if path.is_file() else {}
-    except ValueError:
+    except (ValueError, RecursionError):
         content = None
     if isinstance(content, dict):
         return content
@@ -125,7 +127,7 @@ def _json_lines(path: Path) -> tuple[list[dict[str, Any]], list[str]]:
             continue
         try:
             record = json.loads(line)
-        except json.JSONDecodeError:
+        except (ValueError, RecursionError):
             record = None
         if isinstance(record, dict):
             records.append(record)
