@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from io import StringIO
 from itertools import permutations
 from pathlib import Path
@@ -12,12 +13,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import tiny
 from rich.console import Console
 from small import make_load, make_prepared
 from strip import write_strip
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
+from harness.measurement.run import run
+from harness.planning.suite import read_suite
+from harness.results import records
 from harness.scene.exchange import import_, matrices
 from harness.series import store
 from harness.verification.reference import reference
@@ -441,3 +446,117 @@ def test_a_missing_file_of_a_series_is_named_and_made_again(name: str, series: P
     assert name in refused.output
     assert solve_series(series).exit_code == 0
     assert invoke("report", series).exit_code == 0
+
+
+# --- a directory of results ---------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
+        text = '[[solver]]\nname = "exact"\nforms = ["dual"]\n'
+        suite = read_suite(str(tiny.write_suite(folder, text, tolerances=[1e-6, 1e-8])))
+        assert run(suite, folder / "finished", QUIET) == 0
+    return folder / "finished"
+
+
+@pytest.fixture
+def results(finished: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(finished, tmp_path / "copy"))
+
+
+def measured(directory: Path) -> list[dict[str, Any]]:
+    return records.read(directory / records.MEASUREMENTS)
+
+
+@pytest.mark.slow
+def test_the_gate_does_not_pass_what_nobody_planned(results: Path) -> None:
+    """Without suite.toml, and with the first row alone."""
+    assert invoke("gate", results).exit_code == 0
+    (results / "suite.toml").unlink()
+    records.rewrite(results / records.MEASUREMENTS, measured(results)[:1])
+    done = invoke("gate", results)
+    assert done.exit_code == 1
+    assert "suite.toml" in done.output
+
+
+WRONG: list[tuple[str, Any]] = [
+    *(("limit_mm", value) for value in ("a", -1.0, [1], True)),
+    *((name, 3) for name in ("key", "source", "status", "message", "answer", "scene_key", "scene", "solver")),
+    *(("gated", value) for value in ("yes", 1, None)),
+    *(("series", value) for value in ([], {"cases": "a"}, {"cases": 2, "other": 1})),
+    *(("case", value) for value in ("a", {}, [])),
+    *(("solve_s", value) for value in ("fast", {}, [1, 2])),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "value"), WRONG)
+def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, results: Path) -> None:
+    rows = measured(results)
+    rows[1][name] = value
+    records.rewrite(results / records.MEASUREMENTS, rows)
+    for command in ("gate", "report"):
+        done = invoke(command, results)
+        if done.exit_code != 0 or command == "gate":
+            assert done.exit_code == 2, done.output
+            assert f"measurements.jsonl: line 2: {name}" in done.output
+
+
+@pytest.mark.slow
+def test_a_nested_line_is_named(results: Path) -> None:
+    path = results / records.MEASUREMENTS
+    path.write_bytes(b"[" * 100_000 + b"\n" + path.read_bytes())
+    for command in ("gate", "report"):
+        done = invoke(command, results)
+        assert done.exit_code == 2
+        assert "line 1" in done.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        *(
+            ("suite.toml", text)
+            for text in (b"solver = 3", b"solver = [3]", b"[[solver]]\nname = 1", b"\xff")
+        ),
+        *(("problems.jsonl", text) for text in (b"[" * 100_000 + b"\n{}\n", b"{}\n", b'{"scene": 3}\n')),
+        ("problems.jsonl", b'{"scene": "tiny", "n": "many"}\n'),
+        *(("machine.json", text) for text in (b"[" * 100_000, b"[]", b"1", b"\xff")),
+    ],
+)
+def test_a_damaged_file_beside_the_rows_is_named(name: str, content: bytes, results: Path) -> None:
+    (results / name).write_bytes(content)
+    done = invoke("report", results)
+    assert done.exit_code in (0, 2), done.output
+    said = done.output if done.exit_code else (results / "report" / "report.md").read_text()
+    assert name in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("values", [np.full(20, "1.0"), np.full(20, 1.0 + 2j), np.full((20, 2), 1.0)])
+def test_an_answer_of_another_kind_is_none(values: Any, results: Path) -> None:
+    np.savez(results / measured(results)[0]["answer"], x=values, lam=np.zeros(10))
+    done = invoke("gate", results)
+    assert done.exit_code == 1
+    assert "missing, damaged or not finite" in done.output
+
+
+@pytest.mark.slow
+def test_an_answer_that_is_a_pipe_is_none(results: Path) -> None:
+    answer = results / measured(results)[0]["answer"]
+    answer.unlink()
+    os.mkfifo(answer)
+    assert invoke("gate", results).exit_code == 1
+
+
+@pytest.mark.slow
+def test_text_among_the_arrays_of_a_scene_is_left_out(results: Path) -> None:
+    (path,) = (results / "scenes").iterdir()
+    with np.load(path) as file:
+        arrays = dict(file)
+    np.savez(path, **{name: values.astype(str) for name, values in arrays.items()})
+    assert invoke("report", results).exit_code == 0

@@ -279,7 +279,7 @@ def test_block_the_bound_near_by_and_the_rounding_of_the_sum_count(
     prepared = Prepared(diagonal(3.0))
     load = LoadCase(array(1.0), array(10.0))
     load = replace(load, p=prepared.dual_load(load))
-    found = vouch(Bound.of(prepared), [load], [array(0.0)], [None])[0]
+    found = assess(Bound.of(prepared), [load], [array(0.0)], [None])[0]
     rounding = abs(Fraction(float(found.x[0])) - Fraction(1, 3))
     assert 0 < rounding <= Fraction(found.bound_mm)
     assert found.bound_mm >= near

@@ -152,6 +152,7 @@ def report(
     """
     with error_reporting() as console:
         from harness.results import records
+        from harness.results.kinds import refuse_unreadable
         from harness.series.store import SERIES, refuse_damaged
         from problems.errors import InputError
 
@@ -164,8 +165,7 @@ def report(
         path = directory / records.MEASUREMENTS
         if not path.is_file():
             raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
-        if not records.read(path):
-            raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
+        refuse_unreadable(directory)
         from report.writers.markdown import write
 
         console.print(f"Report: {write(directory)}")

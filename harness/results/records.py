@@ -111,7 +111,7 @@ def _split(path: Path) -> tuple[list[Row], bytes]:
 def _parse(line: bytes) -> Row | None:
     try:
         row = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return row if isinstance(row, dict) else None
 

@@ -79,6 +79,13 @@ ORIGIN: dict[str, Kind] = {
 
 FIELDS: dict[str, Kind] = {**ASKED, **PROBLEM, **MEASURED, **MEASURED_OF_CASES, **JUDGED, **ORIGIN}
 
+#: The rows of problems.jsonl, one per scene.
+PROBLEM_FIELDS: dict[str, Kind] = {
+    **_fields("text", "scene title scene_key reference_route refused"),
+    **_fields("number", "n m active cond_K lambda_min lambda_max reference_s reference_bound_mm"),
+    **_fields("object", "build_s"),
+}
+
 
 def of_kind(kind: Kind) -> list[str]:
     """The names of the fields of a kind."""

@@ -8,18 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
+from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
 from harness.planning.plan import expand
-from harness.planning.suite import validated
+from harness.planning.suite import RandomCases, validated
 from harness.results import records
+from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
 from problems.errors import Fault, InputError
+from problems.input.validation import validation_faults
 from problems.scene import read_toml
 
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
@@ -27,6 +31,8 @@ from .reference_problem import ReferenceProblem, reference_problem
 
 #: What the gate reads of a row: which answer belongs to which scene.
 NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", "limit_mm")
+NULLABLE = ("answer", "message")
+MAX_CASES = 10**9
 
 
 @dataclass(frozen=True)
@@ -66,14 +72,33 @@ def gate(directory: Path, console: Console, reference_limit_s: float | None = No
 
 
 def gated_rows(path: Path) -> dict[str, Row]:
-    """The gated rows by their keys. Raises InputError if a row lacks a field that is needed."""
+    """The gated rows by their keys. Raises InputError if a row lacks a field that is needed, or if a field is
+    of another kind or out of bounds.
+    """
     rows = records.read(path)
     faults = [
         Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
         for number, row in enumerate(rows, start=1)
         for name in NEEDED
-        if name not in row
+        if name not in row or (row[name] is None and name not in NULLABLE)
     ]
+    if faults:
+        raise InputError(faults)
+    refuse_wrong_kinds(path, rows)
+    for number, row in enumerate(rows, start=1):
+        if not 0 < row["limit_mm"] < inf:
+            allowed = "must be positive and finite"
+            faults.append(Fault(str(path), f"line {number}: limit_mm", row["limit_mm"], allowed))
+        case = row.get("case")
+        if case is not None and not (type(case) is int and 0 <= case < MAX_CASES):
+            faults.append(
+                Fault(str(path), f"line {number}: case", case, f"an integer from 0 to {MAX_CASES - 1}")
+            )
+        if row.get("series") is not None:
+            try:
+                RandomCases.model_validate(row["series"])
+            except ValidationError as error:
+                faults += validation_faults(path, RandomCases, error, f"line {number}: series")
     if faults:
         raise InputError(faults)
     return {row["key"]: row for row in rows if row["gated"]}
@@ -112,9 +137,12 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
 
 
 def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
-    """The gated measurements of the suite that was run without a row."""
+    """The gated measurements of the suite that was run without a row; suite.toml itself if it is missing."""
     path = directory / "suite.toml"
-    if path.is_file():
+    if not path.is_file():
+        why = "is missing, so that nobody knows which rows there should be: run again"
+        yield Finding(path.name, Judgement("cannot_be_judged"), LIMIT_MM, why)
+    else:
         for measurement in expand(validated(read_toml(path), path)):
             if measurement.gated and measurement.key not in rows:
                 why = "never measured: the run did not end"

@@ -15,12 +15,15 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.stages import Progress
+from problems.input.bounded import regular_file
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 
 from .judge import Judgement, conditioned_limit, judge
 from .reference import Reference, default_limit_s, reference, reference_of
+
+ANSWER_MIB = 1024  # the largest file of an answer that is read
 
 
 @dataclass(frozen=True)
@@ -54,9 +57,11 @@ class ReferenceProblem:
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""
         try:
-            with np.load(path) as saved:
+            with np.load(regular_file(path, "answer", ANSWER_MIB)) as saved:
                 x, lam = saved["x"], saved["lam"]
         except Exception:  # numpy, zipfile and zlib raise kinds of their own
+            return Judgement("no_answer", self.reference.bound_mm)
+        if not x.dtype.kind == lam.dtype.kind == "f":
             return Judgement("no_answer", self.reference.bound_mm)
         return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
 

@@ -62,6 +62,8 @@ class Results:
                 arrays = {name: file[name] for name in file.files}
         except (OSError, ValueError, BadZipFile):
             return {}
+        if any(array.dtype.kind not in "fiu" for array in arrays.values()):
+            return {}
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 
     def on_ladders(self, wanted: bool) -> Results:

@@ -1,0 +1,55 @@
+"""Whether the fields of rows are of the schema's kinds: a file may hold anything."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from problems.errors import Fault, InputError
+from problems.scene import read_toml
+
+from . import records
+from .records import Row
+from .schema import FIELDS, PROBLEM_FIELDS, Kind
+
+MAX_FAULTS = 20  # named at once
+TYPES: dict[Kind, tuple[type, ...]] = {
+    "number": (int, float),
+    "text": (str,),
+    "flag": (bool,),
+    "object": (dict,),
+}
+
+
+def refuse_wrong_kinds(path: Path, rows: Sequence[Row], fields: Mapping[str, Kind] = FIELDS) -> None:
+    """Raise InputError naming file, line and field if a field is of another kind; null is of every kind."""
+    faults = [
+        Fault(str(path), f"line {number}: {name}", value, f"must be a {fields[name]} or null")
+        for number, row in enumerate(rows, start=1)
+        for name, value in row.items()
+        if name in fields and value is not None and type(value) not in TYPES[fields[name]]
+    ]
+    faults += [
+        Fault(str(path), f"line {number}: scene", row.get("scene"), "must be a text")
+        for number, row in enumerate(rows, start=1)
+        if row.get("scene") is None
+    ]
+    if faults:
+        raise InputError(faults[:MAX_FAULTS])
+
+
+def refuse_unreadable(directory: Path) -> None:
+    """Raise InputError, naming file and place, unless DIRECTORY can be reported on."""
+    path = directory / records.MEASUREMENTS
+    rows = records.read(path)
+    if not rows:
+        raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
+    refuse_wrong_kinds(path, rows)
+    problems = directory / "problems.jsonl"
+    refuse_wrong_kinds(problems, records.read_complete_rows(problems), PROBLEM_FIELDS)
+    suite = directory / "suite.toml"
+    solvers = read_toml(suite).get("solver", []) if suite.is_file() else []
+    if not (isinstance(solvers, list) and all(isinstance(entry, dict) for entry in solvers)):
+        raise InputError.one(suite, "solver", solvers, "tables [[solver]]")
+    if not all(isinstance(entry.get("name"), str) for entry in solvers):
+        raise InputError.one(suite, "solver.name", None, "must be a text")
