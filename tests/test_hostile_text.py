@@ -61,17 +61,8 @@ def results(folder: Path, name: str) -> Path:
 
 def solution(folder: Path, name: str) -> Path:
     """The files of `solve`, with one text for everything that has a name."""
-    parts = [
-        {
-            "name": name,
-            "start": 6 * k,
-            "stop": 6 * k + 6,
-            "outline": [0, 20, 0, 10],
-            "clamped": [],
-            "supports": [],
-        }
-        for k in range(2)
-    ]
+    bare = {"name": name, "outline": [0, 20, 0, 10], "clamped": [], "supports": []}
+    parts = [bare | {"start": start, "stop": start + 6} for start in (0, 6)]
     record = {
         "title": name, "method": name, "status": name, "verdict": "within", "n": 12, "m": 6, "qp": True,
         "closest_mm": 0.1, "judged_error_mm": 1e-9, "error_bound_mm": 1e-9, "parts": parts,
