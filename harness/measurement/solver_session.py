@@ -138,6 +138,8 @@ def protect(problem: Problem) -> None:
     assembly, stages = problem.assembly, vars(problem.prepared)
     made = [*assembly.blocks, *stages.get("factors", ()), stages.get("Q"), assembly.A, assembly.nodes]
     for matrix in made:
+        if sp.issparse(matrix) and matrix.data.flags.writeable:
+            matrix.sum_duplicates()  # as scipy would in place, when it is first asked for |A|
         parts = (matrix.data, matrix.indices, matrix.indptr) if sp.issparse(matrix) else (matrix,)
         for array in parts:
             if array is not None:

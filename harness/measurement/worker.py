@@ -92,9 +92,9 @@ class Run:
             return
         for start in range(0, len(cases), size):
             some = slice(start, start + size)
-            outcomes = list(self.solved_batch(session, cases[some], files[some]))
-            stored.check()
-            yield from outcomes
+            for outcome in self.solved_batch(session, cases[some], files[some]):
+                stored.check()
+                yield outcome
 
     def solved(self, session: SolverSession, case: LoadCase, answer_file: Path) -> Row:
         """Solve one load case and save its answer: the last event."""
