@@ -52,7 +52,6 @@ class SolverSession:
     ) -> None:
         self.solver, self.problem, self.tolerance, self.lap = solver, problem, tolerance, lap
         self.solved: deque[Solved] = deque(maxlen=most)
-        self.process = os.getpid()
         self.opened = False
         self.state: Any = None
         self.ready: Any = None
@@ -116,11 +115,12 @@ class SolverSession:
 
     @contextmanager
     def in_one_process(self) -> Iterator[None]:
-        """A fork of the solver's that comes back ends."""
+        """A fork that the solver makes meanwhile ends if it comes back."""
+        process = os.getpid()
         try:
             yield
         finally:
-            if os.getpid() != self.process:
+            if os.getpid() != process:
                 os._exit(0)
 
     @contextmanager
