@@ -21,8 +21,9 @@ from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
 from harness.measurement.run import run
-from harness.planning.suite import read_suite
+from harness.planning.suite import read_suite, read_written
 from harness.results import records
+from harness.results.kinds import refuse_unreadable
 from harness.scene.exchange import import_, matrices
 from harness.series import store
 from harness.verification.reference import reference
@@ -32,6 +33,7 @@ from problems.errors import InputError
 from problems.scene import read_scene
 from problems.storage import cache
 
+PUBLISHED = Path(__file__).parents[1] / "results" / "published"
 QUIET = Console(file=StringIO())
 
 
@@ -506,6 +508,21 @@ def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, r
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "value"), [("key", None), ("key", []), ("status", 3), ("time_limit_s", "a")]
+)
+def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, results: Path) -> None:
+    rows = measured(results)
+    rows[1][name] = value
+    records.rewrite(results / records.MEASUREMENTS, rows)
+    words = ["--scene", results.parent / "tiny.npz", "--solver", "gi", "--out", results]
+    tiny.write_problem(results.parent / "tiny.npz")
+    done = invoke("run", "gate", *words)
+    assert done.exit_code == 2
+    assert f"measurements.jsonl: line 2: {name}" in done.output
+
+
+@pytest.mark.slow
 def test_a_nested_line_is_named(results: Path) -> None:
     path = results / records.MEASUREMENTS
     path.write_bytes(b"[" * 100_000 + b"\n" + path.read_bytes())
@@ -521,7 +538,7 @@ def test_a_nested_line_is_named(results: Path) -> None:
     [
         *(
             ("suite.toml", text)
-            for text in (b"solver = 3", b"solver = [3]", b"[[solver]]\nname = 1", b"\xff")
+            for text in (b"solver = 3", b"solver = [3]", b"[[solver]]\nname = 1", b"\xff", b"scenes = 3")
         ),
         *(("problems.jsonl", text) for text in (b"[" * 100_000 + b"\n{}\n", b"{}\n", b'{"scene": 3}\n')),
         ("problems.jsonl", b'{"scene": "tiny", "n": "many"}\n'),
@@ -560,3 +577,10 @@ def test_text_among_the_arrays_of_a_scene_is_left_out(results: Path) -> None:
         arrays = dict(file)
     np.savez(path, **{name: values.astype(str) for name, values in arrays.items()})
     assert invoke("report", results).exit_code == 0
+
+
+@pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*/suite.toml")), ids=lambda path: path.parent.name)
+def test_what_is_published_can_be_read(path: Path) -> None:
+    """Nothing that an older version wrote is taken for damage."""
+    assert read_written(path).solver
+    refuse_unreadable(path.parent)

@@ -151,6 +151,7 @@ def report(
       python -m harness report results/default
     """
     with error_reporting() as console:
+        from harness.planning.suite import read_written
         from harness.results import records
         from harness.results.kinds import refuse_unreadable
         from harness.series.store import SERIES, refuse_damaged
@@ -166,6 +167,9 @@ def report(
         if not path.is_file():
             raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
         refuse_unreadable(directory)
+        suite = directory / "suite.toml"
+        if suite.is_file():
+            read_written(suite)
         from report.writers.markdown import write
 
         console.print(f"Report: {write(directory)}")

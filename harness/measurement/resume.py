@@ -9,10 +9,13 @@ from rich.console import Console
 from harness.planning.plan import Measurement
 from harness.planning.timeouts import OUT_OF_TIME
 from harness.results import records
+from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
 from problems.scene import read_scene
 
 from .describe import Description, Solvers
+
+NEEDED = ("key", "scene", "status", "time_limit_s", "memory_limit_mib")
 
 
 def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
@@ -21,6 +24,7 @@ def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console:
     if records.move_torn_line(path):
         console.print(f"{path}: the last line was torn; it is now in {records.TORN}", style="yellow")
     rows = records.read(path)
+    refuse_wrong_kinds(path, rows, needed=NEEDED)
     planned = {m.key: m for m in plan}
     sources = {m.scene: m.source for m in plan}
     scene_keys = {name: read_scene(source).key for name, source in sources.items()}

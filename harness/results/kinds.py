@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from problems.errors import Fault, InputError
-from problems.scene import read_toml
 
 from . import records
 from .records import Row
@@ -21,8 +20,16 @@ TYPES: dict[Kind, tuple[type, ...]] = {
 }
 
 
-def refuse_wrong_kinds(path: Path, rows: Sequence[Row], fields: Mapping[str, Kind] = FIELDS) -> None:
-    """Raise InputError naming file, line and field if a field is of another kind; null is of every kind."""
+def refuse_wrong_kinds(
+    path: Path,
+    rows: Sequence[Row],
+    fields: Mapping[str, Kind] = FIELDS,
+    needed: Sequence[str] = ("scene",),
+) -> None:
+    """Raise InputError naming file, line and field if a field is of another kind, or a needed one is null.
+
+    Any other field may be null.
+    """
     faults = [
         Fault(str(path), f"line {number}: {name}", value, f"must be a {fields[name]} or null")
         for number, row in enumerate(rows, start=1)
@@ -30,16 +37,17 @@ def refuse_wrong_kinds(path: Path, rows: Sequence[Row], fields: Mapping[str, Kin
         if name in fields and value is not None and type(value) not in TYPES[fields[name]]
     ]
     faults += [
-        Fault(str(path), f"line {number}: scene", row.get("scene"), "must be a text")
+        Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
         for number, row in enumerate(rows, start=1)
-        if row.get("scene") is None
+        for name in needed
+        if row.get(name) is None
     ]
     if faults:
         raise InputError(faults[:MAX_FAULTS])
 
 
 def refuse_unreadable(directory: Path) -> None:
-    """Raise InputError, naming file and place, unless DIRECTORY can be reported on."""
+    """Raise InputError, naming file and line, unless the rows of DIRECTORY can be reported on."""
     path = directory / records.MEASUREMENTS
     rows = records.read(path)
     if not rows:
@@ -47,9 +55,3 @@ def refuse_unreadable(directory: Path) -> None:
     refuse_wrong_kinds(path, rows)
     problems = directory / "problems.jsonl"
     refuse_wrong_kinds(problems, records.read_complete_rows(problems), PROBLEM_FIELDS)
-    suite = directory / "suite.toml"
-    solvers = read_toml(suite).get("solver", []) if suite.is_file() else []
-    if not (isinstance(solvers, list) and all(isinstance(entry, dict) for entry in solvers)):
-        raise InputError.one(suite, "solver", solvers, "tables [[solver]]")
-    if not all(isinstance(entry.get("name"), str) for entry in solvers):
-        raise InputError.one(suite, "solver.name", None, "must be a text")

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from harness.planning.plan import expand
-from harness.planning.suite import RandomCases, validated
+from harness.planning.suite import RandomCases, read_written
 from harness.results import records
 from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
@@ -24,7 +24,6 @@ from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
 from problems.errors import Fault, InputError
 from problems.input.validation import validation_faults
-from problems.scene import read_toml
 
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
 from .reference_problem import ReferenceProblem, reference_problem
@@ -143,7 +142,7 @@ def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
         why = "is missing, so that nobody knows which rows there should be: run again"
         yield Finding(path.name, Judgement("cannot_be_judged"), LIMIT_MM, why)
     else:
-        for measurement in expand(validated(read_toml(path), path)):
+        for measurement in expand(read_written(path)):
             if measurement.gated and measurement.key not in rows:
                 why = "never measured: the run did not end"
                 yield Finding(measurement.key, Judgement("no_answer"), measurement.limit_mm, why)
