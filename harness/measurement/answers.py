@@ -121,8 +121,8 @@ def _plain(details: object) -> dict[str, Any]:
         text = to_line(details)
         if len(text) > LARGEST_DETAILS:
             return {"dropped": f"{len(text)} characters"}
-        text.encode()
         plain: dict[str, Any] = json.loads(text, parse_int=_bounded)
+        json.dumps(plain, ensure_ascii=False).encode()  # no lone surrogates
     except Exception as error:
         raise Refused(f"details is not JSON: {error_text(error)}") from error
     return plain
