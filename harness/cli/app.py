@@ -1,5 +1,4 @@
-"""The command line: run, report, gate, list, check; `series` is in series.py, the commands for one scene in
-scene.py.
+"""The command line: run, report, gate, list; the other commands are in check.py, series.py and scene.py.
 
 Modules that are slow to import are imported inside the commands.
 """
@@ -15,12 +14,14 @@ import typer
 
 from harness.terminal.console import Plugin, ReferenceLimit, Scheduler, error_reporting, option
 
+from . import check as check_command
 from . import scene as scene_commands
 from . import series as series_command
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
+app.add_typer(check_command.app)
 app.add_typer(scene_commands.app)
 app.add_typer(series_command.app)
 
@@ -214,38 +215,6 @@ def list_(what: Listed) -> None:
         from .listing import listing
 
         console.print(listing(what.value))
-
-
-@app.command()
-def check(
-    solver: Annotated[list[str] | None, option("NAME", "A solver by name. Repeatable.")] = None,
-    plugin: Plugin = None,
-    time_limit: Annotated[
-        float, option("SECONDS", "Time limit for each test problem in each form.", min=0.001)
-    ] = 60.0,
-    memory_limit: Annotated[
-        int, option("MIB", "Memory limit, over all processes of the solver.", min=1)
-    ] = 8192,
-) -> None:
-    """Test solvers on small problems with known answers, and say what is wrong with them.
-
-    Each solver runs in a process of its own, stopped at its time or memory limit.
-
-    \b
-    Examples:
-      python -m harness check --plugin mine.py
-      python -m harness check --solver ipm --solver gi
-
-    \b
-    Exit codes: 0 nothing found, 1 faults found, 2 wrong usage or bad input.
-    """
-    with error_reporting(interrupted="Interrupted.") as console:
-        from harness.conformance.isolated import run as run_checks
-        from solvers.registry import modules
-
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        names = solver or ([plugin.stem] if plugin else list(modules()))
-        raise typer.Exit(run_checks(names, plugin, time_limit, memory_limit, console))
 
 
 def main() -> None:
