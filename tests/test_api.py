@@ -31,6 +31,7 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from problems.model.joint import Joint
 from solvers.registry import modules
 
@@ -210,3 +211,12 @@ def test_a_series_of_random_gaps_by_an_object() -> None:
     first = cases.load(0)
     assert prepared(scene).assembly.m == len(first.g)
     np.testing.assert_array_equal(first.f, load_case(scene).f)
+
+
+def test_the_callers_loads_stay_writable() -> None:
+    problem = in_form(make_prepared(1, 6), "primal")
+    f, g = np.ones(problem.assembly.n), np.ones(problem.assembly.m)
+    (load,) = problem.loads([LoadCase(f, g)])
+    assert not load.f.flags.writeable
+    assert f.flags.writeable
+    assert g.flags.writeable

@@ -121,7 +121,8 @@ def stacked(cases: Sequence[LoadCase]) -> LoadCase:
 
 
 def read_only(load: LoadCase) -> LoadCase:
-    """The load case, its arrays protected against a solver that writes."""
-    for array in (load.f, load.g, load.p):
-        array.flags.writeable = False
-    return load
+    """The load case as read-only views: a solver cannot write, and the caller's own arrays stay writable."""
+    views = [array.view() for array in (load.f, load.g, load.p)]
+    for view in views:
+        view.flags.writeable = False
+    return LoadCase(*views)
