@@ -50,18 +50,26 @@ class Plate:
         return self.young / (2 * (1 + self.poisson))
 
     def stiffness(self) -> sp.csr_array:
-        """(size, size), N/mm and N: the bending stiffness of the free plate."""
+        """(size, size), N/mm and N: the bending stiffness of the free plate.
+
+        All terms have the same nonzero entries, those of nodes of a common element, so that their sum is
+        formed on the values alone.
+        """
         X, Y = line_matrices(self.x), line_matrices(self.y)
-        nu = self.poisson
-        return (
-            self.rigidity
-            * (
-                sp.kron(Y.M, X.H)
-                + sp.kron(Y.H, X.M)
-                + nu * (sp.kron(Y.B, X.B.T) + sp.kron(Y.B.T, X.B))
-                + 2 * (1 - nu) * sp.kron(Y.G, X.G)
-            ).tocsr()
+        nu, outer = self.poisson, np.outer
+        x_B, y_B = X.B.data, Y.B.data
+        x_Bt, y_Bt = (sp.csr_array(B.T).data for B in (X.B, Y.B))
+        values = self.rigidity * (
+            outer(Y.M.data, X.H.data)
+            + outer(Y.H.data, X.M.data)
+            + nu * (outer(y_B, x_Bt) + outer(y_Bt, x_B))
+            + 2 * (1 - nu) * outer(Y.G.data, X.G.data)
         )
+        width = X.M.shape[0]
+        columns = Y.M.indices[:, None] * width + X.M.indices
+        rows = _row_numbers(Y.M)[:, None] * width + _row_numbers(X.M)
+        entries = (values.ravel(), (rows.ravel(), columns.ravel()))
+        return sp.csr_array(sp.coo_array(entries, shape=(self.size, self.size)))
 
     def evaluate(self, x: float, y: float, dx: int = 0, dy: int = 0) -> sp.csr_array:
         """Row vector (1, size) that gives the deflection, or a derivative of it, at a point."""
@@ -87,3 +95,8 @@ class Plate:
     def deflection_dofs(self, line: int) -> np.ndarray:
         """The nx deflections on the grid line y[line], in order of ascending x."""
         return 4 * len(self.x) * line + 2 * np.arange(len(self.x))
+
+
+def _row_numbers(M: sp.csr_array) -> np.ndarray:
+    """The row of each stored entry."""
+    return np.repeat(np.arange(M.shape[0], dtype=M.indices.dtype), np.diff(M.indptr))
