@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Vector
+from problems.forms.compliance import AnyQ, Compliance
 
 from .base import Status
 
 EPS = float(np.finfo(float).eps)
 
 
-def kkt_status(Q: Matrix, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
+def kkt_status(Q: AnyQ, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
     """Status and KKT residual max(max(−y), max_{λ>0} |y|), mm, of λ ≥ 0 with y = Qλ − p.
 
-    "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate".
+    "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate". If Q is given by
+    its products, |Qλ| replaces |Q|λ.
     """
     residual = max(float((-y).max(initial=0.0)), float(abs(y[lam > 0]).max(initial=0.0)))
     if residual <= tolerance:
         return "solved", residual
-    rounding = 4 * EPS * float((abs(p) + abs(Q) @ lam).max(initial=0.0))
+    size = abs(y + p) if isinstance(Q, Compliance) else abs(Q) @ lam
+    rounding = 4 * EPS * float((abs(p) + size).max(initial=0.0))
     return "solved" if residual <= rounding else "inaccurate", residual

@@ -120,10 +120,10 @@ def test_a_strip_with_random_gaps_in_blocks_of_any_size(tmp_path: Path) -> None:
     """Sweeps settle all of them, as NNLS does, whatever was solved before."""
     data, cases, loads = strip_loads(tmp_path, 24)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
-    at_once = BatchedSweeps(data.Q, M, alone)(loads, TOLERANCE)
-    in_threes = BatchedSweeps(data.Q, M, alone)
+    at_once = BatchedSweeps(data.Q, np.diag(data.Q), M, alone)(loads, TOLERANCE)
+    in_threes = BatchedSweeps(data.Q, np.diag(data.Q), M, alone)
     three = [answer for k in range(0, 24, 3) for answer in in_threes(loads[k : k + 3], TOLERANCE)]
-    backwards = BatchedSweeps(data.Q, M, alone)(loads[::-1], TOLERANCE)[::-1]
+    backwards = BatchedSweeps(data.Q, np.diag(data.Q), M, alone)(loads[::-1], TOLERANCE)[::-1]
     closed = set()
     for case, *answers in zip(cases, at_once, three, backwards, strict=True):
         x, lam = solve_by_nnls(data, case)
@@ -142,7 +142,7 @@ def test_contacts_that_all_open_or_all_close(tmp_path: Path) -> None:
     closed = LoadCase(loads[0].f, loads[0].g, data.Q @ spread)
     opened = LoadCase(loads[0].f, loads[0].g, -spread)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
-    shut, free = BatchedSweeps(data.Q, M, alone)([closed, opened], TOLERANCE)
+    shut, free = BatchedSweeps(data.Q, np.diag(data.Q), M, alone)([closed, opened], TOLERANCE)
     np.testing.assert_allclose(shut.lam, spread, rtol=1e-6)
     assert free.lam is not None
     assert not free.lam.any()
@@ -177,7 +177,7 @@ def test_a_near_case_is_where_the_next_one_begins() -> None:
     closed = solve_by_nnls(data, LoadCase(first.f, first.g))[1] > 0
     change = data.Q @ np.where(closed, 1.0, 0.0)  # N more on each closed contact
     second = LoadCase(first.f, first.g, first.p + change)
-    batch = BatchedSweeps(data.Q, banded_inverse(data.Q, None), alone)
+    batch = BatchedSweeps(data.Q, np.diag(data.Q), banded_inverse(data.Q, None), alone)
     one, two = (batch([load], TOLERANCE)[0] for load in (first, second))
     assert one.lam is not None
     assert two.iterations == 1
@@ -197,7 +197,7 @@ def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
         return Answer("solved", np.zeros(45))
 
     monkeypatch.setattr("solvers.active_set.batched.MAX_SWEEPS", 4)  # not enough to be done, but for the set
-    batch = BatchedSweeps(data.Q, M, told)
+    batch = BatchedSweeps(data.Q, np.diag(data.Q), M, told)
     batch(loads[:1], TOLERANCE)
     starts.clear()
     batch.use_sweeps = True
@@ -212,13 +212,13 @@ def test_an_answer_is_worth_what_its_own_forces_say(tmp_path: Path) -> None:
     """A force below zero is cut off, and the gaps are looked at again."""
     data, _, loads = strip_loads(tmp_path, 1)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
-    batch = BatchedSweeps(data.Q, M, alone)
+    batch = BatchedSweeps(data.Q, np.diag(data.Q), M, alone)
     batch(loads, TOLERANCE)
     (case,) = batch.last
     lam = case.trial.lam.copy()
     lam[case.C.argmax()] = -1e-3
     case.trial = TrialSolution(lam, case.trial.y, 0.0)
-    answer = batch._answer(case, loads[0], TOLERANCE)
+    answer = batch.answer(case, loads[0], TOLERANCE)
     assert answer.status == "inaccurate"
     assert answer.lam is not None
     assert answer.lam.min() == 0

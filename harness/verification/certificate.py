@@ -8,11 +8,14 @@ so ‖e‖_K ≤ ‖r‖_{K⁻¹} + √(sᵀλ), and with 0 < κ ≤ λmin(K)
 
     max|e_i| ≤ ‖e‖₂ ≤ (‖r‖₂/√κ + √(sᵀλ)) / √κ.
 
+Where the unknowns have mixed units, the same is done in units D_i of each, powers of two: with r replaced by Dr,
+κ ≤ λmin(DKD) and e = Dẽ, so that |e_i| ≤ D_i ‖ẽ‖₂.
+
 Nothing is assumed about the active set: weakly active contacts (λ_i = s_i = 0) need no special treatment.
 With enclosures of r and s, and x, λ as sums of two float64, both terms are far below the rounding of x.
 
 Where reading has altered a user's numbers, the bound is for the given problem: r and s are enclosed for its
-K + ΔK, A + ΔA, f + Δf, g + Δg, and κ − ‖ΔK‖₂ replaces κ. K + ΔK need not be symmetric: all this holds with
+K + ΔK, A + ΔA, f + Δf, g + Δg, and κ − ‖DΔKD‖₂ replaces κ. K + ΔK need not be symmetric: all this holds with
 ‖e‖²_K = eᵀ(K + ΔK)e, and the λmin that counts is that of its symmetric part.
 """
 
@@ -35,7 +38,8 @@ MAX_REPAIRS = 20
 
 @dataclass(frozen=True)
 class Certificate:
-    """x (n,) feasible, λ (m,) ≥ 0, max|x.hi − x*| ≤ bound_mm, and the contacts proven closed or open.
+    """x (n,) feasible, λ (m,) ≥ 0, and the contacts proven closed or open; max|x.hi − x*| ≤ bound_mm over the
+    displacements that are asked for.
 
     bound_mm is infinite, never NaN, where nothing can be proven.
     """
@@ -55,26 +59,32 @@ def certify(
     lam: DoubleDouble,
     active: NDArray[np.bool_],
     kappa: float,
+    units: Vector | float = 1.0,
 ) -> Certificate:
-    """Make x feasible and λ ≥ 0 by minimal changes, and bound the remaining error. kappa : κ, N/mm."""
+    """Make x feasible and λ ≥ 0 by minimal changes, and bound the remaining error.
+
+    kappa : κ, N/mm, or without a unit if D balances K. units : D (n,), powers of two.
+    """
+    units = np.broadcast_to(units, assembly.n)
     negative = lam.hi < 0
     lam = DoubleDouble(np.where(negative, 0.0, lam.hi), np.where(negative, 0.0, lam.lo))
     x, s, feasible = _repaired(assembly, load.g, x, active)
     r = forces(assembly, load.f, x, lam)
     if assembly.altered:
-        kappa = kappa * (1 - 2 * U) - 1.01 * assembly.altered.norm_K
+        kappa = kappa * (1 - 2 * U) - 1.01 * float(units.max()) ** 2 * assembly.altered.norm_K
     undecided = np.zeros(assembly.m, dtype=bool)
     if not (feasible and kappa > 0):
         return Certificate(x, lam, np.inf, undecided, undecided)
     inflation = 1 + 4 * (assembly.n + 2) * U  # for rounding in sums of that many positive terms
-    norm = float(length(abs(r.value) + r.error)) * inflation
+    norm = float(length(units * (abs(r.value) + r.error))) * inflation
     opening, pressing = s.value + s.error, lam.hi + abs(lam.lo)
     slack = float(opening @ pressing) * inflation + ETA * np.count_nonzero(opening * (pressing > 0))
     error = (norm / np.sqrt(kappa) + np.sqrt(slack)) / np.sqrt(kappa) * inflation
-    bound = (error + float(abs(x.lo).max(initial=0))) * inflation
+    of_each = assembly.at_junction(units * error + abs(x.lo))
+    bound = float(of_each.max(initial=0)) * inflation
     if not np.isfinite(bound):
         return Certificate(x, lam, np.inf, undecided, undecided)
-    decided = (undecided, undecided) if assembly.altered else _proven(assembly, lam, s, r, error)
+    decided = (undecided, undecided) if assembly.altered else _proven(assembly, lam, s, r, error, units)
     return Certificate(x, lam, bound, *decided)
 
 
@@ -98,18 +108,20 @@ def _repaired(
 
 
 def _proven(
-    assembly: Assembly, lam: DoubleDouble, s: Enclosure, r: Enclosure, error: float
+    assembly: Assembly, lam: DoubleDouble, s: Enclosure, r: Enclosure, error: float, units: Vector
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Contacts proven to be closed with a force, and proven to be open.
 
-    |s* − s| ≤ |a|₂ ‖e‖₂. From A(λ* − λ) = Ke + r, in a row i of A with a single entry a
-    |λ* − λ| ≤ (‖K_i‖₂ ‖e‖₂ + |r_i|)/|a|, where ‖K_i‖₂ ≤ √(K_ii · trace K) as K is positive definite.
+    |s* − s| ≤ |Da|₂ ‖ẽ‖₂. From A(λ* − λ) = Ke + r, in a row i of A with a single entry a
+    |λ* − λ| ≤ (‖K_i D‖₂ ‖ẽ‖₂ + |r_i|)/|a|, where ‖K_i D‖₂ ≤ √(K_ii · trace DKD) as K is positive definite.
     """
     A = sp.csc_array(assembly.A)
-    norms = np.sqrt(np.asarray((A * A).sum(axis=0)).ravel())
+    in_units = sp.csc_array(sp.diags_array(units) @ A)
+    norms = np.sqrt(np.asarray((in_units * in_units).sum(axis=0)).ravel())
     is_open = s.value - s.error > 1.01 * norms * error
     diagonal = assembly.diagonal_K()
-    trace = np.concatenate([np.full(K.shape[0], K.diagonal().sum()) for K in assembly.blocks])
+    scaled = diagonal * units**2
+    trace = np.concatenate([np.full(rows.stop - rows.start, scaled[rows].sum()) for rows in assembly.slices])
     rows = sp.csr_array(A)
     single = np.flatnonzero(np.diff(rows.indptr) == 1)
     entry = rows.indptr[single]

@@ -22,6 +22,9 @@ from problems.forms.compliance import AnyQ, dense_submatrix, submatrix
 from .interior_point import interior_contact_set
 
 Stop = Callable[[], bool]
+#: A set S → λ, y = Qλ − p = g − Aᵀx outside S, and the rounding of both.
+Solution = Callable[[NDArray[np.bool_]], tuple[Vector, Vector, float, float]]
+Rescue = Callable[[], NDArray[np.bool_] | None]
 
 ROUNDING = 10  # times the observed rounding
 SMALL_PROBLEM = 100  # contacts, up to which the first set is p > 0
@@ -48,6 +51,42 @@ def contact_set(
     return _pivoted(Q, p, _first_set(Q, p, stop) if start is None else start, stop)[0]
 
 
+def pivoted(at: Solution, S: NDArray[np.bool_], rescue: Rescue, stop: Stop) -> tuple[NDArray[np.bool_], Vector]:
+    """The closed contacts and λ, by the passes above, from a first set S.
+
+    rescue : a set from another method, asked for once; None if it has none.
+    """
+    m = len(S)
+    fewest, full_exchanges = m + 1, FULL_EXCHANGES
+    visited: set[bytes] = set()
+    rescued = False
+    while True:
+        lam, y, lam_rounding, y_rounding = at(S)
+        wrong = np.where(S, lam < -ROUNDING * lam_rounding, y < -ROUNDING * y_rounding)
+        count = int(wrong.sum())
+        if count == 0 or stop():
+            return S, lam
+        if count < fewest:
+            fewest, full_exchanges = count, FULL_EXCHANGES
+            visited.clear()
+        elif full_exchanges:
+            full_exchanges -= 1
+        elif S.tobytes() in visited or len(visited) == SINGLE_EXCHANGES:
+            another = None if rescued else rescue()
+            if another is None:
+                return S, lam
+            S, rescued = another, True
+            fewest, full_exchanges = m + 1, FULL_EXCHANGES
+            visited.clear()
+            continue
+        else:
+            visited.add(S.tobytes())
+            last = np.flatnonzero(wrong)[-1]
+            wrong = np.zeros(m, dtype=bool)
+            wrong[last] = True
+        S = S ^ wrong
+
+
 def _first_set(Q: AnyQ, p: Vector, stop: Stop) -> NDArray[np.bool_]:
     """The contacts closed if every other one is left out, and those that then overlap; p > 0 if m is small.
 
@@ -63,34 +102,7 @@ def _first_set(Q: AnyQ, p: Vector, stop: Stop) -> NDArray[np.bool_]:
 
 def _pivoted(Q: AnyQ, p: Vector, S: NDArray[np.bool_], stop: Stop) -> tuple[NDArray[np.bool_], Vector]:
     """The closed contacts and λ, from a first set S."""
-    m = len(p)
-    fewest, full_exchanges = m + 1, FULL_EXCHANGES
-    visited: set[bytes] = set()
-    interior = False  # whether the interior point has had its turn
-    while True:
-        lam, y, lam_rounding, y_rounding = _solve_for(Q, p, S)
-        wrong = np.where(S, lam < -ROUNDING * lam_rounding, y < -ROUNDING * y_rounding)
-        count = int(wrong.sum())
-        if count == 0 or stop():
-            return S, lam
-        if count < fewest:
-            fewest, full_exchanges = count, FULL_EXCHANGES
-            visited.clear()
-        elif full_exchanges:
-            full_exchanges -= 1
-        elif S.tobytes() in visited or len(visited) == SINGLE_EXCHANGES:
-            if interior:
-                return S, lam
-            S, interior = interior_contact_set(Q, p, stop), True
-            fewest, full_exchanges = m + 1, FULL_EXCHANGES
-            visited.clear()
-            continue
-        else:
-            visited.add(S.tobytes())
-            last = np.flatnonzero(wrong)[-1]
-            wrong = np.zeros(m, dtype=bool)
-            wrong[last] = True
-        S = S ^ wrong
+    return pivoted(lambda C: _solve_for(Q, p, C), S, lambda: interior_contact_set(Q, p, stop), stop)
 
 
 def _solve_for(Q: AnyQ, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vector, float, float]:

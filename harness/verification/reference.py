@@ -14,6 +14,7 @@ refinement repeated until λ_C ≥ 0 and g − Aᵀx ≥ 0 hold for the refined 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,14 +27,16 @@ from numpy.typing import NDArray
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.compliance import dense_submatrix
 from problems.forms.prepared import Prepared
+from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.scene import MadeScene, Scene
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
+from . import augmented, sparse_definite
 from .certificate import certify
 from .definite import smallest_eigenvalue
 from .exact_residual import DoubleDouble, forces, gaps
-from .principal_pivoting import contact_set
+from .principal_pivoting import Stop, contact_set
 
 MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
@@ -96,8 +99,15 @@ def reference(prepared: Prepared, load: LoadCase, limit_s: float | None = None) 
     return Reference(x, lam, active, facts["bound_mm"], facts["route"])
 
 
+def units_of(prepared: Prepared) -> Vector | float:
+    """D (n,), the units in which the error is bounded: balanced for a sparse K, mm for a condensed one."""
+    return (
+        sparse_definite.balanced_units(prepared.assembly) if isinstance(prepared, SparsePrepared) else 1.0
+    )
+
+
 def proven_lambda_min(prepared: Prepared) -> float:
-    """κ ≤ λmin(K), from the cache if it was proven before for this assembly."""
+    """κ ≤ λmin(DKD), from the cache if it was proven before for this assembly."""
     if prepared.key is None:
         return _proven_lambda_min(prepared)
     key = cache.digest("lambda_min", prepared.key, _code())
@@ -106,6 +116,8 @@ def proven_lambda_min(prepared: Prepared) -> float:
 
 
 def _proven_lambda_min(prepared: Prepared) -> float:
+    if isinstance(prepared, SparsePrepared):
+        return sparse_definite.smallest_eigenvalue(prepared, units_of(prepared))
     blocks, estimate = prepared.assembly.blocks, prepared.facts.get("lambda_min")
     if not isinstance(estimate, float):
         estimate = min(float(np.linalg.eigvalsh(_dense(K))[0]) for K in blocks)
@@ -122,14 +134,21 @@ def _code() -> str:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def refined_active_set(prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
-    """The active set, refined and certified."""
+def refined_active_set(
+    prepared: Prepared,
+    load: LoadCase,
+    limit_s: float | None = None,
+    start: NDArray[np.bool_] | None = None,
+) -> Reference:
+    """The active set, refined and certified. start : a first guess of it; the proof does not depend on it."""
     p = prepared.dual_load(load)
     active = np.zeros(len(p), dtype=bool)
     limit_s = default_limit_s(len(p)) if limit_s is None else limit_s
     end = time.monotonic() + limit_s
-    if (p > 0).any():  # else Q is not needed
-        active = contact_set(prepared.compliance, p, stop=lambda: time.monotonic() > end)
+    if start is not None:
+        active = start
+    elif (p > 0).any():  # else Q is not needed
+        active = _contact_set(prepared, load, p, stop=lambda: time.monotonic() > end)
     stopped = time.monotonic() > end
     for _ in range(MAX_SET_CORRECTIONS):
         x, lam = _refine(prepared, load, active)
@@ -139,7 +158,8 @@ def refined_active_set(prepared: Prepared, load: LoadCase, limit_s: float | None
         if not wrong.any():
             break
         active = active ^ wrong
-    proof = certify(prepared.assembly, load, x, lam, active, proven_lambda_min(prepared))
+    kappa, units = proven_lambda_min(prepared), units_of(prepared)
+    proof = certify(prepared.assembly, load, x, lam, active, kappa, units)
     undecided = int((~(proof.closed | proof.open)).sum())
     if not np.isfinite(proof.bound_mm):
         route = UNPROVEN
@@ -152,28 +172,27 @@ def refined_active_set(prepared: Prepared, load: LoadCase, limit_s: float | None
     return Reference(proof.x.hi, proof.lam.hi, active, proof.bound_mm, route)
 
 
+def _contact_set(prepared: Prepared, load: LoadCase, p: Vector, stop: Stop) -> NDArray[np.bool_]:
+    if isinstance(prepared, SparsePrepared):
+        return augmented.contact_set(prepared, load, p > 0, stop)
+    return contact_set(prepared.compliance, p, stop=stop)
+
+
 def _refine(
     prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]
 ) -> tuple[DoubleDouble, DoubleDouble]:
     assembly = prepared.assembly
-    rows = np.flatnonzero(active)
-    A_C = assembly.A[:, rows]
-    factor = None
-    if rows.size:
-        block = dense_submatrix(prepared.compliance, rows)
-        factor = sla.cho_factor(block, lower=True, overwrite_a=True)
+    if isinstance(prepared, SparsePrepared):
+        solve = augmented.ContactSystem(prepared, active).solve
+    else:
+        solve = _dense_system(prepared, np.flatnonzero(active))
     x = DoubleDouble(np.zeros(assembly.n), np.zeros(assembly.n))
     lam = DoubleDouble(np.zeros(assembly.m), np.zeros(assembly.m))
     force, gap = load.f, load.g  # the residuals at zero
     before = np.inf
     for _ in range(MAX_REFINEMENTS):
-        dx = prepared.solve_K(force)
-        if factor is not None:
-            dlam = np.zeros(assembly.m)
-            dlam[rows] = sla.cho_solve(factor, A_C.T @ dx - gap[rows], check_finite=False)
-            dx = dx - prepared.solve_K(assembly.A @ dlam)
-            lam = lam.plus(dlam)
-        x = x.plus(dx)
+        dx, dlam = solve(force, gap)
+        x, lam = x.plus(dx), lam.plus(dlam)
         step = float(abs(dx).max(initial=0))
         if step >= before / 2 or step <= ENOUGH * float(abs(x.hi).max(initial=0)):
             break
@@ -181,3 +200,23 @@ def _refine(
         force = forces(assembly, load.f, x, lam).value
         gap = gaps(assembly, load.g, x).value
     return x, lam
+
+
+def _dense_system(
+    prepared: Prepared, rows: NDArray[np.intp]
+) -> Callable[[Vector, Vector], tuple[Vector, Vector]]:
+    """(force, gap) → x and λ of the conditions for the closed contacts `rows`, through K and Q_CC."""
+    assembly = prepared.assembly
+    A_C, factor = assembly.A[:, rows], None
+    if rows.size:
+        block = dense_submatrix(prepared.compliance, rows)
+        factor = sla.cho_factor(block, lower=True, overwrite_a=True)
+
+    def solve(force: Vector, gap: Vector) -> tuple[Vector, Vector]:
+        x, lam = prepared.solve_K(force), np.zeros(assembly.m)
+        if factor is not None:
+            lam[rows] = sla.cho_solve(factor, A_C.T @ x - gap[rows], check_finite=False)
+            x = x - prepared.solve_K(assembly.A @ lam)
+        return x, lam
+
+    return solve

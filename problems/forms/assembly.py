@@ -28,6 +28,8 @@ class Assembly:
     nodes : (n, 2) coordinates of the unknowns in mm, or None if they are unknown.
     parts : a name for each block.
     altered : how far these, and a user's f and g, may be from what was given; None if nothing was altered.
+    junction : the unknowns that are asked for, displacements in mm; None if all are. The others, of a model
+        without condensation, are inner displacements, slopes and twists.
     """
 
     blocks: tuple[Matrix, ...]
@@ -35,6 +37,7 @@ class Assembly:
     nodes: Matrix | None = None
     parts: tuple[str, ...] = ()
     altered: Alteration | None = None
+    junction: NDArray[np.intp] | None = None
 
     @property
     def n(self) -> int:
@@ -43,6 +46,15 @@ class Assembly:
     @property
     def m(self) -> int:
         return int(self.A.shape[1])
+
+    @property
+    def asked(self) -> int:
+        """The number of displacements that are asked for."""
+        return self.n if self.junction is None else len(self.junction)
+
+    def at_junction(self, x: Matrix) -> Matrix:
+        """Of (n,) or (n, k), the rows that are asked for."""
+        return x if self.junction is None else x[self.junction]
 
     @property
     def slices(self) -> list[slice]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, get_args
 
-Form = Literal["primal", "dual"]
+Form = Literal["primal", "dual", "sparse"]
 FORMS: tuple[Form, ...] = get_args(Form)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +19,9 @@ import scipy.sparse as sp
 from .assembly import Assembly, LoadCase, Matrix, Vector
 from .names import Form
 from .prepared import Prepared
+
+#: Called with what is being made, and the fraction done.
+Progress = Callable[[str, float], None]
 
 
 class Problem(ABC):

@@ -16,8 +16,8 @@ from problems.storage.fingerprint import fingerprint
 from . import factorisation
 from .assembly import Assembly, Matrix
 from .prepared import Prepared
+from .problem import Progress
 
-Progress = Callable[[str, float], None]
 LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 SMALLEST_EIGENVALUE = 1e-300  # N/mm: below it K⁻¹ overflows
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from problems.errors import Fault, InputError
 from problems.forms.alteration import Alteration
-from problems.forms.assembly import Assembly, LoadCase, Matrix
+from problems.forms.assembly import Assembly, LoadCase
 
 from .bounded import LARGEST
 
@@ -22,12 +23,12 @@ SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
 
 
-def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
+def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembly, LoadCase]:
     """Read and check K, A, f, g.
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
         nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
-    K is split into its diagonal blocks. What does not fit into float64 is rounded, and K that is not quite
+    K is split into its diagonal blocks, dense unless they are to be `sparse`. What does not fit into float64 is rounded, and K that is not quite
     symmetric is replaced by (K + Kᵀ)/2; `Assembly.altered` bounds the differences. Raises InputError with all
     faults.
     """
@@ -37,10 +38,12 @@ def read_matrices(files: dict[str, Path]) -> tuple[Assembly, LoadCase]:
         where = {key: str(files["problem"]) for key in (*"KAfg", "nodes")}
     else:
         data = {key: _read_mtx(path, key) for key, path in files.items()}
-    return checked(data, where)
+    return checked(data, where, sparse)
 
 
-def checked(data: Mapping[str, Any], where: Mapping[str, str]) -> tuple[Assembly, LoadCase]:
+def checked(
+    data: Mapping[str, Any], where: Mapping[str, str], sparse: bool = False
+) -> tuple[Assembly, LoadCase]:
     """K, A (dense or sparse), f, g and perhaps nodes as an assembly and a load case.
 
     where : the file or the argument that each comes from. Raises InputError with all faults.
@@ -100,7 +103,10 @@ def checked(data: Mapping[str, Any], where: Mapping[str, str]) -> tuple[Assembly
     sums = (off_K.sum(1), off_A.sum(1), off_A.sum(0), off_f.sum(1), off_g.sum(1))
     above = 1 + 2 * max(n, m, 4) * U  # for rounding in these sums themselves
     altered = Alteration(*(above * np.asarray(each, dtype=float).ravel() for each in sums))
-    return _blocks(K, A, f, g, nodes, altered if altered else None)
+    blocks = tuple(K[a:b, a:b] for a, b in _ends_of_blocks(K))
+    names = tuple(f"part {k + 1}" for k in range(len(blocks)))
+    made = tuple(sp.csc_array(block) if sparse else block.toarray(order="F") for block in blocks)
+    return Assembly(made, sp.csc_array(A), nodes, names, altered if altered else None), LoadCase(f, g)
 
 
 def _rounding(given: Any, read: Any) -> sp.csr_array:
@@ -130,18 +136,13 @@ def _rounding(given: Any, read: Any) -> sp.csr_array:
     return off
 
 
-def _blocks(
-    K: sp.csr_array, A: sp.csr_array, f: Matrix, g: Matrix, nodes: Matrix | None, altered: Alteration | None
-) -> tuple[Assembly, LoadCase]:
-    """Split K into diagonal blocks; the unknowns of one block must be contiguous in x."""
+def _ends_of_blocks(K: sp.csr_array) -> Iterator[tuple[int, int]]:
+    """The unknowns of each diagonal block of K, which must be contiguous in x."""
     count, label = connected_components(K, directed=False)
     starts = np.flatnonzero(np.diff(label, prepend=-1))
     if len(starts) != count:  # interleaved blocks: a single dense block is always valid
         starts = np.array([0])
-    ends = np.append(starts[1:], K.shape[0])
-    blocks = tuple(K[a:b, a:b].toarray(order="F") for a, b in zip(starts, ends, strict=True))
-    names = tuple(f"part {k + 1}" for k in range(len(blocks)))
-    return Assembly(blocks, sp.csc_array(A), nodes, names, altered), LoadCase(f, g)
+    yield from itertools.pairwise([*starts.tolist(), K.shape[0]])
 
 
 def _read_npz(path: Path) -> dict[str, Any]:

@@ -15,17 +15,16 @@ soft parts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import blas
-
 from problems.forms.assembly import Matrix, Vector
+from problems.forms.compliance import AnyQ
 from solvers.base import Answer, LoadCase
 from solvers.kkt import EPS, kkt_status
 from solvers.linear_algebra.banded_inverse import BandedInverse, BandFactor
-from solvers.linear_algebra.product import product
+from solvers.linear_algebra.product import products
 
 from .block_pivoting import block_pivoting, wrong_signs
 from .bordered_factor import Set
@@ -43,12 +42,13 @@ SolveOne = Callable[[Set | None, Vector, float], Answer]
 
 @dataclass
 class Case:
-    """A load case during the sweeps, in the order of the banded inverse.
+    """A load case during the sweeps, its vectors in the order of the banded inverse.
 
-    p : (m,) mm. C : its contact set. trial : λ (m,) N and y = Qλ − p (m,) mm. factor : of M on the open set.
+    load : the case as it was given. p : (m,) mm. C : its contact set. trial : λ (m,) N and y = Qλ − p (m,) mm. factor : of M on the open set.
     settled : no sign is wrong, and |y_C| is far below the tolerance or within rounding.
     """
 
+    load: LoadCase
     p: Vector
     C: Set
     trial: TrialSolution
@@ -60,48 +60,89 @@ class Case:
 
 @dataclass
 class BatchedSweeps:
-    """Q (m, m), M ≈ Q⁻¹. last : the cases of the previous call, which warm-start the next ones.
+    """Q (m, m) or its products, its diagonal, M ≈ Q⁻¹. last : the cases of the previous call, which warm-start
+    the next ones.
 
     solve_one : for unsettled cases; for all cases, once most of a call's were unsettled or few contacts are
         closed, so that the small systems of each case are faster.
     """
 
-    Q: Matrix
+    Q: AnyQ
+    diagonal: Vector
     M: BandedInverse
     solve_one: SolveOne
+    max_sweeps: int = MAX_SWEEPS
     last: list[Case] = field(default_factory=list)
     use_sweeps: bool = True
 
     def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """An answer to each load. Iterations are products with Q, inner iterations sets tried with M."""
-        p = [load.p[self.M.order] for load in loads]
         if not self.last:
-            zero = np.zeros(len(self.Q))
-            unloaded = Case(zero, zero > 0, TrialSolution(zero, zero, 0.0))
-            self.last = self._sweep([_warm_started(unloaded, p[0])], tolerance)
-            self.use_sweeps = sweeps_pay(self.last)
+            self.last = [self.cold(loads[0], tolerance)]
+            self.use_sweeps = self.pay(self.last)
         if not self.use_sweeps:
             return [self.solve_one(None, load.p, tolerance) for load in loads]
-        self.last = self._sweep([_warm_started(nearest(self.last, each), each) for each in p], tolerance)
-        self.use_sweeps = sweeps_pay(self.last)
-        return [self._answer(case, load, tolerance) for case, load in zip(self.last, loads, strict=True)]
+        started = [_warm_started(nearest(self.last, p), load, p) for load, p in self._ordered(loads)]
+        self.last = self._sweep(started, tolerance)
+        self.use_sweeps = self.pay(self.last)
+        return [self.answer(case, load, tolerance) for case, load in zip(self.last, loads, strict=True)]
+
+    def cold(self, load: LoadCase, tolerance: float) -> Case:
+        """The case of a load from nothing; it may be unsettled."""
+        zero = np.zeros(len(load.p))
+        return self.warm(Case(load, zero, zero > 0, TrialSolution(zero, zero, 0.0)), load, tolerance)
+
+    def warm(self, solved: Case, load: LoadCase, tolerance: float) -> Case:
+        """The same from a solved case."""
+        ((_, p),) = self._ordered([load])
+        (case,) = self._sweep([_warm_started(solved, load, p)], tolerance)
+        return case
+
+    def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
+        """y = Qλ − p, (m, k) mm, of forces λ (m, k) for that many loads."""
+        return products(self.Q, lam) - np.column_stack([load.p for load in loads])
+
+    def settled(self, case: Case, tolerance: float, stagnating: bool) -> bool:
+        """Whether |y_C| is far below the tolerance or within rounding."""
+        rounding = case.trial.rounding
+        return rounding <= max(RESIDUAL_TARGET * tolerance, _rounding_bound(case.p, case.trial.y)) or (
+            stagnating and rounding <= tolerance
+        )
+
+    def pay(self, cases: Sequence[Case]) -> bool:
+        """Whether sweeps settle such cases, and faster than case by case."""
+        closed = np.mean([case.C.mean() for case in cases])
+        return 2 * sum(case.settled for case in cases) >= len(cases) and bool(closed >= MIN_CLOSED)
+
+    def _ordered(self, loads: Sequence[LoadCase]) -> Iterator[tuple[LoadCase, Vector]]:
+        """Each load and its p in the order of M."""
+        return ((load, load.p[self.M.order]) for load in loads)
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
-        order, compliance = self.M.order, np.diag(self.Q)[self.M.order]
+        order, compliance = self.M.order, self.diagonal[self.M.order]
         unsettled = cases
-        for _ in range(MAX_SWEEPS):
+        for _ in range(self.max_sweeps):
             lam = np.empty((len(order), len(unsettled)), order="F")
             for column, case in enumerate(unsettled):
                 lam[order, column] = _banded_step(case, self.M, compliance, tolerance)
-            Qlam = blas.dgemm(1.0, self.Q, lam)
+            y = self.gaps(lam, [case.load for case in unsettled])
             for column, case in enumerate(unsettled):
-                _update(case, lam[order, column], Qlam[order, column], compliance, tolerance)
+                self._update(case, lam[order, column], y[order, column], compliance, tolerance)
             unsettled = [case for case in unsettled if not case.settled]
             if not unsettled:
                 break
         return cases
 
-    def _answer(self, case: Case, load: LoadCase, tolerance: float) -> Answer:
+    def _update(self, case: Case, lam: Vector, y: Vector, compliance: Vector, tolerance: float) -> None:
+        """Take λ and y, and decide whether the case is settled."""
+        rounding = float(abs(y[case.C]).max(initial=0.0))
+        stagnating = rounding > case.trial.rounding / 2
+        case.trial, case.sweeps = TrialSolution(lam, y, rounding), case.sweeps + 1
+        if self.settled(case, tolerance, stagnating):
+            case.settled = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
+
+    def answer(self, case: Case, load: LoadCase, tolerance: float) -> Answer:
+        """The answer of a case; one that is unsettled is solved from its set."""
         order = self.M.order
         if not case.settled:
             C = np.zeros(len(order), dtype=bool)
@@ -110,7 +151,7 @@ class BatchedSweeps:
         lam, y = np.empty(len(order)), np.empty(len(order))
         lam[order], y[order] = np.maximum(case.trial.lam, 0.0), case.trial.y
         if (case.trial.lam < 0).any():
-            y = product(self.Q, lam) - load.p
+            y = self.gaps(lam[:, None], [load])[:, 0]
         # `kkt_status` bounds the same rounding by |Q|λ, which is slow to compute.
         status, residual = kkt_status(self.Q, load.p, lam, y, max(tolerance, _rounding_bound(load.p, y)))
         details = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
@@ -137,16 +178,10 @@ def nearest(cases: Sequence[Case], p: Vector) -> Case:
     return min(cases, key=lambda case: float(np.linalg.norm(case.p - p)))
 
 
-def sweeps_pay(cases: Sequence[Case]) -> bool:
-    """Whether sweeps settle such cases, and faster than case by case."""
-    closed = np.mean([case.C.mean() for case in cases])
-    return 2 * sum(case.settled for case in cases) >= len(cases) and bool(closed >= MIN_CLOSED)
-
-
-def _warm_started(solved: Case, p: Vector) -> Case:
+def _warm_started(solved: Case, load: LoadCase, p: Vector) -> Case:
     """A case that starts from the solution of another one."""
     y = solved.trial.y + solved.p - p
-    return Case(p, solved.C, TrialSolution(solved.trial.lam, y, float(abs(y).max())), solved.factor)
+    return Case(load, p, solved.C, TrialSolution(solved.trial.lam, y, float(abs(y).max())), solved.factor)
 
 
 def _banded_step(case: Case, M: BandedInverse, compliance: Vector, tolerance: float) -> Vector:
@@ -155,18 +190,6 @@ def _banded_step(case: Case, M: BandedInverse, compliance: Vector, tolerance: fl
     found = block_pivoting(banded.at, case.C, compliance, tolerance, SETS_PER_SWEEP)
     case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
     return found.trial.lam
-
-
-def _update(case: Case, lam: Vector, Qlam: Vector, compliance: Vector, tolerance: float) -> None:
-    """Take λ, and decide whether the case is settled."""
-    y = Qlam - case.p
-    rounding = float(abs(y[case.C]).max(initial=0.0))
-    stagnating = rounding > case.trial.rounding / 2
-    case.trial, case.sweeps = TrialSolution(lam, y, rounding), case.sweeps + 1
-    if rounding <= max(RESIDUAL_TARGET * tolerance, _rounding_bound(case.p, y)) or (
-        stagnating and rounding <= tolerance
-    ):
-        case.settled = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
 
 
 def _rounding_bound(p: Vector, y: Vector) -> float:

@@ -10,6 +10,7 @@ with themselves: positive definite for any window, and equal to Q⁻¹ if a wind
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
 from problems.forms.assembly import Matrix, Vector
+
+Contacts = NDArray[np.intp]
 
 WINDOW_LINES = 4  # lines of contacts across the joint in a window, before the current one
 DEFAULT_LINE = 16  # contacts per line if coordinates are unknown
@@ -73,20 +76,47 @@ def banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse:
 
     Raises LinAlgError if Q is not positive definite.
     """
-    m = len(Q)
-    order, across = order_along_joint(nodes, m)
+    return of_windows(Windows.of(nodes, len(Q)), lambda window: Q.T[np.ix_(window, window)].T)
+
+
+def of_windows(windows: Windows, Q_WW: Callable[[Contacts], Matrix]) -> BandedInverse:
+    """Q_WW : a window's principal submatrix of Q as a new array, stored by columns; it is overwritten.
+
+    Raises LinAlgError if one is not positive definite.
+    """
+    m, across = len(windows.order), windows.across
     band = np.zeros((min((WINDOW_LINES + 1) * across, m) + 1, m), order="F")
-    for start in range(0, m, across):
-        first, stop = max(start - WINDOW_LINES * across, 0), min(start + across, m)
-        window = order[first:stop]
-        L, info = lapack.dpotrf(Q.T[np.ix_(window, window)].T, lower=1, overwrite_a=1)
+    for first, start, stop in windows.ranges():
+        L, info = lapack.dpotrf(Q_WW(windows.order[first:stop]), lower=1, overwrite_a=1)
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} of Q_WW is not positive definite")
         rows = lapack.dtrtri(L, lower=1)[0][start - first :]
         added = rows.T @ rows
         for j in range(stop - first):
             band[: stop - first - j, first + j] += added[j:, j]
-    return BandedInverse(order, band)
+    return BandedInverse(windows.order, band)
+
+
+@dataclass(frozen=True)
+class Windows:
+    """order : (m,) the contacts along the joint. across : contacts per line across it."""
+
+    order: Contacts
+    across: int
+
+    @classmethod
+    def of(cls, nodes: Matrix | None, m: int) -> Windows:
+        return cls(*order_along_joint(nodes, m))
+
+    def ranges(self) -> Iterator[tuple[int, int, int]]:
+        """For each line of contacts, in the order: where its window begins, where it begins and ends."""
+        m, across = len(self.order), self.across
+        for start in range(0, m, across):
+            yield max(start - WINDOW_LINES * across, 0), start, min(start + across, m)
+
+    def contacts(self) -> list[Contacts]:
+        """The contacts of each window."""
+        return [self.order[first:stop] for first, _, stop in self.ranges()]
 
 
 def order_along_joint(nodes: Matrix | None, m: int) -> tuple[NDArray[np.intp], int]:

@@ -12,7 +12,7 @@ most of the quarter are closed, it is all contacts that overlap.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -24,11 +24,14 @@ from solvers.active_set.bordered_factor import Set
 from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.nested import Cells, cells_of, representatives
 from solvers.active_set.solve import solve_from
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.base import Answer, Batch, Form, LoadCase, Problem, Solver, WarmStart, failed
 from solvers.interior_point.identify import identified_set
 from solvers.linear_algebra.banded_inverse import banded_inverse
 from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
+
+if TYPE_CHECKING:
+    from solvers.active_set.sparse_newton import SparseState
 
 WIDTHS = (4, 2)  # of the cells, in contacts
 COARSE_PASSES = 4  # on each subset, which only needs an approximate solution
@@ -41,6 +44,9 @@ class _Ready:
     inverse: Matrix
     cells: tuple[Cells, ...]
     start: WarmStart | None = None
+
+
+State: TypeAlias = "_Ready | SparseState | Answer"
 
 
 class ActiveSetNewton(Solver):
@@ -58,7 +64,7 @@ class ActiveSetNewton(Solver):
     max_sets : limit on the contact sets tried.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+    forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
 
     def __init__(self, *, nested: bool = True, max_sets: int = 1000) -> None:
         if max_sets < 1:
@@ -66,8 +72,12 @@ class ActiveSetNewton(Solver):
         self.nested = nested
         self.max_sets = max_sets
 
-    def prepare(self, data: Problem) -> _Ready | Answer:
-        """Q⁻¹, and the cells; a failed answer if Q is not positive definite."""
+    def prepare(self, data: Problem) -> State:
+        """Q⁻¹, and the cells; a failed answer if Q, or K in the sparse form, is not positive definite."""
+        if data.form == "sparse":
+            from solvers.active_set.sparse_newton import SparseState  # not in the other forms
+
+            return SparseState.of(data, self.max_sets)
         assembly = data.assembly
         widths = WIDTHS if self.nested else ()
         cells = tuple(cells_of(assembly.contact_nodes, assembly.m, width) for width in widths)
@@ -78,19 +88,21 @@ class ActiveSetNewton(Solver):
 
     def update(
         self,
-        state: _Ready | Answer,
-        ready: _Ready | Answer,
+        state: State,
+        ready: State,
         load: LoadCase,
         tolerance: float,
         start: WarmStart,
-    ) -> _Ready | Answer:
+    ) -> State:
         """The first guess comes from the warm start."""
         return state if isinstance(state, Answer) else replace(state, start=start)
 
-    def batched(self, state: _Ready | Answer) -> BatchedSweeps | None:
+    def batched(self, state: State) -> Batch | None:
         """Sweeps with a banded M ≈ Q⁻¹; unsettled cases are solved as in `solve`."""
         if isinstance(state, Answer):
             return None
+        if not isinstance(state, _Ready):
+            return state.batched()
         Q, nodes, inverse = state.problem.Q, state.problem.assembly.contact_nodes, state.inverse
 
         def solve_one(C: Set | None, p: Vector, tolerance: float) -> Answer:
@@ -99,12 +111,14 @@ class ActiveSetNewton(Solver):
             sets = ContactSets(Q, p, inverse)
             return self._settled(solve_from(C, sets, tolerance, self.max_sets), sets, tolerance)
 
-        return BatchedSweeps(Q, banded_inverse(Q, nodes), solve_one)
+        return BatchedSweeps(Q, np.diag(Q), banded_inverse(Q, nodes), solve_one)
 
-    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
+    def solve(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
             return ready
         try:
+            if not isinstance(ready, _Ready):
+                return ready.solve(load, tolerance)
             C, coarse = _first_guess(ready, load.p, tolerance)
             sets = ContactSets(ready.problem.Q, load.p, ready.inverse)
             answer = self._settled(solve_from(C, sets, tolerance, self.max_sets), sets, tolerance)

@@ -1,0 +1,32 @@
+"""The sparse form: min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ g over all N unknowns of the model, K̂ and B sparse.
+
+Nothing is condensed: x is û at the junction, and λ is that of the other forms. Needs K̂ and B, no factor.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from .assembly import Matrix
+from .names import Form
+from .primal import Primal
+from .sparse_prepared import SparsePrepared
+
+
+class Sparse(Primal):
+    """As the primal form, with sparse blocks of K."""
+
+    form: ClassVar[Form] = "sparse"
+    prepared: SparsePrepared
+
+    @property
+    def arrays(self) -> list[Matrix]:
+        blocks = [sp.csc_array(K) for K in self.assembly.blocks]
+        return [array for K in blocks for array in (K.data, K.indices, K.indptr)]
+
+    @property
+    def yardstick(self) -> None:
+        return None

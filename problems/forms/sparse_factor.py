@@ -1,0 +1,154 @@
+"""Factors of a sparse symmetric positive definite K: a band if some numbering gives one, else general.
+
+    band        K = LLᵀ in (b + 1) N numbers, LAPACK's dpbtrf; in the numbering as it is, else along the
+                longer side of the model, else Cuthill and McKee's, whichever is the first narrow enough
+    general     SciPy's SuperLU with a fill-reducing order and no pivoting, so that K = LDLᵀ
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import splu
+
+from .assembly import Matrix
+
+Order = NDArray[np.intp]
+
+BAND_TO_ROW = 20  # a band at most this many times longer than K's mean row is worth it
+
+
+class NotPositiveDefinite(np.linalg.LinAlgError):
+    """K has a motion that costs no energy; `unknown` is one that moves, by its number."""
+
+    def __init__(self, unknown: int) -> None:
+        super().__init__(f"the pivot of unknown {unknown} is not positive")
+        self.unknown = unknown
+
+
+class Factor(Protocol):
+    """K⁻¹ through a factorisation."""
+
+    @property
+    def numbers(self) -> int:
+        """How many float64 it holds."""
+
+    def solve(self, b: Matrix) -> Matrix:
+        """K⁻¹ b, b (N,) or (N, k)."""
+
+
+def factored(K: sp.csc_array, nodes: Matrix | None = None) -> Factor:
+    """The factor of K (N, N). nodes : (N, 2) of the unknowns, if known. Raises NotPositiveDefinite."""
+    widest = BAND_TO_ROW * K.nnz / max(K.shape[0], 1)
+    if half_bandwidth(K) < widest:
+        return BandFactor(lower_band(K))
+    for order in _orders(K, nodes):
+        renumbered = sp.csc_array(K[order][:, order])
+        if half_bandwidth(renumbered) < widest:
+            return Renumbered(order, lower_band(renumbered))
+    return GeneralFactor(K)
+
+
+def narrowest_order(K: sp.csc_array, nodes: Matrix | None = None) -> Order | None:
+    """The numbering with the narrowest band; None if that is K's own."""
+    own = half_bandwidth(K)
+    if own + 1 <= BAND_TO_ROW * K.nnz / max(K.shape[0], 1):
+        return None
+    widths = [(half_bandwidth(sp.csc_array(K[order][:, order])), order) for order in _orders(K, nodes)]
+    width, order = min(widths, key=lambda each: each[0])
+    return order if width < own else None
+
+
+def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Order]:
+    if nodes is not None:
+        longer, shorter = np.argsort(-np.ptp(nodes, axis=0))
+        yield np.lexsort((nodes[:, shorter], nodes[:, longer]))
+    yield reverse_cuthill_mckee(sp.csr_matrix(K), symmetric_mode=True)
+
+
+def half_bandwidth(K: sp.csc_array) -> int:
+    """max |i − j| over the entries of K."""
+    columns = np.repeat(np.arange(K.shape[1], dtype=K.indices.dtype), np.diff(K.indptr))
+    return int((K.indices - columns).max(initial=0))
+
+
+def lower_band(K: sp.csc_array) -> Matrix:
+    """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth."""
+    width = half_bandwidth(K)
+    band = np.zeros((width + 1, K.shape[0]), order="F")
+    columns = np.repeat(np.arange(K.shape[1]), np.diff(K.indptr))
+    lower = K.indices >= columns
+    place = columns[lower] * width + K.indices[lower]  # row − column + column (width + 1)
+    band.ravel(order="K")[place] = K.data[lower]
+    return band
+
+
+class BandFactor:
+    """L, lower triangular with K = LLᵀ, stored as (b + 1, N): L[j + d, j] in row d. Overwrites `band`."""
+
+    def __init__(self, band: Matrix) -> None:
+        self.L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
+        if info:
+            raise NotPositiveDefinite(int(info) - 1)
+
+    @property
+    def numbers(self) -> int:
+        return int(self.L.size)
+
+    def solve(self, b: Matrix) -> Matrix:
+        x: Matrix = lapack.dpbtrs(self.L, b, lower=1)[0]
+        return x
+
+
+class Renumbered:
+    """The band factor of K[order][:, order]."""
+
+    def __init__(self, order: Order, band: Matrix) -> None:
+        self.order = order
+        try:
+            self.band = BandFactor(band)
+        except NotPositiveDefinite as error:
+            raise NotPositiveDefinite(int(order[error.unknown])) from error
+
+    @property
+    def numbers(self) -> int:
+        return self.band.numbers
+
+    def solve(self, b: Matrix) -> Matrix:
+        x = np.empty_like(b)
+        x[self.order] = self.band.solve(b[self.order])
+        return x
+
+
+class GeneralFactor:
+    """K = LDLᵀ after a symmetric permutation."""
+
+    def __init__(self, K: sp.csc_array) -> None:
+        options = {"SymmetricMode": True}
+        try:
+            self.lu = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        except RuntimeError as error:  # exactly singular
+            raise NotPositiveDefinite(_idle_unknown(K)) from error
+        pivots = self.lu.U.diagonal()
+        wrong = np.flatnonzero(~(pivots > 0))
+        if wrong.size:
+            raise NotPositiveDefinite(int(np.flatnonzero(self.lu.perm_c == wrong[0])[0]))
+
+    @property
+    def numbers(self) -> int:
+        return int(self.lu.L.nnz + self.lu.U.nnz)
+
+    def solve(self, b: Matrix) -> Matrix:
+        x: Matrix = self.lu.solve(np.asarray(b, dtype=float))
+        return x
+
+
+def _idle_unknown(K: sp.csc_array) -> int:
+    """The unknown with the smallest diagonal entry."""
+    return int(K.diagonal().argmin())

@@ -1,0 +1,80 @@
+"""An assembly with sparse blocks: K⁻¹ by sparse factors, Q by its products. Nothing dense is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from .assembly import Assembly, Matrix
+from .compliance import Compliance
+from .near_compliance import NearCompliance, near_compliance
+from .near_inverse import Rows
+from .prepared import Prepared
+from .sparse_factor import BandFactor, Factor, NotPositiveDefinite, factored
+
+
+class SparsePrepared(Prepared):
+    """K's blocks are sparse; each is factored when K⁻¹ is first needed.
+
+    key : of K and A, under which references are stored; None if they are not.
+    coarser : makes an assembly of similar Q whose factors are cheaper; None if there is none.
+
+    `sparse_factors` raises NotPositiveDefinite, with the number of an unknown that moves.
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        key: str | None = None,
+        seconds: dict[str, float] | None = None,
+        coarser: Callable[[], Assembly] | None = None,
+    ) -> None:
+        super().__init__(assembly)
+        self.key = key
+        self.seconds = seconds or {}
+        self.coarser = coarser
+
+    @property
+    def facts(self) -> dict[str, object]:
+        assembly = self.assembly
+        return {"n": assembly.n, "m": assembly.m, "parts": assembly.parts, "seconds": self.seconds}
+
+    @cached_property
+    def sparse_factors(self) -> tuple[Factor, ...]:
+        found = []
+        for K, rows in zip(self.assembly.blocks, self.assembly.slices, strict=True):
+            try:
+                nodes = None if self.assembly.nodes is None else self.assembly.nodes[rows]
+                found.append(factored(sp.csc_array(K), nodes))
+            except NotPositiveDefinite as error:
+                raise NotPositiveDefinite(rows.start + error.unknown) from error
+        return tuple(found)
+
+    def solve_K(self, b: Matrix) -> Matrix:
+        pairs = zip(self.sparse_factors, self.assembly.slices, strict=True)
+        return np.concatenate([factor.solve(b[rows]) for factor, rows in pairs])
+
+    @property
+    def compliance(self) -> Compliance:
+        return Compliance(self.solve_K, self.assembly.A)
+
+    def near_compliance(self, windows: Sequence[Rows]) -> NearCompliance | None:
+        """Q_WW of windows of contacts to some four digits, for a preconditioner; None without band factors."""
+        like = SparsePrepared(self.coarser()) if self.coarser else self
+        bands = [factor for factor in like.sparse_factors if isinstance(factor, BandFactor)]
+        if len(bands) < len(like.sparse_factors):
+            return None
+        return near_compliance(like.assembly, bands, windows)
+
+    @cached_property
+    def Q(self) -> Matrix:
+        """As a dense matrix, (m, m), by m solutions with K; no code of the sparse form asks for it."""
+        return self.compliance.toarray()
+
+    @cached_property
+    def factors(self) -> Any:
+        raise TypeError("an assembly with sparse blocks has no dense factors")

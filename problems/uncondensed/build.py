@@ -1,0 +1,71 @@
+"""From a scene to the sparse form's matrices and loads. Nothing is condensed, nothing is stored.
+
+scene → finite elements of each part, springs between them → Assembly (K̂, B), f̂, g
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import scipy.sparse as sp
+
+from problems.errors import InputError
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.sparse_prepared import SparsePrepared
+from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
+from problems.storage.cache import digest
+from problems.storage.fingerprint import fingerprint
+
+from .whole_model import WholeModel
+
+DENSEST = 0.25  # of a block's entries: a denser K gains nothing from this form
+SMALL = 200  # unknowns up to which any K is taken
+
+
+def prepared(scene: Scene) -> SparsePrepared:
+    """K̂ and B of a scene; factors when first needed. Raises InputError if K is dense or cannot be read."""
+    start = time.perf_counter()
+    match scene:
+        case JointScene():
+            model = WholeModel.of(scene)
+            assembly = model.assembly()
+            coarser = lambda: model.graded().assembly()  # noqa: E731
+        case MatricesScene():
+            assembly, coarser = _own(scene)[0], None
+        case MadeScene():
+            assembly, coarser = _sparse(scene.made.assembly, scene), None
+        case _:
+            raise TypeError(type(scene).__name__)
+    code = fingerprint([Path(__file__)], within=("problems/fem", "problems/model", "problems/effects"))
+    key = digest("uncondensed", scene.assembly_key, code)
+    return SparsePrepared(assembly, key, {"model": time.perf_counter() - start}, coarser)
+
+
+def load_case(scene: Scene) -> LoadCase:
+    """f̂ (N,) and g (m,) of a scene."""
+    match scene:
+        case JointScene():
+            return WholeModel.of(scene).load_case()
+        case MatricesScene():
+            return _own(scene)[1]
+        case MadeScene():
+            return scene.made.load
+    raise TypeError(type(scene).__name__)
+
+
+def _own(scene: MatricesScene) -> tuple[Assembly, LoadCase]:
+    from problems.input.user_matrices import read_matrices  # only for own matrices
+
+    assembly, load = read_matrices(dict(scene.files), sparse=True)
+    return _sparse(assembly, scene), load
+
+
+def _sparse(assembly: Assembly, scene: Scene) -> Assembly:
+    blocks = tuple(sp.csc_array(K) for K in assembly.blocks)
+    for K in blocks:
+        share = K.nnz / K.shape[0] ** 2
+        if K.shape[0] > SMALL and share > DENSEST:
+            allowed = f"at most {DENSEST:.0%} of a block's entries; K is dense: use --form dual or primal"
+            raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
+    return Assembly(blocks, assembly.A, assembly.nodes, assembly.parts, assembly.altered)
