@@ -13,9 +13,7 @@ from problems.forms.problem import Progress
 from problems.model.scene import Scene
 
 
-def prepared(
-    scene: Scene, progress: Progress = lambda text, fraction: None, form: Form = "dual"
-) -> Prepared:
+def prepared(scene: Scene, progress: Progress = lambda text, fraction: None, form: Form = "dual") -> Prepared:
     """K and A of a scene, condensed from the cache or now, or as they are for the sparse form.
 
     Factors and Q are made when first needed. Raises InputError if a part can move freely, or if a user's
@@ -31,7 +29,7 @@ def prepared(
 
 
 def load_case(scene: Scene, form: Form = "dual") -> LoadCase:
-    """f and g of a scene: the sum of its effects' terms, or the user's own. f has an entry per unknown of K."""
+    """f, an entry per unknown of K, and g: the sum of the scene's effects' terms, or the user's own."""
     if form == "sparse":
         from problems.uncondensed import build as uncondensed
 

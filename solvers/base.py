@@ -24,10 +24,11 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.names import FORMS, Form
+from problems.forms.names import DENSE_FORMS, FORMS, Form
 from problems.forms.problem import Problem
 
 __all__ = [
+    "DENSE_FORMS",
     "FORMS",
     "Answer",
     "Batch",
@@ -90,8 +91,8 @@ class WarmStart:
 class Solver(ABC):
     """Base of all solvers. Options are keyword arguments of the constructor, checked there."""
 
-    #: The forms that the solver takes.
-    forms: ClassVar[tuple[Form, ...]] = FORMS
+    #: The forms that the solver takes; in the sparse one, blocks and G are SciPy's sparse arrays.
+    forms: ClassVar[tuple[Form, ...]] = DENSE_FORMS
     #: The distribution of the library, if it has another name than the solver.
     distribution: ClassVar[str | None] = None
 

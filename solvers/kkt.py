@@ -15,8 +15,8 @@ EPS = float(np.finfo(float).eps)
 def kkt_status(Q: AnyQ, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
     """Status and KKT residual max(max(−y), max_{λ>0} |y|), mm, of λ ≥ 0 with y = Qλ − p.
 
-    "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate". If Q is given by
-    its products, |Qλ| replaces |Q|λ.
+    "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate". |Qλ| replaces
+    |Q|λ if Q is given by its products.
     """
     residual = max(float((-y).max(initial=0.0)), float(abs(y[lam > 0]).max(initial=0.0)))
     if residual <= tolerance:

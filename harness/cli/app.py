@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import Plugin, ReferenceLimit, Scheduler, error_reporting, option
+from harness.terminal.console import FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
 
 from . import check as check_command
 from . import scene as scene_commands
@@ -24,11 +24,6 @@ app = typer.Typer(
 app.add_typer(check_command.app)
 app.add_typer(scene_commands.app)
 app.add_typer(series_command.app)
-
-
-class FormName(StrEnum):
-    primal = "primal"
-    dual = "dual"
 
 
 class Listed(StrEnum):
@@ -72,7 +67,7 @@ def run(
         list[str] | None, option("NAME", "Only these solvers, in the suite or not. Repeatable.")
     ] = None,
     form: Annotated[
-        list[FormName] | None, option("FORM", "Only this form, primal or dual. Repeatable.")
+        list[FormName] | None, option("FORM", "Only this form: primal, dual or sparse. Repeatable.")
     ] = None,
     tolerance: Annotated[
         list[float] | None, option("TOL", "Tolerance passed to the solvers. Repeatable.")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import signal
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.terminal.console import Plugin, SceneName, Scheduler, error_reporting, option
+from harness.terminal.console import FormName, Plugin, SceneName, Scheduler, error_reporting, option
 
 if TYPE_CHECKING:
     from problems.load_cases.base import LoadCases
@@ -43,7 +43,7 @@ def series(
     ] = None,
     solver: Annotated[str, option("NAME", "The solver.")] = "newton",
     form: Annotated[
-        str | None, option("FORM", "primal or dual.  [default: dual where the solver takes it]")
+        FormName | None, option("FORM", "primal, dual or sparse.  [default: the cheaper one]")
     ] = None,
     tolerance: Annotated[float, option("TOL", "Tolerance passed to the solver.")] = 1e-11,
     limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
@@ -95,7 +95,7 @@ def series(
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         made = make_solver(solver, {}, plugin)
-        taken = form or default_form(made.forms)
+        taken: Any = form.value if form else default_form(made.forms)
         if taken not in made.forms:
             faults.append(Fault("--form", "form", taken, f"{solver} takes {' and '.join(made.forms)}"))
         if not (0 < tolerance < inf and 0 < limit < inf):
@@ -108,16 +108,16 @@ def series(
         if gaps:
             from problems.load_cases.measured_gaps import measured_gaps
 
-            chosen: LoadCases = measured_gaps(read, gaps, cases)
+            chosen: LoadCases = measured_gaps(read, gaps, cases, taken)
         elif sweep:
             from problems.load_cases.sweep import sweep as swept
 
-            chosen = swept(read, sweep)
+            chosen = swept(read, sweep, taken)
         else:
             from problems.load_cases.random_gaps import random_gaps
 
-            chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length)
-        job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin)  # type: ignore[arg-type]
+            chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length, taken)
+        job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin)
         facts = {
             "solver_version": solver_version(solver, plugin),
             "solver_code": code_of(made),

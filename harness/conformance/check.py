@@ -12,6 +12,7 @@ from harness.measurement.solver_session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
+from problems.forms.sparse_prepared import SparsePrepared
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 
 from .inspection import TOLERANCE, Finding, distance, inspect
@@ -40,12 +41,12 @@ def findings(
         yield _raised("any", "constructor", error)
         return
     if not isinstance(taken, tuple | list) or not taken or any(form not in FORMS for form in taken):
-        fix = 'Set it to a tuple of "primal" and "dual", e.g. forms = ("dual",)'
+        fix = 'Set it to a tuple of "primal", "dual" and "sparse", e.g. forms = ("dual",)'
         yield Finding("any", "forms", f"forms is {shown(taken)}", fix)
         return
     for form in [form for form in taken if forms is None or form in forms]:
         try:
-            for known in known_problems():
+            for known in known_problems(form):
                 begin(f"{form}, {known.name}")
                 yield from _check_problem(factory, known, form)
         except _Raised as raised:
@@ -197,8 +198,9 @@ def _differ(one: Answer, two: Answer, known: KnownProblem, case: KnownCase) -> b
 def _fingerprint(known: KnownProblem) -> list[bytes]:
     assembly = known.prepared.assembly
     loads = [array for case in known.cases for array in (case.load.f, case.load.g, case.load.p)]
-    matrices = [*assembly.blocks, *known.prepared.factors, known.prepared.Q]
-    return [a.tobytes() for a in (*matrices, assembly.A.data, assembly.A.indices, *loads)]
+    dense = not isinstance(known.prepared, SparsePrepared)
+    stages = [*known.prepared.factors, known.prepared.Q] if dense else []
+    return [a.tobytes() for a in (*assembly.stored, *stages, assembly.A.data, assembly.A.indices, *loads)]
 
 
 def first_of_each(found: Iterable[Finding]) -> list[Finding]:

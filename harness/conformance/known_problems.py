@@ -7,12 +7,18 @@ then hold by construction, and the answer is unique because K is positive defini
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.names import Form
 from problems.forms.prepared import Prepared
+from problems.forms.sparse_prepared import SparsePrepared
+
+DOMINANT = 2e5  # N/mm, added to the diagonal of a banded K, which makes it positive definite
 
 Random = np.random.Generator
 
@@ -69,15 +75,27 @@ def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> 
     return KnownCase(name, LoadCase(f, g, p), x, lam)
 
 
-def known_problems() -> list[KnownProblem]:
+def known_problems(form: Form = "dual") -> list[KnownProblem]:
     """One contact; two parts; two parts and a rigid tool. Arrays are read-only as in a measurement."""
     random = np.random.default_rng(0)
     made = []
     for name, pairs, tools in (("one contact", 1, 0), ("two parts", 12, 0), ("two parts and a tool", 30, 10)):
         blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
         prepared = Prepared(Assembly(blocks, contact_rows(pairs, tools)))
-        for array in (*blocks, *prepared.factors, prepared.Q, prepared.assembly.A.data):
+        if form == "sparse":
+            banded = tuple(
+                sp.csc_array(np.triu(np.tril(K, 3), -3) + DOMINANT * np.eye(len(K))) for K in blocks
+            )
+            prepared = SparsePrepared(Assembly(banded, contact_rows(pairs, tools)))
+        for array in _arrays(prepared):
             array.flags.writeable = False
         cases = tuple(known_case(random, prepared, closed, title) for title, closed in CLOSED.items())
         made.append(KnownProblem(name, prepared, cases))
     return made
+
+
+def _arrays(prepared: Prepared) -> list[NDArray[Any]]:
+    assembly = prepared.assembly
+    if isinstance(prepared, SparsePrepared):
+        return [assembly.A.data, *assembly.stored]
+    return [*assembly.stored, *prepared.factors, prepared.Q, assembly.A.data]

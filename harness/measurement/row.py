@@ -65,7 +65,8 @@ def run_task(task: Task, answers: Path) -> TaskResult:
 def run_task_on_worker(task: Task) -> TaskResult:
     """The same on a worker of a scheduler, which has the assembly in its own cache, or builds it first."""
     first = task.batch[0]
-    _ = in_form(prepared(read_scene(first.source)), first.form).arrays  # made before the clock starts
+    scene = read_scene(first.source)
+    _ = in_form(prepared(scene, form=first.form), first.form).arrays  # made before the clock starts
     with tempfile.TemporaryDirectory() as folder:
         result = run_task(task, Path(folder))
         paths = [Path(folder) / f"{m.stem}.npz" for m in task.batch]
@@ -118,7 +119,7 @@ def _row(m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, e
     return {
         "key": m.key,
         **{name: getattr(m, name) for name in ("suite", "scene", "source", "solver", "form", "variant")},
-        "n": problem.prepared.assembly.n,
+        "n": problem.prepared.assembly.asked,
         "m": problem.prepared.assembly.m,
         "active": int(problem.reference.active.sum()),
         **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated")},

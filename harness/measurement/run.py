@@ -31,6 +31,7 @@ from harness.verification.reference_problem import (
     record_refusal,
     reference_problem,
 )
+from problems.forms.names import road_of
 from problems.scene import read_scene
 
 from .describe import Description, Solvers, describe
@@ -138,17 +139,21 @@ def measure_remaining(
 def pending_tasks(
     remaining: list[Measurement], rows: list[Row], directory: Path, solvers: Solvers, display: Display
 ) -> Iterator[tuple[Pending, Task]]:
-    """One task after another; a scene is opened before its first. `rows` grow meanwhile."""
-    problem = None
+    """One task after another; a scene is opened before its first in each road. `rows` grow meanwhile."""
+    opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
     for batch in batches(remaining):
         m = batch[0]
-        if problem is None or problem.scene.name != m.scene:
-            start = time.monotonic()
-            problem = reference_problem(m.source, partial(display.building, m.scene), m.reference_limit_s)
-            record(problem, directory)
+        if any(problem.scene.name != m.scene for problem in opened.values()):
+            opened = {}
+        road = road_of(m.form)
+        if road not in opened:
+            start, building = time.monotonic(), partial(display.building, m.scene)
+            opened[road] = reference_problem(m.source, building, m.reference_limit_s, m.form)
+            record(opened[road], directory)
             display.ready(m.scene, time.monotonic() - start)
+        problem = opened[road]
         display.doing(f"{m.scene}: {m.solver} {m.form}")
-        timed_out_on = predicted_timeout(m, problem.prepared.assembly.n, rows)
+        timed_out_on = predicted_timeout(m, problem.prepared.assembly.asked, rows)
         task = Task(batch, solvers[m.solver, m.variant], timed_out_on)
         yield Pending(task, problem), task
 

@@ -78,7 +78,7 @@ class Run:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.lap("load_s"):
             scene = read_scene(job["source"])
-            problem = in_form(prepared(scene), job["form"])
+            problem = in_form(prepared(scene, form=job["form"]), job["form"])
             cases = list(load_cases(scene, job))
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
@@ -161,11 +161,11 @@ class Run:
 def load_cases(scene: Scene, job: Row) -> Iterator[LoadCase]:
     """The scene's own load case, or those of a series."""
     if job["series"] is None:
-        yield load_case(scene)
+        yield load_case(scene, job["form"])
         return
     from problems.load_cases.random_gaps import random_gaps
 
-    cases = random_gaps(scene, **job["series"])
+    cases = random_gaps(scene, **job["series"], form=job["form"])
     for case in job["cases"]:
         yield cases.load(case)
 

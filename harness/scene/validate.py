@@ -12,7 +12,8 @@ from rich.table import Table
 
 from harness.planning.estimate import estimated, refuse_what_cannot_fit
 from harness.results.machine import physical_memory_mib
-from problems.build import built, prepared
+from problems.build import prepared
+from problems.condensation.build import built
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, Scene

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,6 +23,12 @@ LONGEST_LINE = 200  # characters of a file quoted in a message
 
 def option(metavar: str, help: str, **limits: Any) -> Any:
     return typer.Option(metavar=metavar, help=help, **limits)
+
+
+class FormName(StrEnum):
+    primal = "primal"
+    dual = "dual"
+    sparse = "sparse"
 
 
 SceneName = Annotated[

@@ -8,7 +8,7 @@ so ‖e‖_K ≤ ‖r‖_{K⁻¹} + √(sᵀλ), and with 0 < κ ≤ λmin(K)
 
     max|e_i| ≤ ‖e‖₂ ≤ (‖r‖₂/√κ + √(sᵀλ)) / √κ.
 
-Where the unknowns have mixed units, the same is done in units D_i of each, powers of two: with r replaced by Dr,
+Where the unknowns have mixed units, the same is done in units D_i of each, powers of two: with Dr for r,
 κ ≤ λmin(DKD) and e = Dẽ, so that |e_i| ≤ D_i ‖ẽ‖₂.
 
 Nothing is assumed about the active set: weakly active contacts (λ_i = s_i = 0) need no special treatment.

@@ -23,13 +23,14 @@ from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
 from problems.errors import Fault, InputError
+from problems.forms.names import road_of
 from problems.input.validation import validation_faults
 
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
 from .reference_problem import ReferenceProblem, reference_problem
 
 #: What the gate reads of a row: which answer belongs to which scene.
-NEEDED = ("key", "source", "scene_key", "answer", "status", "message", "gated", "limit_mm")
+NEEDED = ("key", "source", "scene_key", "form", "answer", "status", "message", "gated", "limit_mm")
 NULLABLE = ("answer", "message")
 MAX_CASES = 10**9
 
@@ -104,12 +105,13 @@ def gated_rows(path: Path) -> dict[str, Row]:
 
 
 def judged(rows: dict[str, Row], directory: Path, limit_s: float | None = None) -> Iterator[Finding]:
-    """The rows' answers, judged scene by scene, so that each scene is opened once."""
+    """The rows' answers, judged scene by scene, so that each scene is opened once per road."""
     problem: ReferenceProblem | None = None
-    source = None
-    for row in sorted(rows.values(), key=lambda row: str(row["source"])):
-        if problem is None or row["source"] != source:
-            problem, source = reference_problem(row["source"], limit_s=limit_s), row["source"]
+    opened: tuple[str, str] | None = None
+    for row in sorted(rows.values(), key=lambda row: (str(row["source"]), road_of(row["form"]))):
+        wanted = row["source"], road_of(row["form"])
+        if problem is None or wanted != opened:
+            problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
         yield judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
 
 

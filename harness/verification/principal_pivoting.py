@@ -51,7 +51,9 @@ def contact_set(
     return _pivoted(Q, p, _first_set(Q, p, stop) if start is None else start, stop)[0]
 
 
-def pivoted(at: Solution, S: NDArray[np.bool_], rescue: Rescue, stop: Stop) -> tuple[NDArray[np.bool_], Vector]:
+def pivoted(
+    at: Solution, S: NDArray[np.bool_], rescue: Rescue, stop: Stop
+) -> tuple[NDArray[np.bool_], Vector]:
     """The closed contacts and λ, by the passes above, from a first set S.
 
     rescue : a set from another method, asked for once; None if it has none.

@@ -25,6 +25,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.balance import balanced_units
 from problems.forms.compliance import dense_submatrix
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
@@ -37,6 +38,9 @@ from .certificate import certify
 from .definite import smallest_eigenvalue
 from .exact_residual import DoubleDouble, forces, gaps
 from .principal_pivoting import Stop, contact_set
+
+#: (force, gap) → x and λ of the optimality conditions for a contact set with these right-hand sides.
+ContactSolve = Callable[[Vector, Vector], tuple[Vector, Vector]]
 
 MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
@@ -101,9 +105,7 @@ def reference(prepared: Prepared, load: LoadCase, limit_s: float | None = None) 
 
 def units_of(prepared: Prepared) -> Vector | float:
     """D (n,), the units in which the error is bounded: balanced for a sparse K, mm for a condensed one."""
-    return (
-        sparse_definite.balanced_units(prepared.assembly) if isinstance(prepared, SparsePrepared) else 1.0
-    )
+    return balanced_units(prepared.assembly) if isinstance(prepared, SparsePrepared) else 1.0
 
 
 def proven_lambda_min(prepared: Prepared) -> float:
@@ -117,7 +119,7 @@ def proven_lambda_min(prepared: Prepared) -> float:
 
 def _proven_lambda_min(prepared: Prepared) -> float:
     if isinstance(prepared, SparsePrepared):
-        return sparse_definite.smallest_eigenvalue(prepared, units_of(prepared))
+        return sparse_definite.smallest_eigenvalue(prepared, balanced_units(prepared.assembly))
     blocks, estimate = prepared.assembly.blocks, prepared.facts.get("lambda_min")
     if not isinstance(estimate, float):
         estimate = min(float(np.linalg.eigvalsh(_dense(K))[0]) for K in blocks)
@@ -182,10 +184,11 @@ def _refine(
     prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]
 ) -> tuple[DoubleDouble, DoubleDouble]:
     assembly = prepared.assembly
-    if isinstance(prepared, SparsePrepared):
-        solve = augmented.ContactSystem(prepared, active).solve
-    else:
-        solve = _dense_system(prepared, np.flatnonzero(active))
+    solve: ContactSolve = (
+        augmented.ContactSystem(prepared, active).solve
+        if isinstance(prepared, SparsePrepared)
+        else _dense_system(prepared, np.flatnonzero(active))
+    )
     x = DoubleDouble(np.zeros(assembly.n), np.zeros(assembly.n))
     lam = DoubleDouble(np.zeros(assembly.m), np.zeros(assembly.m))
     force, gap = load.f, load.g  # the residuals at zero
@@ -202,10 +205,8 @@ def _refine(
     return x, lam
 
 
-def _dense_system(
-    prepared: Prepared, rows: NDArray[np.intp]
-) -> Callable[[Vector, Vector], tuple[Vector, Vector]]:
-    """(force, gap) → x and λ of the conditions for the closed contacts `rows`, through K and Q_CC."""
+def _dense_system(prepared: Prepared, rows: NDArray[np.intp]) -> ContactSolve:
+    """For the closed contacts `rows`, through the factors of K and Q_CC."""
     assembly = prepared.assembly
     A_C, factor = assembly.A[:, rows], None
     if rows.size:

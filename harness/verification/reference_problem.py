@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,10 @@ from harness.results import records
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
+from problems.forms.names import Form
 from problems.forms.prepared import Prepared
-from problems.forms.stages import Progress
+from problems.forms.problem import Progress
+from problems.forms.sparse_prepared import SparsePrepared
 from problems.input.bounded import regular_file
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene, Scene
@@ -38,12 +41,14 @@ class ReferenceProblem:
     reference: Reference
     reference_s: float
     limit_s: float | None = None
+    form: Form = "dual"
 
     def limit_mm(self, asked: float) -> float:
         """The limit on an answer: as asked for; on a rung of a ladder, no less than conditioning allows."""
         if not self.scene.on_ladder:
             return asked
-        cond_K: Any = self.prepared.facts["cond_K"]
+        data = self.prepared
+        cond_K: Any = data.condition if isinstance(data, SparsePrepared) else data.facts["cond_K"]
         largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
         return conditioned_limit(asked, cond_K, largest)
 
@@ -51,7 +56,7 @@ class ReferenceProblem:
         """The same for a load case of a series, with its own reference."""
         if series is None or case is None:
             return self
-        load = random_gaps(self.scene, **series).load(case)
+        load = random_gaps(self.scene, **series, form=self.form).load(case)
         return replace(self, load=load, reference=reference(self.prepared, load, self.limit_s))
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
@@ -67,41 +72,65 @@ class ReferenceProblem:
 
 
 def reference_problem(
-    source: str, progress: Progress = lambda text, fraction: None, limit_s: float | None = None
+    source: str,
+    progress: Progress = lambda text, fraction: None,
+    limit_s: float | None = None,
+    form: Form = "dual",
 ) -> ReferenceProblem:
-    """Open or build a scene, by name or path, and its reference, within limit_s. Raises InputError."""
+    """Open or build a scene, by name or path, and its reference, within limit_s. Raises InputError.
+
+    form : that of the answers; those of the sparse form have an entry of x per unknown of the model.
+    """
     scene = read_scene(source)
-    data = prepared(scene, progress)
+    data = prepared(scene, progress, form)
     if data.assembly.m == 0:
         allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
         raise InputError.one(source, "contacts", 0, allowed)
-    load = load_case(scene)
+    load = load_case(scene, form)
     limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
     progress(f"reference, at most {limit_s:g} s", 0.0)
     start = time.perf_counter()
     known = reference_of(scene, data, load, limit_s)
-    return ReferenceProblem(scene, data, load, known, time.perf_counter() - start, limit_s)
+    return ReferenceProblem(scene, data, load, known, time.perf_counter() - start, limit_s, form)
 
 
 def record(problem: ReferenceProblem, directory: Path) -> None:
-    """Put the scene into DIRECTORY/problems.jsonl and its contacts into DIRECTORY/scenes/NAME.npz."""
+    """Put the scene into DIRECTORY/problems.jsonl and its contacts into DIRECTORY/scenes/NAME.npz.
+
+    The facts of a reference in the sparse form are under `sparse`, with the largest difference between its x
+    and that of the condensed matrices, if both were made.
+    """
     scene, facts, known = problem.scene, problem.prepared.facts, problem.reference
     assembly = problem.prepared.assembly
-    row = {
-        "scene": scene.name,
-        "title": scene.title,
-        "scene_key": scene.key,
-        "n": assembly.n,
-        "m": assembly.m,
-        "active": int(known.active.sum()),
-        **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},
+    contacts = directory / "scenes" / (scene.name.replace("/", "_") + ".npz")
+    of_road: dict[str, Any] = {
         "build_s": facts.get("seconds"),
         "reference_s": problem.reference_s,
         "reference_bound_mm": known.bound_mm,
         "reference_route": known.route,
     }
+    row: dict[str, Any] = {
+        "scene": scene.name,
+        "title": scene.title,
+        "scene_key": scene.key,
+        "n": assembly.asked,
+        "m": assembly.m,
+        "active": int(known.active.sum()),
+        **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},
+        **of_road,
+    }
+    before = _recorded(directory, scene)
+    x = assembly.at_junction(known.x)
+    if problem.form == "sparse":
+        row = (before or row) | {"sparse": {"unknowns": assembly.n, **of_road}}
+    elif before and "sparse" in before:
+        row["sparse"] = before["sparse"]
+    if before and (problem.form == "sparse") != ("sparse" in before):
+        with suppress(OSError, KeyError, ValueError), np.load(contacts) as other:
+            row["sparse"]["from_condensed_mm"] = float(abs(other["x"] - x).max())
     _put(row, directory)
     arrays = {
+        "x": x,
         "gap_before": problem.load.g,
         "gap_after": problem.load.g - assembly.A.T @ known.x,
         "lam": known.lam,
@@ -110,7 +139,15 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
         arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(scene, JointScene):
         arrays["fasteners"] = scene.marks()
-    np.savez(directory / "scenes" / (scene.name.replace("/", "_") + ".npz"), **arrays)
+    np.savez(contacts, **arrays)
+
+
+def _recorded(directory: Path, scene: Scene) -> dict[str, Any] | None:
+    """The row of a scene, if it is unchanged."""
+    for row in records.read_complete_rows(directory / "problems.jsonl"):
+        if row["scene"] == scene.name and row.get("scene_key") == scene.key:
+            return row
+    return None
 
 
 def record_refusal(scene: Scene, directory: Path) -> None:

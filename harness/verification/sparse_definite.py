@@ -1,20 +1,18 @@
 """A proven lower bound on the smallest eigenvalue of a sparse K in balanced units.
 
-The unknowns of a finite-element model have mixed units (mm, 1, 1/mm). With D of powers of two, D_i ≈ 1/√K_ii,
-the scaled DKD has the same digits as K and a diagonal between 1/2 and 2. As in `definite`, a Cholesky
-factorisation of fl(DKD − sI) that runs to completion proves λmin(DKD) ≥ s − γ_{2(b+2)} ‖|R|ᵀ|R|‖₂ − …, where
-no sum has more than b + 1 terms in a band of half-width b (Higham 2002, theorem 10.3).
+DKD has the digits of K and a diagonal between 1/2 and 2 (see problems.forms.balance). As in `definite`, a
+Cholesky factorisation of fl(DKD − sI) that runs to completion proves λmin(DKD) ≥ s − γ_{2(b+2)} ‖|R|ᵀ|R|‖₂ …,
+where no sum has more than b + 1 terms in a band of half-width b (Higham 2002, theorem 10.3).
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
-from problems.forms.assembly import Assembly, Matrix, Vector
+from problems.forms.assembly import Matrix, Vector
+from problems.forms.balance import least_eigenvalue
 from problems.forms.sparse_factor import lower_band, narrowest_order
 from problems.forms.sparse_prepared import SparsePrepared
 
@@ -22,14 +20,6 @@ from .definite import SMALLEST, STEPS
 from .exact_residual import U, gamma
 
 SHARES = (0.5, 0.1, 0.01)  # of the estimate, tried in turn
-POWER_STEPS = 8
-
-
-def balanced_units(assembly: Assembly) -> Vector:
-    """D (n,), powers of two, D_i √K_ii between 1/√2 and √2; 1 where K_ii is not positive."""
-    diagonal = assembly.diagonal_K()
-    positive = diagonal > 0
-    return np.exp2(np.where(positive, -np.round(np.log2(np.where(positive, diagonal, 1.0)) / 2), 0.0))
 
 
 def smallest_eigenvalue(prepared: SparsePrepared, D: Vector) -> float:
@@ -42,19 +32,8 @@ def smallest_eigenvalue(prepared: SparsePrepared, D: Vector) -> float:
         if order is not None:
             scaled = sp.csc_array(scaled[order][:, order])
         solve = prepared.sparse_factors[k].solve
-        least = min(least, _of_band(lower_band(scaled), _estimate(solve, d)))
+        least = min(least, _of_band(lower_band(scaled), least_eigenvalue(solve, d)))
     return float(least)
-
-
-def _estimate(solve: Callable[[Vector], Vector], d: Vector) -> float:
-    """About λmin(DKD), by the power method on its inverse."""
-    v = np.random.default_rng(0).standard_normal(len(d))
-    largest = 1.0
-    for _ in range(POWER_STEPS):
-        v = v / np.linalg.norm(v)
-        w = solve(v / d) / d
-        largest, v = float(v @ w), w
-    return 1 / largest if largest > 0 else 0.0
 
 
 def _of_band(band: Matrix, estimate: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -68,6 +69,15 @@ class Assembly:
         if self.nodes is None:
             return None
         return self.nodes[self.A.indices[self.A.indptr[:-1]]]
+
+    @property
+    def stored(self) -> list[NDArray[Any]]:
+        """The arrays that hold K's blocks."""
+        found: list[NDArray[Any]] = []
+        for K in self.blocks:
+            sparse: Any = K
+            found += [sparse.data, sparse.indices, sparse.indptr] if sp.issparse(K) else [K]
+        return found
 
     def multiply_K(self, x: Matrix) -> Matrix:
         """K x, block by block."""

@@ -10,6 +10,16 @@ from typing import Literal, get_args
 
 Form = Literal["primal", "dual", "sparse"]
 FORMS: tuple[Form, ...] = get_args(Form)
+#: The forms whose matrices are dense: what a solver takes that says nothing else.
+DENSE_FORMS: tuple[Form, ...] = ("primal", "dual")
+
+
+Road = Literal["condensed", "sparse"]
+
+
+def road_of(form: Form) -> Road:
+    """How the matrices of a form are made: condensed onto the junction, or taken as they are."""
+    return "condensed" if form in DENSE_FORMS else "sparse"
 
 
 def default_form(forms: Sequence[Form]) -> Form:

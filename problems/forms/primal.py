@@ -52,4 +52,4 @@ class Primal(Problem):
 
     @property
     def arrays(self) -> list[Matrix]:
-        return list(self.assembly.blocks)
+        return self.assembly.stored

@@ -7,10 +7,6 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-import scipy.sparse as sp
-
-from .assembly import Matrix
 from .names import Form
 from .primal import Primal
 from .sparse_prepared import SparsePrepared
@@ -21,11 +17,6 @@ class Sparse(Primal):
 
     form: ClassVar[Form] = "sparse"
     prepared: SparsePrepared
-
-    @property
-    def arrays(self) -> list[Matrix]:
-        blocks = [sp.csc_array(K) for K in self.assembly.blocks]
-        return [array for K in blocks for array in (K.data, K.indices, K.indptr)]
 
     @property
     def yardstick(self) -> None:

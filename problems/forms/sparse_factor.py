@@ -1,8 +1,8 @@
 """Factors of a sparse symmetric positive definite K: a band if some numbering gives one, else general.
 
-    band        K = LLᵀ in (b + 1) N numbers, LAPACK's dpbtrf; in the numbering as it is, else along the
-                longer side of the model, else Cuthill and McKee's, whichever is the first narrow enough
-    general     SciPy's SuperLU with a fill-reducing order and no pivoting, so that K = LDLᵀ
+band        K = LLᵀ in (b + 1) N numbers, LAPACK's dpbtrf; in the numbering as it is, else along the
+            longer side of the model, else Cuthill and McKee's, whichever is the first narrow enough
+general     SciPy's SuperLU with a fill-reducing order and no pivoting, so that K = LDLᵀ
 """
 
 from __future__ import annotations

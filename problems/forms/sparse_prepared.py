@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .assembly import Assembly, Matrix
+from .balance import balanced_units, least_eigenvalue
 from .compliance import Compliance
 from .near_compliance import NearCompliance, near_compliance
 from .near_inverse import Rows
@@ -41,7 +42,21 @@ class SparsePrepared(Prepared):
     @property
     def facts(self) -> dict[str, object]:
         assembly = self.assembly
-        return {"n": assembly.n, "m": assembly.m, "parts": assembly.parts, "seconds": self.seconds}
+        size = {"n": assembly.asked, "m": assembly.m, "parts": assembly.parts, "unknowns": assembly.n}
+        return size | {"seconds": self.seconds}
+
+    @cached_property
+    def condition(self) -> float:
+        """About the condition number of K in balanced units, whose largest eigenvalue is at most ‖DKD‖_∞."""
+        D = balanced_units(self.assembly)
+        least, largest = np.inf, 0.0
+        for K, rows, factor in zip(
+            self.assembly.blocks, self.assembly.slices, self.sparse_factors, strict=True
+        ):
+            d = D[rows]
+            least = min(least, least_eigenvalue(factor.solve, d))
+            largest = max(largest, float((abs(K) @ d * d).max()))
+        return largest / least if least > 0 else np.inf
 
     @cached_property
     def sparse_factors(self) -> tuple[Factor, ...]:
@@ -63,7 +78,7 @@ class SparsePrepared(Prepared):
         return Compliance(self.solve_K, self.assembly.A)
 
     def near_compliance(self, windows: Sequence[Rows]) -> NearCompliance | None:
-        """Q_WW of windows of contacts to some four digits, for a preconditioner; None without band factors."""
+        """Q_WW of windows of contacts to four digits, for a preconditioner; None without band factors."""
         like = SparsePrepared(self.coarser()) if self.coarser else self
         bands = [factor for factor in like.sparse_factors if isinstance(factor, BandFactor)]
         if len(bands) < len(like.sparse_factors):

@@ -28,9 +28,9 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
         nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
-    K is split into its diagonal blocks, dense unless they are to be `sparse`. What does not fit into float64 is rounded, and K that is not quite
-    symmetric is replaced by (K + Kᵀ)/2; `Assembly.altered` bounds the differences. Raises InputError with all
-    faults.
+    K is split into its diagonal blocks, dense unless they are to be `sparse`. What does not fit into float64
+    is rounded, and K that is not quite symmetric is replaced by (K + Kᵀ)/2; `Assembly.altered` bounds the
+    differences. Raises InputError with all faults.
     """
     where = {key: str(path) for key, path in files.items()}
     if "problem" in files:

@@ -12,6 +12,7 @@ import pandas as pd
 from problems.build import load_case
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.names import Form
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
@@ -55,7 +56,7 @@ class MeasuredGaps(LoadCases):
         return self.gaps[self.numbers.index(k) if self.numbers else k]
 
 
-def measured_gaps(scene: Scene, path: Path, count: int | None = None) -> MeasuredGaps:
+def measured_gaps(scene: Scene, path: Path, count: int | None = None, form: Form = "dual") -> MeasuredGaps:
     """The first `count` rows, or all, of a .csv (numbers; # begins a comment), .npz or .npy.
 
     An .npz must hold an array `gaps`, or a single array; an .npy is memory-mapped, the others are read into
@@ -65,7 +66,7 @@ def measured_gaps(scene: Scene, path: Path, count: int | None = None) -> Measure
     if isinstance(scene, JointScene):
         forces_only = tuple(e for e in scene.effects if not isinstance(e, GapEffect))
         scene = replace(scene, effects=forces_only)
-    forces = load_case(scene)
+    forces = load_case(scene, form)
     m = len(forces.g)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
         raise InputError.one(

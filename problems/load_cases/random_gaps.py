@@ -12,6 +12,7 @@ from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
+from problems.forms.names import Form
 from problems.input.validation import validation_faults
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
@@ -59,8 +60,10 @@ def random_gaps(
     mean: float | None = None,
     sd: float | None = None,
     correlation_length: float | None = None,
+    form: Form = "dual",
 ) -> RandomGaps:
     """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) override its values.
+    form : what will be solved; f has an entry per unknown of its K.
 
     Raises InputError if one of them is given by neither, or if the scene has no joint or more than one
     `initial_gap`.
@@ -94,4 +97,4 @@ def random_gaps(
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = replace(scene, effects=tuple(effect for effect in scene.effects if effect not in found))
-    return RandomGaps(scene.joint, load_case(others), field, seed, cases)
+    return RandomGaps(scene.joint, load_case(others, form), field, seed, cases)

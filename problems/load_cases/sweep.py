@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from problems.build import load_case
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
+from problems.forms.names import Form
 from problems.input.validation import validation_faults
 from problems.model.effect import TieEffect
 from problems.model.scene import JointScene, Scene
@@ -45,6 +46,7 @@ class Sweep(LoadCases):
     scene: JointScene
     steps: tuple[Step, ...]
     count: int
+    form: Form = "dual"
 
     @property
     def key(self) -> str:
@@ -58,10 +60,10 @@ class Sweep(LoadCases):
         effects = list(self.scene.effects)
         for step, value in zip(self.steps, self.parameters(k).values(), strict=True):
             effects[step.effect] = _changed(effects[step.effect], step, value)
-        return load_case(replace(self.scene, effects=tuple(effects)))
+        return load_case(replace(self.scene, effects=tuple(effects)), self.form)
 
 
-def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
+def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
     """The cases of some --sweep options. Raises InputError with all faults."""
     if not isinstance(scene, JointScene):
         raise InputError.one("--sweep", "key", ", ".join(texts), f"{NOTHING}; {OTHER}")
@@ -85,7 +87,7 @@ def sweep(scene: Scene, texts: Sequence[str]) -> Sweep:
     count = prod(len(step.values) for step in steps)
     if count > MOST_CASES:
         raise InputError.one("--sweep", "cases", count, f"at most {MOST_CASES} combinations")
-    return Sweep(scene, steps, count)
+    return Sweep(scene, steps, count, form)
 
 
 def effect_name(scene: JointScene, index: int) -> str:

@@ -6,6 +6,7 @@ scene → finite elements of each part, springs between them → Assembly (K̂, 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import scipy.sparse as sp
@@ -26,20 +27,26 @@ SMALL = 200  # unknowns up to which any K is taken
 def prepared(scene: Scene) -> SparsePrepared:
     """K̂ and B of a scene; factors when first needed. Raises InputError if K is dense or cannot be read."""
     start = time.perf_counter()
+    coarser: Callable[[], Assembly] | None = None
     match scene:
         case JointScene():
             model = WholeModel.of(scene)
             assembly = model.assembly()
-            coarser = lambda: model.graded().assembly()  # noqa: E731
+            coarser = _graded(model)
         case MatricesScene():
-            assembly, coarser = _own(scene)[0], None
+            assembly = _own(scene)[0]
         case MadeScene():
-            assembly, coarser = _sparse(scene.made.assembly, scene), None
+            assembly = _sparse(scene.made.assembly, scene)
         case _:
             raise TypeError(type(scene).__name__)
-    code = fingerprint([Path(__file__)], within=("problems/fem", "problems/model", "problems/effects"))
+    folders = ("problems/fem", "problems/model", "problems/effects", "problems/uncondensed")
+    code = fingerprint([Path(__file__)], within=folders)
     key = digest("uncondensed", scene.assembly_key, code)
     return SparsePrepared(assembly, key, {"model": time.perf_counter() - start}, coarser)
+
+
+def _graded(model: WholeModel) -> Callable[[], Assembly]:
+    return lambda: model.graded().assembly()
 
 
 def load_case(scene: Scene) -> LoadCase:

@@ -79,7 +79,9 @@ class WholeModel:
     def _at_junction(self, M: sp.csc_array) -> sp.csc_array:
         """(N, k): the rows of M (n, k) at the junction's deflections, the others zero."""
         M = sp.csc_array(M)
-        found = sp.csc_array((M.data, self.junction[M.indices], M.indptr), shape=(self.numbering.size, M.shape[1]))
+        found = sp.csc_array(
+            (M.data, self.junction[M.indices], M.indptr), shape=(self.numbering.size, M.shape[1])
+        )
         found.sort_indices()
         return found
 

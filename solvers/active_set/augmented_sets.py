@@ -16,7 +16,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
-from problems.forms.compliance import Compliance
 from problems.forms.sparse_factor import Factor, factored
 from problems.forms.sparse_prepared import SparsePrepared
 
@@ -32,8 +31,7 @@ class AugmentedSets:
 
     def __init__(self, prepared: SparsePrepared, p: Vector, diagonal: Vector) -> None:
         self.prepared, self.p, self.compliance = prepared, p, diagonal
-        self.Q: Compliance = prepared.compliance
-        self.factorisations = 0
+        self.Q, self.factorisations = prepared.compliance, 0
 
     @cached_property
     def _K(self) -> sp.csc_array:

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.compliance import AnyQ
 from solvers.base import Answer, LoadCase
@@ -44,8 +45,9 @@ SolveOne = Callable[[Set | None, Vector, float], Answer]
 class Case:
     """A load case during the sweeps, its vectors in the order of the banded inverse.
 
-    load : the case as it was given. p : (m,) mm. C : its contact set. trial : λ (m,) N and y = Qλ − p (m,) mm. factor : of M on the open set.
-    settled : no sign is wrong, and |y_C| is far below the tolerance or within rounding.
+    load : the case as it was given. p : (m,) mm. C : its contact set. trial : λ (m,) N and y = Qλ − p (m,)
+    mm. factor : of M on the open set. settled : no sign is wrong, and |y_C| is far below the tolerance or
+    within rounding.
     """
 
     load: LoadCase
@@ -60,9 +62,9 @@ class Case:
 
 @dataclass
 class BatchedSweeps:
-    """Q (m, m) or its products, its diagonal, M ≈ Q⁻¹. last : the cases of the previous call, which warm-start
-    the next ones.
+    """Q (m, m) or its products, its diagonal, M ≈ Q⁻¹.
 
+    last : the cases of the previous call, which warm-start the next ones.
     solve_one : for unsettled cases; for all cases, once most of a call's were unsettled or few contacts are
         closed, so that the small systems of each case are faster.
     """

@@ -3,20 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from problems.forms.assembly import Vector
+from problems.forms.compliance import AnyQ
 from solvers.base import Answer
 from solvers.kkt import kkt_status
 from solvers.linear_algebra.product import product
 
 from .block_pivoting import block_pivoting, wrong_signs
 from .bordered_factor import Set
-from .contact_sets import ContactSets, TrialSolution
+from .contact_sets import TrialSolution
 
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further refinement
 MAX_FINER_SETS = 30  # tried for signs that are wrong by less than the tolerance
+
+
+class Sets(Protocol):
+    """λ and y of one contact set after another. compliance : the diagonal of Q."""
+
+    p: Vector
+    compliance: Vector
+
+    @property
+    def Q(self) -> AnyQ: ...
+
+    @property
+    def factorisations(self) -> int: ...
+
+    def at(self, C: Set) -> TrialSolution: ...
+
+    def refined(self, C: Set, trial: TrialSolution, target: float) -> TrialSolution: ...
 
 
 @dataclass(frozen=True)
@@ -28,7 +47,7 @@ class _Settled:
     converged: bool
 
 
-def solve_from(C: Set, sets: ContactSets, tolerance: float, max_sets: int) -> Answer:
+def solve_from(C: Set, sets: Sets, tolerance: float, max_sets: int) -> Answer:
     """Block principal pivoting from C, with λ_C refined against Q and the signs checked again.
 
     Once no sign is wrong by more than the tolerance, up to 30 further sets correct those beyond rounding:
@@ -54,7 +73,7 @@ def solve_from(C: Set, sets: ContactSets, tolerance: float, max_sets: int) -> An
     return Answer(status, lam, iterations=passes, details=details)
 
 
-def _settled(C: Set, sets: ContactSets, threshold: float, tolerance: float, max_sets: int) -> _Settled:
+def _settled(C: Set, sets: Sets, threshold: float, tolerance: float, max_sets: int) -> _Settled:
     """Pivot until no sign is wrong by more than `threshold`, mm, with λ_C refined for the tolerance."""
     passes = single_exchanges = 0
     while True:

@@ -1,9 +1,9 @@
 """Active-set Newton on the sparse form: Q by its products, sweeps with a banded M ≈ Q⁻¹.
 
 M comes from the compliance between neighbouring contacts, which the band factor of a coarser model gives
-without the rest of Q. A sweep is one product with Q, two band solutions per part (see `batched`). What the
-sweeps do not settle, and a K without a band, is solved by block principal pivoting with a sparse factorisation
-of K per contact set (see `augmented_sets`).
+without the rest of Q. A sweep is one product with Q, a solution with K's factors (see `batched`). What the
+sweeps do not settle, and a K without a band, is solved by block principal pivoting with a sparse
+factorisation of K per contact set (see `augmented_sets`).
 """
 
 from __future__ import annotations

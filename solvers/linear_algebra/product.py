@@ -15,7 +15,8 @@ SPARSE_LIMIT = 1 / 8
 def product(G: AnyQ, v: Vector) -> Vector:
     """G v for G symmetric, column-major: reads one triangle, or only the columns where v is nonzero.
 
-    G may be given by its products. Only SciPy's BLAS is called: NumPy's has its own thread pool, and each pool spins while the other works.
+    G may be given by its products. Only SciPy's BLAS is called: NumPy's has its own thread pool, and each
+    pool spins while the other works.
     """
     if isinstance(G, Compliance):
         return G @ v

@@ -25,7 +25,7 @@ from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
 from solvers.active_set.growing_factor import GrowingFactor
 from solvers.active_set.solve import solve_from
-from solvers.base import FORMS, Answer, Form, LoadCase, Problem, Solver, failed
+from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, Solver, failed
 from solvers.kkt import kkt_status
 from solvers.linear_algebra.inverse import inverse_with_factor
 
@@ -53,7 +53,7 @@ class GoldfarbIdnani(Solver):
     max_pivots : limit on the changes of the active set, in units of m.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = FORMS
+    forms: ClassVar[tuple[Form, ...]] = DENSE_FORMS
 
     def __init__(self, *, max_pivots: float = 10.0) -> None:
         if not max_pivots > 0:

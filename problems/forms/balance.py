@@ -1,0 +1,32 @@
+"""Units in which the unknowns of a model weigh alike, and the condition number of K in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .assembly import Assembly, Vector
+
+POWER_STEPS = 8
+
+
+def balanced_units(assembly: Assembly) -> Vector:
+    """D (n,), powers of two, D_i √K_ii between 1/√2 and √2; 1 where K_ii is not positive.
+
+    The unknowns of a finite-element model have mixed units (mm, 1, 1/mm); DKD has the digits of K.
+    """
+    diagonal = assembly.diagonal_K()
+    positive = diagonal > 0
+    return np.exp2(np.where(positive, -np.round(np.log2(np.where(positive, diagonal, 1.0)) / 2), 0.0))
+
+
+def least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector) -> float:
+    """About λmin(DKD), no smaller, by the power method on its inverse. solve : b → K⁻¹b."""
+    v = np.random.default_rng(0).standard_normal(len(D))
+    largest = 0.0
+    for _ in range(POWER_STEPS):
+        v = v / np.linalg.norm(v)
+        w = solve(v / D) / D
+        largest, v = float(v @ w), w
+    return 1 / largest if largest > 0 else 0.0
