@@ -18,6 +18,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, PositiveInt, ValidationError
 
+from harness.results.checksums import Damaged, refuse_changed
 from problems.errors import Fault, InputError
 from problems.input.bounded import Finite, Positive, Seed
 from problems.input.validation import unknown, validation_faults
@@ -151,6 +152,10 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
 def read_written(path: Path) -> Suite:
     """The suite.toml of a results directory, perhaps of an older version. Raises InputError."""
     data = read_toml(path)
+    try:
+        refuse_changed(path.read_bytes())
+    except Damaged as error:
+        raise InputError.one(path, "content", "changed", f"{error}; run the suite again") from error
     if isinstance(entries := data.get("solver"), list) and all(isinstance(entry, dict) for entry in entries):
         data["solver"] = [{OLDER.get(key, key): entry[key] for key in entry} for entry in entries]
     return validated(data, path)

@@ -188,9 +188,7 @@ def record_contacts(job: Job, directory: Path) -> int:
         arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(job.scene, JointScene):
         arrays["fasteners"] = job.scene.marks()
-    new = directory / f"new-{store.CONTACTS}"
-    np.savez(new, **arrays)  # type: ignore[arg-type]
-    new.replace(directory / store.CONTACTS)
+    records.replace_arrays(directory / store.CONTACTS, arrays)
     return assembly.m
 
 
