@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, PositiveInt, Valid
 
 from harness.results.checksums import Damaged, refuse_changed
 from problems.errors import Fault, InputError
-from problems.input.bounded import Finite, Positive, Seed
+from problems.input.bounded import Finite, Positive, Seed, resolved
 from problems.input.validation import unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, rung_names
 from problems.scene import read_toml, scene_names
@@ -130,7 +130,7 @@ def suite_from(data: dict[str, Any], path: Path) -> Suite:
     if isinstance(data.get("scenes"), list):
         data["scenes"] = resolved_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
     if isinstance(data.get("plugin"), str):
-        data["plugin"] = str((path.parent / data["plugin"]).resolve())
+        data["plugin"] = str(resolved(path.parent / data["plugin"]))
     faults += _unknown_solvers(data, path)
     return validated(data, path, faults)
 
@@ -169,7 +169,7 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
     found: dict[str, None] = {}
     for pattern in map(str, patterns):
         if Path(pattern).suffix in (".toml", ".npz"):
-            path = (base / pattern).resolve()
+            path = resolved(base / pattern)
             if not path.is_file():
                 faults.append(Fault(where, key, pattern, "no such file"))
             found[str(path)] = None
