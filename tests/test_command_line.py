@@ -59,7 +59,10 @@ def test_a_terminal_of_few_letters_ends_no_command(words: tuple[str, ...], tmp_p
         ("run", "--scene", "loop.toml"),
         ("run", "--plugin", "loop.py"),
         ("series", "loop.toml", "--out", "out"),
-        (*"series gallery/three-part-stack --sd 0.1 --correlation-length 9 --out".split(), "loop"),
+        (
+            *["series", "gallery/three-part-stack", "--sd", "0.1", "--correlation-length", "9", "--out"],
+            "loop",
+        ),
         ("report", "loop"),
         ("gate", "loop"),
     ],
