@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from problems.input.bounded import regular_file
+from problems.input.bounded import regular_file, resolved
 from problems.input.validation import UNITS, unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, make_rung, rung_names
 from problems.model.effect import Effect, StiffnessEffect
@@ -60,8 +60,8 @@ def read_scene(name_or_path: str) -> Scene:
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
             raise _unknown_scene(name_or_path, scene_names())
-    is_users = not path.resolve().is_relative_to(SCENES)
-    name = path.stem if is_users else path.resolve().relative_to(SCENES).with_suffix("").as_posix()
+    is_users = not resolved(path).is_relative_to(SCENES)
+    name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()
     return _scene(name, path, read_toml(path))
 
 

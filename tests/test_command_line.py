@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 SHOW = """
 import sys
@@ -27,3 +30,46 @@ def test_help_imports_nothing_that_is_slow() -> None:
     assert "Exit codes" in done.stdout
     slow = {"numpy", "scipy", "pandas", "matplotlib", "pydantic", "rich", "problems", "solvers", "report"}
     assert not slow & set(done.stderr.split())
+
+
+def harness(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    paths = {"PYTHONPATH": str(Path(__file__).parents[1]), "RIVETBENCH_CACHE": str(folder / "cache")}
+    command = [sys.executable, "-m", "harness", *words]
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, env=os.environ | paths | environment
+    )
+    assert "Traceback" not in done.stderr
+    return done
+
+
+@pytest.mark.parametrize("words", [("list", "scenes"), ("validate", "gallery/three-part-stack"), ("--help",)])
+def test_a_terminal_of_few_letters_ends_no_command(words: tuple[str, ...], tmp_path: Path) -> None:
+    done = harness(tmp_path, *words, LC_ALL="C", PYTHONUTF8="0", PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "?" in done.stdout or words == ("--help",)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("validate", "loop.toml"),
+        ("validate", "loop.npz"),
+        ("solve", "loop.toml", "--out", "out"),
+        ("run", "loop.toml"),
+        ("run", "--scene", "loop.toml"),
+        ("run", "--plugin", "loop.py"),
+        ("series", "loop.toml", "--out", "out"),
+        (
+            *["series", "gallery/three-part-stack", "--sd", "0.1", "--correlation-length", "9", "--out"],
+            "loop",
+        ),
+        ("report", "loop"),
+        ("gate", "loop"),
+    ],
+)
+def test_links_that_lead_to_themselves_are_bad_input(words: tuple[str, ...], tmp_path: Path) -> None:
+    for name in ("loop", "loop.toml", "loop.npz", "loop.py"):
+        (tmp_path / name).symlink_to(name)
+    done = harness(tmp_path, *words)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "loop" in done.stderr

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from matplotlib.text import Text
 from rich.table import Table
+from rich.text import Text as Lines
 from synthetic_results import no_answer, row, write_rows
 from typer import Typer
 from typer.testing import CliRunner
@@ -212,6 +213,18 @@ def test_no_control_character_reaches_the_terminal() -> None:
         assert sequence not in written
     assert "\x1b[31ma�[2J" in written
     assert "[/b]" in written
+
+
+def test_no_text_passes_for_a_line_of_its_own() -> None:
+    screen = io.StringIO()
+    console = PlainConsole(file=screen, width=80)
+    table = Table("name", title="a\nPassed: all")
+    table.add_row("b\nPassed: all")
+    console.print("c\nPassed: all. Fine.")
+    console.print(table)
+    console.print(Lines("two lines\nof ours"))
+    assert not [line for line in screen.getvalue().splitlines() if line.strip(" │").startswith("Passed")]
+    assert "\nof ours" in screen.getvalue()
 
 
 def test_a_cell_with_control_characters_is_as_wide_as_it_is_shown() -> None:

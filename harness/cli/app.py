@@ -6,7 +6,9 @@ Modules that are slow to import are imported inside the commands.
 from __future__ import annotations
 
 import signal
+import sys
 from enum import StrEnum
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
@@ -213,4 +215,7 @@ def list_(what: Listed) -> None:
 
 
 def main() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # what its encoding lacks, as in LANG=C, ends no command
     app(prog_name="python -m harness")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import Plugin, error_reporting, option
+from harness.terminal.console import MemoryLimit, Plugin, error_reporting, option
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -19,9 +19,7 @@ def check(
     time_limit: Annotated[
         float, option("SECONDS", "Time limit for each test problem in each form.", min=0.001)
     ] = 60.0,
-    memory_limit: Annotated[
-        int, option("MIB", "Memory limit, over all processes of the solver.", min=1)
-    ] = 8192,
+    memory_limit: MemoryLimit = 8192,
 ) -> None:
     """Test solvers on small problems with known answers, and say what is wrong with them.
 

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.terminal.console import FormName, Plugin, SceneName, Scheduler, error_reporting, option
+from harness.terminal.console import (
+    FormName,
+    MemoryLimit,
+    Plugin,
+    SceneName,
+    Scheduler,
+    error_reporting,
+    option,
+)
 
 if TYPE_CHECKING:
     from problems.load_cases.base import LoadCases
@@ -52,13 +60,17 @@ def series(
     ] = 100,
     threads: Annotated[int, option("N", "Threads for linear algebra.", min=1)] = 2,
     plugin: Plugin = None,
+    time_limit: Annotated[
+        float, option("SECONDS", "Time limit per load case; for a plug-in.", min=0.001)
+    ] = 60.0,
+    memory_limit: MemoryLimit = 8192,
     scheduler: Scheduler = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
 
     The assembly is opened and the solver prepared once. Each case is a row with a proven bound on its error,
     and its gaps are saved: stop with Ctrl-C, run the same command again, and it continues where it stopped;
-    more --cases extend it.
+    more --cases extend it. A plug-in runs in a process of its own, stopped at its time or memory limit.
 
     \b
     Examples:
@@ -75,14 +87,13 @@ def series(
                 3 nothing could be judged, 130 interrupted.
     """
     with error_reporting() as console:
-        from harness.measurement.solver_code import code_of
+        from harness.measurement.describe import described
         from harness.series.run import run
         from harness.series.session import Job
         from harness.series.store import CASES
+        from harness.terminal.waiting import waiting
         from problems.errors import Fault, InputError
-        from problems.forms.names import default_form
         from problems.scene import read_scene
-        from solvers.registry import make_solver, solver_version
 
         random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
         drawn = [name for name, value in random.items() if value is not None]
@@ -94,8 +105,10 @@ def series(
             faults.append(Fault("series", "cases", " ".join(sources), "random gaps, --gaps or --sweep"))
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
-        made = make_solver(solver, {}, plugin)
-        taken: Any = form.value if form else default_form(made.forms)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with waiting(console) as show:
+            (made,) = described([(solver, {})], plugin, "--solver", show)
+        taken: Any = form.value if form else made.default_form
         if taken not in made.forms:
             faults.append(Fault("--form", "form", taken, f"{solver} takes {' and '.join(made.forms)}"))
         if not (0 < tolerance < inf and 0 < limit < inf):
@@ -103,7 +116,6 @@ def series(
             faults.append(Fault("series", "tolerance, limit", (tolerance, limit), allowed))
         if faults:
             raise InputError(faults)
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         read = read_scene(scene)
         if gaps:
             from problems.load_cases.measured_gaps import measured_gaps
@@ -117,11 +129,9 @@ def series(
             from problems.load_cases.random_gaps import random_gaps
 
             chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length, taken)
-        job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin)
-        facts = {
-            "solver_version": solver_version(solver, plugin),
-            "solver_code": code_of(made),
-        }
+        limits = time_limit, memory_limit
+        job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
+        facts = {"solver_version": made.version, "solver_code": made.code}
         code = run(job, facts, out, console, scheduler)
         if (out / CASES).is_file():
             from report.writers.series import write  # slow to import: not before the first row

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from math import inf
 from numbers import Integral, Real
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from harness.results.records import Row, to_line
+from harness.results.records import Row, replace_arrays, to_line
 from problems.forms.assembly import Vector
 from problems.forms.problem import Problem
 from solvers.base import Answer, Status
@@ -147,9 +146,4 @@ def figures(answer: Answer) -> Row:
 
 def save(path: Path, x: Vector, lam: Vector | None, m: int) -> None:
     """x (n,) in mm and lam (m,) in N, NaN if the solver gives none; written atomically."""
-    new = path.with_name(path.name + ".new")
-    with new.open("wb") as file:
-        np.savez(file, x=x, lam=np.full(m, np.nan) if lam is None else lam)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
+    replace_arrays(path, {"x": x, "lam": np.full(m, np.nan) if lam is None else lam})

@@ -5,9 +5,10 @@ A library that prints, crashes or hangs while it is imported then does no harm, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from harness.planning.suite import Suite
 from problems.errors import Fault, InputError
@@ -42,11 +43,22 @@ Solvers = dict[tuple[str, str], Description]
 
 
 def describe(suite: Suite, doing: Callable[[str], None] = lambda text: None) -> list[Description]:
-    """A description of each of the suite's solver entries. Raises InputError, all faults at once.
+    """A description of each of the suite's solver entries, as `described` gives them."""
+    entries = [(e.name, e.options) for e in suite.solver]
+    return described(entries, suite.plugin, f"suite {suite.name}", doing)
 
-    doing : called with what is being imported, again and again.
+
+def described(
+    solvers: Sequence[tuple[str, dict[str, Any]]],
+    plugin: str | Path | None,
+    where: str,
+    doing: Callable[[str], None] = lambda text: None,
+) -> list[Description]:
+    """A description of each solver, given by name and options. Raises InputError, all faults at once.
+
+    where : what names them. doing : called with what is being imported, again and again.
     """
-    job = {"solvers": [[e.name, e.options] for e in suite.solver], "plugin": suite.plugin}
+    job = {"solvers": list(solvers), "plugin": str(plugin) if plugin else None}
     phases = {"importing the solvers": IMPORT_S}
     with Limited("harness.measurement.describe", job, 1, phases, IMPORT_MIB) as child:
         while not child.over():
@@ -56,7 +68,7 @@ def describe(suite: Suite, doing: Callable[[str], None] = lambda text: None) -> 
     if reply["status"] != "described":
         last = (reply["stderr"] or "").splitlines()[-1:]
         why = " ".join([f"importing it: {reply['message']}", *last])
-        raise InputError.one(suite.plugin or f"suite {suite.name}", "solver", reply.get("name"), why)
+        raise InputError.one(plugin or where, "solver", reply.get("name"), why)
     if reply["faults"]:
         raise InputError([Fault(**fault) for fault in reply["faults"]])
     return [Description(**found) for found in reply["found"]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, to_toml
 from harness.planning.timeouts import predicted_timeout
 from harness.results import records
+from harness.results.checksums import parsed, with_header
 from harness.results.machine import machine
 from harness.results.provenance import provenance
 from harness.results.records import Row
@@ -55,7 +55,7 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
     refuse_limits_too_low(plan)
     with records.locked(directory):
         rows = resumed(directory, plan, solvers, console)
-        records.replace_text(directory / "suite.toml", to_toml(suite))
+        records.replace_text(directory / "suite.toml", with_header(to_toml(suite)))
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)
@@ -171,12 +171,12 @@ def record_machine(directory: Path, found: dict[str, Any]) -> str:
     new = directory / "machine.json"
     for path in sorted(directory.glob("machine*.json")):
         with suppress(OSError, ValueError):
-            if json.loads(path.read_text("utf-8"))["machine"] == found["machine"]:
+            if parsed(path.read_bytes()).get("machine") == found["machine"]:
                 new = path
                 break
             if path == new:
                 path.rename(path.with_name(f"machine-{len(list(directory.glob('machine*.json')))}.json"))
-    records.replace_text(new, json.dumps(found, indent=1, ensure_ascii=False) + "\n")
+    records.replace_object(new, found)
     return str(found["machine"])
 
 

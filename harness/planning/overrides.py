@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from problems.errors import Fault, InputError
+from problems.input.bounded import resolved
 from problems.scene import read_scene
 from solvers.base import Form
 
@@ -46,7 +47,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             allowed = ", ".join(map(str, sorted(set(sizes.values()))))
             faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
         data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
-    plugin = str(change.plugin.resolve()) if change.plugin else suite.plugin
+    plugin = str(resolved(change.plugin)) if change.plugin else suite.plugin
     if change.solvers:
         data["solver"] = [entry for entry in data["solver"] if entry["name"] in change.solvers]
     named = {entry["name"] for entry in data["solver"]}

@@ -18,8 +18,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, PositiveInt, ValidationError
 
+from harness.results.checksums import Damaged, refuse_changed
 from problems.errors import Fault, InputError
-from problems.input.bounded import Finite, Positive, Seed
+from problems.input.bounded import Finite, Positive, Seed, resolved
 from problems.input.validation import unknown, validation_faults
 from problems.manufactured.ladder import PREFIX, rung_names
 from problems.scene import read_toml, scene_names
@@ -129,7 +130,7 @@ def suite_from(data: dict[str, Any], path: Path) -> Suite:
     if isinstance(data.get("scenes"), list):
         data["scenes"] = resolved_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
     if isinstance(data.get("plugin"), str):
-        data["plugin"] = str((path.parent / data["plugin"]).resolve())
+        data["plugin"] = str(resolved(path.parent / data["plugin"]))
     faults += _unknown_solvers(data, path)
     return validated(data, path, faults)
 
@@ -151,6 +152,10 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
 def read_written(path: Path) -> Suite:
     """The suite.toml of a results directory, perhaps of an older version. Raises InputError."""
     data = read_toml(path)
+    try:
+        refuse_changed(path.read_bytes())
+    except Damaged as error:
+        raise InputError.one(path, "content", "changed", f"{error}; run the suite again") from error
     if isinstance(entries := data.get("solver"), list) and all(isinstance(entry, dict) for entry in entries):
         data["solver"] = [{OLDER.get(key, key): entry[key] for key in entry} for entry in entries]
     return validated(data, path)
@@ -164,7 +169,7 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
     found: dict[str, None] = {}
     for pattern in map(str, patterns):
         if Path(pattern).suffix in (".toml", ".npz"):
-            path = (base / pattern).resolve()
+            path = resolved(base / pattern)
             if not path.is_file():
                 faults.append(Fault(where, key, pattern, "no such file"))
             found[str(path)] = None

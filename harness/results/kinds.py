@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from problems.errors import Fault, InputError
+from problems.input.bounded import regular_file
 
 from . import records
+from .checksums import arrays_in, parsed
 from .records import Row
 from .schema import FIELDS, PROBLEM_FIELDS, Kind
 
+MAX_MIB = 1024  # of a file beside the rows
 MAX_FAULTS = 20  # named at once
 TYPES: dict[Kind, tuple[type, ...]] = {
     "number": (int, float),
@@ -54,4 +57,18 @@ def refuse_unreadable(directory: Path) -> None:
         raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
     refuse_wrong_kinds(path, rows)
     problems = directory / "problems.jsonl"
-    refuse_wrong_kinds(problems, records.read_complete_rows(problems), PROBLEM_FIELDS)
+    refuse_wrong_kinds(problems, records.read(problems), PROBLEM_FIELDS)
+    refuse_damaged(directory.glob("machine*.json"), parsed)
+    refuse_damaged(directory.glob("scenes/*.npz"), arrays_in)
+
+
+def refuse_damaged(paths: Iterable[Path], read: Callable[[bytes], object]) -> None:
+    """Raise InputError naming each file that `read` refuses by a ValueError."""
+    faults = []
+    for path in sorted(paths):
+        try:
+            read(regular_file(path, "content", MAX_MIB).read_bytes())
+        except ValueError as error:
+            faults.append(Fault(str(path), "content", str(error)[:80], "delete it, and run again"))
+    if faults:
+        raise InputError(faults[:MAX_FAULTS])

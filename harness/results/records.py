@@ -9,15 +9,17 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import filelock
 import numpy as np
 
 from problems.errors import InputError
+
+from .checksums import DAMAGED, Damaged, parsed, sealed, with_arrays
 
 Row = dict[str, Any]
 
@@ -30,7 +32,16 @@ def to_line(row: Row) -> str:
     """One line of strict JSON: non-finite numbers become null, and lone surrogates, as in a file name that is
     not UTF-8, their JSON escapes.
     """
-    text = json.dumps(_plain(row), ensure_ascii=False, allow_nan=False)
+    return _json(_plain(row))
+
+
+def to_sealed_line(row: Row) -> str:
+    """The same with the row's checksum."""
+    return _json(sealed(_plain(row)))
+
+
+def _json(content: Row, indent: int | None = None) -> str:
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, indent=indent)
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -53,7 +64,7 @@ def _plain(value: Any) -> Any:
 
 def append(path: Path, *rows: Row) -> None:
     """Append one line per row and force them to disk; on failure (a full disk) restore the file."""
-    rest = memoryview("".join(to_line(row) + "\n" for row in rows).encode())
+    rest = memoryview("".join(to_sealed_line(row) + "\n" for row in rows).encode())
     with path.open("ab", buffering=0) as file:  # a buffer would write its remainder on closing
         size = file.seek(0, os.SEEK_END)
         try:
@@ -99,7 +110,12 @@ def _split(path: Path) -> tuple[list[Row], bytes]:
     *lines, last = content.split(b"\n")
     rows: list[Row] = []
     for number, line in enumerate(lines, start=1):
-        row = _parse(line)
+        try:
+            row = _parse(line)
+        except Damaged:
+            what = line[:80].decode(errors="replace")
+            again = "delete the line, and run again"
+            raise InputError.one(path, f"line {number}", what, f"{DAMAGED}; {again}") from None
         if row is None and number == len(lines) and not last:
             return rows, line + b"\n"
         if row is None:
@@ -109,26 +125,49 @@ def _split(path: Path) -> tuple[list[Row], bytes]:
 
 
 def _parse(line: bytes) -> Row | None:
+    """The row; None if the line is none. Raises Damaged."""
     try:
-        row = json.loads(line)
-    except (ValueError, RecursionError):
+        return parsed(line)
+    except Damaged:
+        raise
+    except ValueError:
         return None
-    return row if isinstance(row, dict) else None
 
 
 def rewrite(path: Path, rows: list[Row]) -> None:
     """Replace the rows of the file, atomically."""
-    replace_text(path, "".join(to_line(row) + "\n" for row in rows))
+    replace_text(path, "".join(to_sealed_line(row) + "\n" for row in rows))
+
+
+def replace_object(path: Path, content: Row) -> None:
+    """Write a JSON object with its checksum, atomically."""
+    replace_text(path, _json(sealed(_plain(content)), indent=1) + "\n")
 
 
 def replace_text(path: Path, text: str) -> None:
     """Write a file atomically."""
+    with _replacing(path) as file:
+        file.write(text.encode())
+
+
+def replace_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write a .npz file with its checksum, atomically."""
+    with _replacing(path) as file:
+        file.write(with_arrays(arrays))
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file that takes the place of PATH once it is whole and on disk."""
     new = path.with_name(path.name + ".new")
-    with new.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
+    try:
+        with new.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -70,9 +70,13 @@ JUDGED: dict[str, Kind] = {
     **_fields("number", "reference_bound_mm displacement_error_mm contact_mismatch min_gap_mm"),
     **_fields("number", "primal_residual dual_residual duality_gap backward_error"),
 }
+#: The checksum of a row (checksums.py).
+CRC = "crc32"
+
 #: Where, when and by which code: `commit` is the project's, or the installed version's text.
 ORIGIN: dict[str, Kind] = {
     **_fields("text", "machine solver_version solver_code rivetbench_version commit recorded_at"),
+    **_fields("text", CRC),
     **_fields("number", "overhead_s"),
     **_fields("flag", "clean"),
 }

@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from problems.errors import InputError
+from problems.input.bounded import resolved
 
 
 @contextmanager
@@ -18,7 +19,7 @@ def into_place(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     `out` is no regular file or folder, is of the other kind, or is one of the inputs.
     """
     _check([out], inputs)
-    target = out.resolve()
+    target = resolved(out)
     target.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=target.parent, prefix=".rivetbench.") as folder:
         new = Path(folder) / target.name

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from problems.build import prepared
 from problems.model.scene import JointScene, Scene
 
 from . import store
+from .isolated import solve_isolated
 from .on_worker import solve_on_worker
 from .session import BLOCK, Job, Result, SeriesSession
 
@@ -82,7 +83,11 @@ def run(
 def results_of(
     job: Job, remaining: list[int], scheduler: str | None, console: Console
 ) -> Iterator[Iterator[list[Result]]]:
-    """The results as they come, from this process or from the workers of a scheduler."""
+    """The results as they come, from this process, a plug-in's own, or the workers of a scheduler."""
+    if scheduler is None and job.plugin:
+        with closing(solve_isolated(job, remaining)) as results:
+            yield results
+        return
     if scheduler is None:
         with console.status("opening the assembly, preparing the solver"):
             session = SeriesSession(job)
@@ -183,9 +188,7 @@ def record_contacts(job: Job, directory: Path) -> int:
         arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(job.scene, JointScene):
         arrays["fasteners"] = job.scene.marks()
-    new = directory / f"new-{store.CONTACTS}"
-    np.savez(new, **arrays)  # type: ignore[arg-type]
-    new.replace(directory / store.CONTACTS)
+    records.replace_arrays(directory / store.CONTACTS, arrays)
     return assembly.m
 
 

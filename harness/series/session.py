@@ -42,6 +42,7 @@ class Job:
     """What a series solves, and how.
 
     check : every check-th case is compared with the reference; 0: none. threads : None: as they are.
+    time_limit_s : per case, and memory_limit_mib, over all its processes: of a plug-in (isolated.py).
     """
 
     scene: Scene
@@ -54,6 +55,8 @@ class Job:
     threads: int | None
     options: dict[str, Any] = field(default_factory=dict)
     plugin: Path | None = None
+    time_limit_s: float = 60.0
+    memory_limit_mib: int = 8192
     key: str = field(default_factory=lambda: uuid4().hex)
 
 
@@ -66,7 +69,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class _Attempt:
+class Attempt:
     case: int
     load: LoadCase
     row: Row
@@ -75,6 +78,8 @@ class _Attempt:
 
 class SeriesSession:
     """A job in this process. solver : made by the caller, or else by its name."""
+
+    block_time_s = BLOCK_TIME_S
 
     def __init__(self, job: Job, solver: Solver | None = None) -> None:
         threadpoolctl.threadpool_limits(job.threads)
@@ -105,13 +110,13 @@ class SeriesSession:
             started, attempts = time.monotonic(), []
             for case, load in loads:
                 attempts.append(self._try(case, load))
-                if time.monotonic() - started > BLOCK_TIME_S:
+                if time.monotonic() - started > self.block_time_s:
                     yield self._results(attempts)
                     started, attempts = time.monotonic(), []
             if attempts:
                 yield self._results(attempts)
 
-    def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[_Attempt]:
+    def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[Attempt]:
         """Solve them all at once; if that raises, one after another, to find out which one does."""
         start = time.perf_counter()
         try:
@@ -120,14 +125,14 @@ class SeriesSession:
             return [self._try(case, load) for case, load in loads]
         share = (time.perf_counter() - start) / len(loads)
         return [
-            _Attempt(case, load, self._new_row(case) | {"solve_s": share}, answer)
+            Attempt(case, load, self._new_row(case) | {"solve_s": share}, answer)
             for (case, load), answer in zip(loads, answers, strict=True)
         ]
 
     def _new_row(self, case: int) -> Row:
         return {"case": case, **self.job.cases.parameters(case), "warm_from": None}
 
-    def _try(self, case: int, load: LoadCase) -> _Attempt:
+    def _try(self, case: int, load: LoadCase) -> Attempt:
         """Solve one; if the solver raises, its status is `failed`."""
         self.row = self._new_row(case)
         near = self.session.nearest(load)
@@ -138,9 +143,9 @@ class SeriesSession:
         except Exception as error:
             self.session.forget()
             answer = failed(f"{type(error).__name__}: {error}"[:500])
-        return _Attempt(case, load, self.row, answer)
+        return Attempt(case, load, self.row, answer)
 
-    def _results(self, attempts: list[_Attempt]) -> list[Result]:
+    def _results(self, attempts: list[Attempt]) -> list[Result]:
         """The rows and gaps, with a proven error bound for each answer."""
         start = time.perf_counter()
         known = self._assessed(attempts)
@@ -149,7 +154,7 @@ class SeriesSession:
         share = (time.perf_counter() - start) / len(attempts)
         return [self._result(each, known.get(each.case), share) for each in attempts]
 
-    def _retry(self, attempts: list[_Attempt], known: dict[int, Assessment]) -> None:
+    def _retry(self, attempts: list[Attempt], known: dict[int, Assessment]) -> None:
         """Solve again what is not proven to be within the limit, with p := Qλ − y for the gap y found.
 
         This removes the rounding errors of Q and p. The better of the two answers is kept.
@@ -171,7 +176,7 @@ class SeriesSession:
                 count = (old.answer.iterations or 0) + (better.answer.iterations or 0)
                 attempts[index[case]] = replace(old, answer=replace(better.answer, iterations=count))
 
-    def _assessed(self, attempts: list[_Attempt]) -> dict[int, Assessment]:
+    def _assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
         needs = self.problem.needs
         answered = [each for each in attempts if all(getattr(each.answer, v) is not None for v in needs)]
         if not answered:
@@ -181,7 +186,7 @@ class SeriesSession:
         found = assess(self.bound, [each.load for each in answered], lams, own)
         return {each.case: assessment for each, assessment in zip(answered, found, strict=True)}
 
-    def _result(self, attempt: _Attempt, assessment: Assessment | None, assess_s: float) -> Result:
+    def _result(self, attempt: Attempt, assessment: Assessment | None, assess_s: float) -> Result:
         answer, job = attempt.answer, self.job
         row = attempt.row | {
             "status": answer.status,
@@ -211,7 +216,7 @@ class SeriesSession:
             row |= self._against_reference(attempt, assessment.x)
         return Result(row, assessment.gap.astype(np.float32))
 
-    def _against_reference(self, attempt: _Attempt, x: Vector) -> Row:
+    def _against_reference(self, attempt: Attempt, x: Vector) -> Row:
         """The distance to the certified reference, which replaces the bound in the verdict."""
         known = refined_active_set(self.data, attempt.load)
         lam = np.asarray(attempt.answer.lam, dtype=float)

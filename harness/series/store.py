@@ -22,20 +22,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.results import records
+from harness.results.checksums import DAMAGED, Damaged, arrays_in, parsed
 from harness.results.schema import VERDICTS
 from problems.errors import Fault, InputError
+from problems.input.bounded import regular_file
 from problems.load_cases.base import LoadCases
 from problems.storage.cache import digest
 
 from .session import Result
 
 CASES, GAPS, CONTACTS, SERIES = "cases.jsonl", "gaps.f4", "contacts.npz", "series.json"
-CRC = "gaps_crc32"  # the field of a row
+CRC = "gaps_crc32"  # of a row
 UNITS = ("_mm", "_s")  # of the fields that are numbers
 AGAIN = "run the same `series` command again"
 DELETE = f"delete it, and {AGAIN}"
 MAX_CASES = 10**9
 CHUNK = 2**20  # bytes
+MAX_MIB = 1024  # of contacts.npz
 MAX_FAULTS = 10  # named at once
 BYTES = np.dtype(np.float32).itemsize
 
@@ -62,21 +65,18 @@ def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]
     else:
         for row in rows(directory):
             if row.get("series") != series_key(identity):
-                allowed = (
-                    f"not known to be of this series without {SERIES}: name another directory with --out"
-                )
+                allowed = f"of an unknown series without {SERIES}: name another directory with --out"
                 raise InputError.one(directory / CASES, f"case {row['case']}", row.get("series"), allowed)
-    content = {"identity": identity, **facts}
-    records.replace_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    records.replace_object(path, {"identity": identity, **facts})
 
 
 def read_series(directory: Path) -> dict[str, Any]:
     """The content of series.json. Raises InputError if it is damaged."""
     path = directory / SERIES
     try:
-        content = json.loads(path.read_text("utf-8"))
+        content = parsed(path.read_bytes())
         whole = isinstance(content["identity"], dict) and isinstance(content["cases"], int)
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError) as error:
         raise InputError.one(path, "content", str(error)[:80], DELETE) from error
     if not whole:
         raise InputError.one(path, "content", "not what was written", DELETE)
@@ -141,12 +141,12 @@ def refuse_damaged(directory: Path) -> None:
 def contacts_in(directory: Path) -> int:
     """m, as contacts.npz has it; 0 if it is missing or damaged."""
     try:
-        with np.load(directory / CONTACTS) as arrays:
-            m = int(arrays["m"])
-            nodes = arrays.get("contact_nodes", np.zeros((m, 2)))
-            fasteners = arrays.get("fasteners", np.zeros((0, 2)))
-    except Exception:  # numpy, zipfile and zlib raise kinds of their own
+        arrays = arrays_in(regular_file(directory / CONTACTS, "content", MAX_MIB).read_bytes())
+        m = int(arrays["m"])
+    except (OSError, ValueError, TypeError, KeyError):
         return 0
+    nodes = arrays.get("contact_nodes", np.zeros((m, 2)))
+    fasteners = arrays.get("fasteners", np.zeros((0, 2)))
     whole = nodes.shape == (m, 2) and fasteners.ndim == 2 and fasteners.shape[1] == 2
     return m if whole and nodes.dtype.kind == fasteners.dtype.kind == "f" else 0
 
@@ -190,12 +190,12 @@ def _lines(path: Path) -> Iterator[tuple[bytes, records.Row]]:
             if not line.endswith(b"\n"):
                 return
             try:
-                row = json.loads(line)
-            except (ValueError, RecursionError) as error:
+                row = parsed(line)
+            except ValueError as error:
                 what = line[:80].decode(errors="replace")
-                raise InputError.one(path, f"line {number}", what, "not a JSON object") from error
-            if not isinstance(row, dict):
-                raise InputError.one(path, f"line {number}", row, "not a JSON object")
+                why = DAMAGED if isinstance(error, Damaged) else "not a JSON object"
+                allowed = f"{why}; delete the line, and {AGAIN}"
+                raise InputError.one(path, f"line {number}", what, allowed) from error
             for name in ("case", "verdict", *row):
                 if not _valid(name, row.get(name)):
                     raise InputError.one(

@@ -35,6 +35,7 @@ SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or .npz with matrices.")
 ]
 Plugin = Annotated[Path | None, option("FILE", "Python file with your own solver.")]
+MemoryLimit = Annotated[int, option("MIB", "Memory limit, over all processes of the solver.", min=1)]
 ReferenceLimit = Annotated[
     float | None,
     option(

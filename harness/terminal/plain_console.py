@@ -27,8 +27,11 @@ class PlainConsole(Console):
         super().__init__(highlight=False, markup=False, emoji=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """As in rich; here already, because the widths of a table's columns are measured before `render`."""
-        return super().render_str(legible(text), **options)
+        """As in rich; here already, because the widths of a table's columns are measured before `render`.
+
+        A string is one line, so that no title or file name can pass for a line of ours.
+        """
+        return super().render_str(legible(text).replace("\n", UNKNOWN), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """As in rich, whose own control sequences are marked as such or made from styles afterwards."""

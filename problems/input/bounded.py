@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 from typing import Annotated
@@ -21,6 +22,11 @@ Seed = Annotated[int, Field(ge=0, lt=2**53)]
 #: A name that a picture, a table and a file can show: one line without control characters.
 ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
 Name = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=ONE_LINE)]
+
+
+def resolved(path: Path) -> Path:
+    """The absolute path without symbolic links; whoever opens it finds out if these have no end."""
+    return Path(os.path.realpath(path))
 
 
 def regular_file(path: Path, key: str, mib: float) -> Path:

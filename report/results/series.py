@@ -39,13 +39,16 @@ class Series:
 def read(directory: Path) -> Series:
     """Raises FileNotFoundError if the directory has no series."""
     facts = quoted(json.loads((directory / "series.json").read_text("utf-8")))
+    count = facts["cases"]  # of this series; an earlier, longer one may have left rows of others
     rows: dict[int, tuple[Any, ...] | None] = {}
     verdicts: dict[int, str] = {}
     swept: list[str] = []
     for row in _rows(directory / "cases.jsonl"):  # of equal cases the last
         case = row["case"]
+        if case >= count:
+            continue
         verdicts[case], rows[case] = row["verdict"], None
-        if case < facts["cases"] and row.get("max_gap_mm") is not None:
+        if row.get("max_gap_mm") is not None:
             swept = swept or [key for key in row if "." in key]
             rows[case] = (case, *(row.get(name) for name in FIGURES), *(row[key] for key in swept))
     kept = [row for row in rows.values() if row]

@@ -1,0 +1,144 @@
+"""Plug-ins that misbehave in a series: it ends, what was solved is kept, and the same command goes on."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from strip import write_strip
+from test_hostile_plugins import ROOT, all_end, command, environment, harness, write
+
+from harness.series import store
+
+pytestmark = pytest.mark.slow
+
+COUNTED = "self.count = getattr(self, 'count', 0) + 1\n        if self.count == 3: "
+MORE_MEMORY = "held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(60)"
+
+
+def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[object]:
+    """The command for five cases with the plug-in."""
+    write_strip(folder)
+    plugin = write(folder, at_import, in_solve)
+    words = ["series", folder / "strip.toml", "--plugin", plugin, "--solver", "mine", "--cases", 5]
+    return [*words, "--check", 0, "--threads", 1, "--out", folder / "out"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "status", "said"),
+    [
+        ("os._exit(0)", "crashed", "ended with exit code 0 before its answer"),
+        ("os.kill(os.getpid(), 11)", "crashed", "killed by SIGSEGV"),
+        ("sys.exit(0)", "failed", "raised SystemExit"),
+        ("time.sleep(60)", "time_limit", "solve took more than 1 s"),
+        ("exec('while True: pass')", "time_limit", "solve took more than 1 s"),
+        (MORE_MEMORY, "memory_limit", "more than 700 MiB"),
+    ],
+)
+def test_the_case_that_ends_the_process_is_a_row_and_the_others_are_solved(
+    tmp_path: Path, fault: str, status: str, said: str
+) -> None:
+    limits = ("--time-limit", 1 if "took" in said else 20, "--memory-limit", 700)
+    going = [*series(tmp_path, in_solve=COUNTED + fault), *limits]
+    done = harness(tmp_path, *going)
+    assert done.returncode == 1
+    assert f"case 2: {status}, no_answer" in done.stdout
+    assert said in done.stdout
+    assert "Not solved: 2. Run the same command again." in done.stdout
+    kept = list(store.rows(tmp_path / "out"))
+    assert [row["verdict"] for row in kept] == ["within", "within", "no_answer"]
+    done = harness(tmp_path, *going)
+    assert done.returncode == 1  # for the one without an answer
+    rows = list(store.rows(tmp_path / "out"))
+    assert rows[:3] == kept
+    assert [(row["case"], row["verdict"]) for row in rows[3:]] == [(3, "within"), (4, "within")]
+    assert "4 within, 1 no answer" in done.stdout
+
+
+def test_a_plugin_that_writes_into_the_cache_is_named(tmp_path: Path) -> None:
+    done = harness(tmp_path, *series(tmp_path, in_solve=COUNTED + "os.remove(problem.Q.filename)"))
+    assert done.returncode == 1
+    assert "case 2: failed, no_answer: raised Refused: the solver wrote into the cache" in done.stdout
+    assert [row["verdict"] for row in store.rows(tmp_path / "out")] == ["within", "within", "no_answer"]
+
+
+@pytest.mark.parametrize(
+    ("at_import", "in_solve"),
+    [
+        ("threading.Thread(target=time.sleep, args=(60,)).start()", "pass"),
+        ("", "os.fork()"),
+        ("os.fork()", "pass"),
+        ("", "os.fork() or (os.setsid(), time.sleep(60))"),
+        ("atexit.register(time.sleep, 60)", "print('hello' * 10**6)"),
+    ],
+)
+def test_forks_threads_and_exit_handlers_are_left_behind(
+    tmp_path: Path, at_import: str, in_solve: str
+) -> None:
+    done = harness(tmp_path, *series(tmp_path, at_import, in_solve))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "5 within" in done.stdout
+    gaps = np.fromfile(tmp_path / "out" / store.GAPS, np.float32)
+    assert gaps.size == 5 * 45
+    assert {row["verdict"] for row in store.rows(tmp_path / "out")} == {"within"}
+
+
+@pytest.mark.parametrize(
+    ("at_import", "said"),
+    [
+        ("sys.exit(0)", "importing the file failed with SystemExit: 0"),
+        ("os._exit(0)", "importing it: ended with exit code 0"),
+    ],
+)
+def test_an_import_that_ends_the_process_is_bad_input(tmp_path: Path, at_import: str, said: str) -> None:
+    done = harness(tmp_path, *series(tmp_path, at_import))
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "mine.py" in done.stderr
+
+
+@pytest.mark.parametrize("step", ["convert", "prepare"])
+def test_a_preparation_that_hangs_ends(tmp_path: Path, step: str) -> None:
+    going = series(tmp_path)
+    plugin = tmp_path / "mine.py"
+    plugin.write_text(plugin.read_text() + f"\n    def {step}(self, given):\n        time.sleep(60)\n")
+    done = harness(tmp_path, *going, "--time-limit", 1)
+    assert done.returncode == 1
+    assert "case 0: time_limit, no_answer: solve took more than 1 s" in done.stdout
+
+
+def test_on_workers_too(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    done = harness(tmp_path, *series(tmp_path, in_solve="os._exit(7)"), "--scheduler", "local:1")
+    assert done.returncode == 3
+    assert "ended with exit code 7" in done.stdout
+    assert "5 no answer" in done.stdout
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_ends_within_a_second(tmp_path: Path, sent: int) -> None:
+    go = tmp_path / "begun"
+    going = subprocess.Popen(
+        command(*series(tmp_path, in_solve=f"open({str(go)!r}, 'w'); time.sleep(60)")),
+        cwd=ROOT,
+        env=environment(tmp_path),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not go.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    start = time.monotonic()
+    going.send_signal(sent)
+    _, said = going.communicate(timeout=30)
+    assert time.monotonic() - start < 1
+    assert going.returncode == 130
+    assert "Interrupted" in said
+    assert "Traceback" not in said
+    assert all_end(tmp_path)
