@@ -44,7 +44,7 @@ def grid(nx: int, ny: int, rng: np.random.Generator | None = None) -> np.ndarray
     return nodes if rng is None else nodes[rng.permutation(len(nodes))]
 
 
-def alone(C: Set | None, p: Vector, tolerance: float) -> Answer:
+def alone(C: Set | None, load: LoadCase, tolerance: float) -> Answer:
     raise AssertionError("all are settled together")
 
 
@@ -192,7 +192,7 @@ def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
     assert (M.order != np.arange(45)).any()
     starts: list[Set | None] = []
 
-    def told(C: Set | None, p: Vector, tolerance: float) -> Answer:
+    def told(C: Set | None, load: LoadCase, tolerance: float) -> Answer:
         starts.append(C)
         return Answer("solved", np.zeros(45))
 
