@@ -24,6 +24,7 @@ from problems.scene import read_scene, scene_names
 from solvers.base import Form
 from solvers.registry import make_solver
 
+WHOLE = 2**1200
 RUNGS = rung_names()
 TAKEN = [name for name in RUNGS if not make_rung(name).refused]
 REFUSED = [name for name in RUNGS if make_rung(name).refused]
@@ -43,8 +44,8 @@ def opened(name: str) -> ReferenceProblem:
 
 
 def whole(values: Any) -> Any:
-    """Whole numbers that are 2¹⁴⁰ times the values, exactly."""
-    exact = [Fraction(float(v)) * 2**140 for v in np.asarray(values).ravel()]
+    """Whole numbers that are 2¹²⁰⁰ times the values, exactly: so denormal numbers, too, become whole."""
+    exact = [Fraction(float(v)) * WHOLE for v in np.asarray(values).ravel()]
     assert all(v.denominator == 1 for v in exact)
     return np.array([v.numerator for v in exact], dtype=object).reshape(np.shape(values))
 
@@ -67,8 +68,8 @@ def test_the_answer_satisfies_the_optimality_conditions_without_rounding(name: s
     A, (x, lam, f, g) = whole(made.assembly.A.toarray()), map(whole, (made.x, made.lam, *load_of(made)))
     parts = zip(made.assembly.blocks, made.assembly.slices, strict=True)
     Kx = np.concatenate([whole(K) @ x[rows] for K, rows in parts])
-    y = g * 2**140 - A.T @ x
-    assert (Kx + A @ lam == f * 2**140).all()
+    y = g * WHOLE - A.T @ x
+    assert (Kx + A @ lam == f * WHOLE).all()
     assert (lam >= 0).all()
     assert (y >= 0).all()
     assert not (lam * y).any()
