@@ -39,7 +39,7 @@ def _scaled(made: ManufacturedProblem, stiffness: float, length: float) -> Manuf
 
 RUNGS: Ladder = {
     **{f"K-{2.0**a:.0e}": partial(_rung, a, 0) for a in (-50, -100, -300, -600, -980)},
-    "K-1e-302": partial(_rung, -1002, 0, REFUSED),
+    "K-9e-305": partial(_rung, -1010, 0, REFUSED),
     **{f"g-{2.0**b:.0e}": partial(_rung, 0, b) for b in (-50, -300, -1000, -1050)},
     "f-7e-302": partial(_rung, -500, -500),
     "f-1e-313": partial(_rung, -520, -520),
