@@ -221,7 +221,7 @@ def _undecided(newton: NewtonSteps, point: Point, units: Vector) -> float:
 
 @np.errstate(over="ignore")
 def _gap(newton: NewtonSteps, point: Point, units: Vector) -> float:
-    """√(Σ q_ii λ_i y_i / m) / max_j |a_ji|: μ as a displacement, for contacts more compliant than usual, mm."""
+    """√(Σ q_ii λ_i y_i / m) / max_j |a_ji|: μ as a displacement, mm."""
     return float(np.sqrt((np.diag(newton.Q) * point.lam * point.y / units**2).mean()))
 
 
