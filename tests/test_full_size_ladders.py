@@ -138,6 +138,7 @@ def test_the_suite_measures_every_rung_with_every_solver_of_ours() -> None:
     assert {m.scene for m in plan} == set(RUNGS)
     for name in RUNGS:
         ours = {(m.solver, m.form) for m in plan if m.scene == name and m.gated}
-        assert ours == {(solver, form) for solver, form, _ in IN_HOUSE}
+        due = {(solver, form) for solver, form, _ in IN_HOUSE}
+        assert ours == (due - {("gi", "primal")} if "/11308-" in name else due)
     assert len({m.solver for m in plan if not m.gated}) <= 2
     assert not any(scene.startswith("hard-full/") for scene in read_suite("hard").scenes)

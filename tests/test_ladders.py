@@ -158,3 +158,26 @@ def test_the_suite_measures_every_rung_with_every_solver() -> None:
     lines = {(m.solver, m.form) for m in plan}
     assert len(plan) == len(TAKEN) * len(lines)
     assert {m.solver for m in plan if m.gated} == {"ipm", "gi", "newton", "ipm-fast"}
+
+
+@pytest.mark.parametrize("m", [8, 16, 24, 32])
+def test_the_chain_takes_quadratically_many_exchanges(m: int) -> None:
+    base = opened(f"hard/pivoting/chain-{m:02d}")
+    gi, problem = make_solver("gi", {}), in_form(base.prepared, "primal")
+    answer = gi.solve(gi.setup(gi.prepare(gi.convert(problem)), base.load, 1e-10), base.load, 1e-10)
+    assert answer.iterations == m**2 // 4 + 4
+
+
+@pytest.mark.parametrize("n", [16, 64, 256])
+def test_all_contacts_of_a_vertex_touch_and_a_third_have_a_force(n: int) -> None:
+    made = made_of(f"hard/pivoting/vertex-{n:03d}")
+    assert made.assembly.A.shape == (n, n)
+    assert not (made.load.g - made.assembly.A.T @ made.x).any()
+    assert np.count_nonzero(made.lam) == round(n / 3)
+
+
+def test_the_denormal_ladder_ends_in_denormal_numbers() -> None:
+    smallest = np.finfo(float).smallest_normal
+    f, g = made_of("hard/denormal/f-8e-314").load.f, made_of("hard/denormal/g-8e-317").load.g
+    assert (abs(f[f != 0]) < smallest).all()
+    assert (abs(g[g != 0]) < smallest).all()

@@ -28,9 +28,9 @@ class ManufacturedProblem:
 
 @dataclass(frozen=True, eq=False)
 class DeferredProblem:
-    """A manufactured problem too large to be made before it is needed, or to be kept beside another.
+    """A manufactured problem so large that it is made when needed only, and not kept beside another.
 
-    sizes : the unknowns of each block of K. m : the number of contacts. make : the same problem at every call.
+    sizes : the unknowns of each block of K. m : the contacts. make : the same problem at every call.
     """
 
     sizes: tuple[int, ...]

@@ -1,8 +1,8 @@
 """Stiffnesses, forces and lengths in ever smaller units, towards the smallest numbers of float64.
 
-A normal number is at least 2⁻¹⁰²²; below it, digits are lost. K times 2ᵃ and x and g times 2ᵇ give f and λ times
-2ᵃ⁺ᵇ: as long as every digit fits, the same answer without rounding. An answer is right if it is so in mm; with
-lengths of 1e-300 mm, that is no more than a finite one.
+A normal number is at least 2⁻¹⁰²²; below it, digits are lost. K times 2ᵃ and x and g times 2ᵇ give f and λ
+times 2ᵃ⁺ᵇ: as long as every digit fits, the same answer without rounding. An answer is judged in mm; where
+lengths are 1e-300 mm, it only has to be a finite one.
 """
 
 from __future__ import annotations
@@ -39,8 +39,7 @@ def _scaled(made: ManufacturedProblem, stiffness: float, length: float) -> Manuf
 
 RUNGS: Ladder = {
     **{f"K-{2.0**a:.0e}": partial(_rung, a, 0) for a in (-50, -100, -300, -600, -980)},
-    "K-9e-305": partial(_rung, -1010, 0, REFUSED),
+    f"K-{2.0**-1010:.0e}": partial(_rung, -1010, 0, REFUSED),
     **{f"g-{2.0**b:.0e}": partial(_rung, 0, b) for b in (-50, -300, -1000, -1050)},
-    "f-7e-302": partial(_rung, -500, -500),
-    "f-1e-313": partial(_rung, -520, -520),
+    **{f"f-{2.0 ** (2 * k):.0e}": partial(_rung, k, k) for k in (-500, -520)},
 }

@@ -1,14 +1,16 @@
 """Pivoting: contact sets by the thousand for methods that exchange one contact at a time.
 
-fathi, murty: single exchanges of signs visit exponentially many contact sets. Q = LLᵀ, L unit lower triangular
-with 2 below the diagonal, and p = 1 (Fathi, Math. Programming 17:335–344, 1979) or pᵢ = 2 − 2⁻ⁱ (Murty, Math.
-Programming Study 7:61–73, 1978, divided by 2ᵐ). L = (I + S)(I − S)⁻¹ with S the shift, so L⁻¹ has entries 1
-and ±2, and K = Q⁻¹ = L⁻ᵀL⁻¹ is whole; cond(K) ≈ (4m/π)⁴. As Qe₁ = (1, 2, …, 2)ᵀ, the solution is λ = e₁,
-x = −Qe₁: one closed contact of m. Murty's gaps shrink by half from contact to contact, to 2¹⁻ᵐ.
+fathi, murty: single exchanges of signs visit exponentially many contact sets. Q = LLᵀ, L unit lower
+triangular with 2 below the diagonal, and p = 1 (Fathi, Math. Programming 17:335–344, 1979) or pᵢ = 2 − 2⁻ⁱ,
+i from 0 (the p of Murty, Math. Programming Study 7:61–73, 1978, divided by 2ᵐ). L = (I + S)(I − S)⁻¹ with S
+the shift, so L⁻¹ has entries 1 and ±2, and K = Q⁻¹ = L⁻ᵀL⁻¹ is whole; cond(K) ≈ (4m/π)⁴. As
+Qe₁ = (1, 2, …, 2)ᵀ, the solution is λ = e₁, x = −Qe₁: one closed contact of m. Murty's gaps shrink by half
+from contact to contact, to 2¹⁻ᵐ.
 
-chain: a dual active-set method that adds the most violated contact drops it again, and again. K = B(2I + S + Sᵀ
-− eₘeₘᵀ)B, B = diag(2^−⌈i/2⌋), x = g, gᵢ ≈ −(3/4)ⁱ, i from 0: all contacts close in the end, after m²/4 + 4
-exchanges of Goldfarb and Idnani's method on the primal problem, as counted for m = 8, 12, …, 32.
+chain: a dual active-set method that adds the most violated contact drops it again, and again.
+K = B(2I + S + Sᵀ − eeᵀ)B with e the last unit vector, B = diag(2^−round(i/2)), and x = g, gᵢ ≈ −(3/4)ⁱ, i
+from 0: all contacts close in the end, after m²/4 + 4 exchanges of Goldfarb and Idnani's method on the primal
+problem (counted for m = 8, 16, 24, 32; found by search, no source).
 
 vertex: as many contacts as unknowns, in random directions, all of them touch, and two thirds without a force.
 """

@@ -4,10 +4,10 @@ With the Hadamard matrix H (n, n), Hᵀ = H, HH = nI, entries ±1 and n a power 
 
     K = HDH/n,  D = diag(d) of integers,    x = Hc, c integer,    Kx = H(Dc),
 
-so K has the eigenvalues d, and all entries and partial sums are integers. (Any other n is a sum of powers of two;
-H is then the block diagonal of the Hadamard matrices of these orders.) With λ ≥ 0 and y ≥ 0, λᵢyᵢ = 0,
-on the same grid, f = Kx + Aλ and g = Aᵀx + y hold exactly in float64 as long as no sum exceeds 2⁵³: x and λ
-are the exact solution. Finally everything is scaled by powers of two.
+so K has the eigenvalues d, and all entries and partial sums are integers. (Any other n is a sum of
+powers of two; H is then block diagonal, of the Hadamard matrices of these orders.) With λ ≥ 0 and y ≥ 0,
+λᵢyᵢ = 0, on the same grid, f = Kx + Aλ and g = Aᵀx + y hold exactly in float64 as long as no sum exceeds 2⁵³:
+x and λ are the exact solution. Finally everything is scaled by powers of two.
 """
 
 from __future__ import annotations

@@ -88,7 +88,9 @@ class GoldfarbIdnani(Solver):
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is None:
             lam = _certain(ready, slacks, result, tolerance, details)
-            return Answer(result.status, lam, data.prepared.recover(lam, load), result.pivots, details=details)
+            return Answer(
+                result.status, lam, data.prepared.recover(lam, load), result.pivots, details=details
+            )
         if result.status == "inaccurate":
             return _finished(ready, load, result, tolerance, details)
         lam = _on_support(ready, load, slacks(result.u)[0], result)

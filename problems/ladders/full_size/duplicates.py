@@ -1,4 +1,4 @@
-"""Nearly dependent constraints at full size: 128 contacts duplicated, the copies ever closer to the originals."""
+"""Nearly dependent constraints at full size: 128 contacts duplicated, ever closer to the originals."""
 
 from __future__ import annotations
 
