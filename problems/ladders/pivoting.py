@@ -34,7 +34,7 @@ def _fathi(m: int) -> Rung:
 
 
 def _murty(m: int) -> Rung:
-    p = 2.0 - 0.5 ** np.arange(m)
+    p: Vector = 2.0 - np.exp2(-np.arange(m))
     return Rung(f"Murty's problem with {m} contacts, one closed", made=_triangular(m, p))
 
 
