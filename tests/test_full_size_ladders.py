@@ -19,16 +19,21 @@ from problems.forms.manufactured_problem import DeferredProblem, ManufacturedPro
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.ladders.full_size import degeneracy, duplicates
-from problems.manufactured.exact import exact_model, spectrum
+from problems.manufactured.exact import Shares, exact_model, spectrum
 from problems.manufactured.ladder import ladder_names, make_rung, rung_names
 from problems.scene import read_scene
 from solvers.base import Form
 from solvers.registry import make_solver
 
 RUNGS = rung_names("hard-full/")
+OF_BOTH_SIZES = ["degeneracy", "duplicates", "supports", "thickness"]
 N = 300  # unknowns per part: 256 + 32 + 8 + 4
 SMALL = {
-    **{f"{percent} % weak": degeneracy._make(N, percent / 100) for percent in (25, 50, 75, 100)},
+    **{
+        f"{percent} % weak": degeneracy.touching(N, 1e6, Shares(min(0.4, 1 - percent / 100), percent / 100))
+        for percent in (25, 50, 75, 100)
+    },
+    **{f"cond {cond:g}": degeneracy.touching(N, cond, Shares()) for cond in (1e10, 1e12)},
     **{f"2^-{bits} apart": duplicates._make(N, 2.0**-bits) for bits in (4, 12, 16)},
 }
 IN_HOUSE: list[tuple[str, Form, float]] = [
@@ -98,17 +103,18 @@ def test_in_house_solvers_are_right(name: str, solver: str, form: Form, toleranc
     assert answer.lam is not None
     x = answer.x if answer.x is not None else data.recover(answer.lam, made.load)
     known = Reference(made.x, made.lam, made.lam > 0, 0.0, "chosen, exact")
-    limit = conditioned_limit(1e-7, 1e6, float(abs(made.x).max()))
+    condition = max(float(np.linalg.cond(K)) for K in made.assembly.blocks)
+    limit = conditioned_limit(1e-7, condition, float(abs(made.x).max()))
     assert judge(data, made.load, known, x, answer.lam, limit).verdict == "within"
 
 
 def test_a_rung_is_named_by_its_size_and_has_it() -> None:
-    assert ladder_names("hard-full/") == ["degeneracy", "duplicates", "supports", "thickness"]
+    assert ladder_names("hard-full/") == ["conditioning", *OF_BOTH_SIZES]
     for name in RUNGS:
         size = int(name.split("/")[2].split("-")[0])
         assert (read_scene(name).expected_size or ())[0] == size
         assert read_scene(name).on_ladder
-    for ladder in ladder_names("hard-full/"):
+    for ladder in OF_BOTH_SIZES:
         assert any(name.startswith(f"hard-full/{ladder}/11308-") for name in RUNGS)
 
 

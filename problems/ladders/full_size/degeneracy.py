@@ -23,15 +23,17 @@ def crossed(A: sp.csc_array) -> sp.csc_array:
     return sp.csc_array(A[np.r_[:n, 2 * n - 1 : n - 1 : -1]])
 
 
-def _make(n: int, weak: float) -> ManufacturedProblem:
-    one, d = sp.eye_array(n), spectrum(n, CONDITION)
+def touching(n: int, condition: float, shares: Shares) -> ManufacturedProblem:
+    """Two parts of n unknowns in contact at each."""
+    one, d = sp.eye_array(n), spectrum(n, condition)
     A = crossed(sp.csc_array(sp.vstack([one, -one])))
-    return manufacture(exact_model(d, d, A=A), seed=2, shares=Shares(min(0.4, 1 - weak), weak))
+    return manufacture(exact_model(d, d, A=A), seed=2, shares=shares)
 
 
 def _rung(n: int, percent: int) -> Rung:
-    size = n // 2
-    problem = DeferredProblem((size, size), size, partial(_make, size, percent / 100))
+    size, weak = n // 2, percent / 100
+    shares = Shares(min(0.4, 1 - weak), weak)
+    problem = DeferredProblem((size, size), size, partial(touching, size, CONDITION, shares))
     return Rung(f"Two parts, {percent} % of the contacts touch without a force, n = {n}", made=problem)
 
 

@@ -1,4 +1,7 @@
-"""The wing panel on ever softer supports: cond(K) grows with their compliance."""
+"""The wing panel on ever softer supports: cond(K) grows with their compliance.
+
+It ends at 3e11: beyond, λmin(K) can no longer be proven at this size, so that no answer could be judged.
+"""
 
 from __future__ import annotations
 
@@ -19,5 +22,5 @@ def _rung(n: int, stiffness: float) -> Rung:
 
 RUNGS: Ladder = {
     f"{n}-{stiffness:.0e}": partial(_rung, n, stiffness)
-    for n, stiffness in ((4386, 1e3), (4386, 1.0), (4386, 1e-2), (4386, 1e-3), (4386, 1e-4), (11308, 1e-3))
+    for n, stiffness in ((4386, 1e3), (4386, 1.0), (4386, 1e-1), (4386, 1e-2), (4386, 2e-3), (11308, 1e-1))
 }
