@@ -1,4 +1,7 @@
-"""Nearly dependent constraints at full size: 128 contacts duplicated, ever closer to the originals."""
+"""Nearly dependent constraints at full size: 128 contacts duplicated, ever closer to the originals.
+
+At 2⁻¹⁶ the model refuses them as dependent: a pivot of Q is within the rounding of 3184 contacts.
+"""
 
 from __future__ import annotations
 
@@ -28,5 +31,5 @@ def _rung(n: int, bits: int) -> Rung:
 
 RUNGS: Ladder = {
     f"{n}-{2.0**-bits:.0e}": partial(_rung, n, bits)
-    for n, bits in ((6112, 4), (6112, 8), (6112, 12), (6112, 16), (11308, 12))
+    for n, bits in ((6112, 4), (6112, 8), (6112, 10), (6112, 12), (11308, 12))
 }
