@@ -40,8 +40,7 @@ def stored_mib(scene: Scene) -> float:
         case JointScene():
             return 8 * _entries(_blocks(scene), scene.joint.size[1]) / MIB
         case MadeScene():
-            assembly = scene.made.assembly
-            return 8 * _entries([len(K) for K in assembly.blocks], assembly.m) / MIB
+            return 8 * _entries(list(scene.block_sizes), scene.expected_size[1]) / MIB
     return 0.0
 
 

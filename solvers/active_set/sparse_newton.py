@@ -124,6 +124,10 @@ class SparseState:
             if status in ("solved", "inaccurate"):
                 status = "solved" if residual <= max(tolerance, rounding[column]) else "inaccurate"
             details = found[k].details | {"kkt_residual_mm": residual}
+            if status == "solved":
+                details.pop("cause", None)
+            elif "cause" not in details:
+                details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
             found[k] = replace(found[k], status=status, x=x[:, column], details=details)
         return found
 
