@@ -10,12 +10,11 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import pytest
+import scipy.sparse as sp
 from exact_draws import LOADS, ExactLoad, ExactProblem, exact_problem
 from long import draws
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ from problems.forms.problem import in_form
 from solvers.registry import in_house, make_solver, modules
 
 SEED = 16
-TIME_LIMIT_S = 20  # per problem
+TIME_LIMIT_S = 20  # of the processor, per problem
 LARGEST_CONDITION = 1e13  # the commands refuse 1e14
 COMPLIANCE = 0.1  # mm/N, as in ipm's CONTACT_COMPLIANCE
 WORST_SHOWN = 20
@@ -88,8 +87,8 @@ def contained(log: Log) -> Iterator[None]:
     def stop(*_: object) -> None:
         raise TimeoutError
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, TIME_LIMIT_S)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, TIME_LIMIT_S)
     try:
         yield
     except TimeoutError:
@@ -97,8 +96,8 @@ def contained(log: Log) -> Iterator[None]:
     except Exception as error:
         log.fault("traceback", repr(error))
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def test_nothing_wrong_is_called_solved_and_no_bound_is_too_small() -> None:
@@ -109,7 +108,7 @@ def test_nothing_wrong_is_called_solved_and_no_bound_is_too_small() -> None:
         with contained(log):
             _check(log, made, np.random.default_rng([SEED, index, 1]))
         if index % 1000 == 999:
-            print(f"{index + 1} of {count // LOADS}, {time.monotonic() - start:.0f} s, {dict(log.faults)}")
+            print(f"{index + 1} of {count // LOADS}, {time.monotonic() - start:.0f} s, {dict(log.faults)}", flush=True)
     print(count, f"load cases, {time.monotonic() - start:.0f} s:", dict(log.faults), dict(log.seen))
     assert not log.faults, "\n".join([str(dict(log.faults)), *log.words])
     # Else the assertion above says little.
@@ -176,27 +175,34 @@ def _hostile_forces(each: ExactLoad, random: np.random.Generator) -> list[Vector
     return [each.lam + 1e-12 * noise[0], each.lam + 1e-3 * noise[1], noise[2], np.zeros_like(each.lam)]
 
 
-def _allowed(data: Prepared, each: ExactLoad, condition: float) -> dict[str, float]:
-    """max|x − x*|, mm, that each solver's promise leaves.
+def _promised(name: str, D: float, m: int, weakest: float, force: float, rounding: float) -> float:
+    """√D ‖x − x*‖_K, which max|x − x*| does not exceed, of a solver that kept its word; D = 1: ‖λ − λ*‖_Q.
 
-    With contacts of unit length, D the largest compliance and |y_C| ≤ δ, y ≥ −δ: the answer is that of gaps
-    changed by δ, off by √D √(mδ²/λmin(Q)) at most (batched/bound.py). δ is the tolerance or rounding. Of ipm
-    also λᵀy ≤ m ε_μ, which is √(D m ε_μ). Where no contact is more compliant than ipm assumes, the judge's
-    limit must hold as well.
+    With contacts of unit length and |y_C| ≤ δ, y ≥ −δ: the answer is that of gaps changed by δ, and off by
+    √(mδ²/λmin(Q)) in the norm of K at most (batched/bound.py). Of ipm, λᵀy ≤ m ε_μ, and feasible to δ: from
+    ‖e‖²_K = (λ − λ*)ᵀ(y − y*) ≤ λᵀy − λ*ᵀy ≤ m ε_μ + δ Σ(λ + λ*).
+    """
+    tolerance = TOLERANCES[name]
+    if name == "ipm":
+        delta = max(1e-3 * np.sqrt(tolerance), rounding)
+        return float(np.sqrt(D * (m * tolerance + 2.1 * delta * force)))
+    return float(np.sqrt(D * m / weakest) * max(tolerance, rounding)) if weakest > 0 else np.inf
+
+
+def _allowed(data: Prepared, each: ExactLoad, condition: float) -> dict[str, tuple[float, float]]:
+    """max|x − x*|, mm, that each solver's promise and the judge's limit leave; the latter is for joints no
+    more compliant than ipm assumes.
     """
     m, c = data.assembly.m, abs(data.assembly.A).max(axis=0).toarray().ravel()
     D = float(np.diag(data.solve_K(np.eye(data.assembly.n))).max())
-    weakest = np.linalg.eigvalsh(data.Q / c / c[:, None])[0]
-    size = float(max(abs(each.x).max(), abs(data.solve_K(each.load.f)).max()))
-    judged = conditioned_limit(1e-7, condition, size)
+    weakest = float(np.linalg.eigvalsh(data.Q / c / c[:, None])[0])
+    size = float(max(abs(v).max() for v in (each.x, data.solve_K(each.load.f), each.load.g / c)))
     rounding = conditioned_limit(0.0, condition, size)
-    found = {}
-    for name, tolerance in TOLERANCES.items():
-        promise = np.sqrt(D * m / max(weakest, 0.0)) * max(tolerance, rounding / 10) + rounding
-        if name == "ipm":
-            promise += np.sqrt(D * m * tolerance)
-        found[name] = min(promise, judged) if COMPLIANCE >= D else promise
-    return found
+    judged = conditioned_limit(1e-7, condition, size) if D <= COMPLIANCE else np.inf
+    force = float((c * each.lam).sum())
+    return {
+        name: (_promised(name, D, m, weakest, force, rounding / 10) + rounding, judged) for name in TOLERANCES
+    }
 
 
 def _check_solver(
@@ -204,7 +210,7 @@ def _check_solver(
     data: Prepared,
     given: tuple[ExactLoad, ...],
     references: list[Reference],
-    allowed: list[dict[str, float]],
+    allowed: list[dict[str, tuple[float, float]]],
     variant: Variant,
 ) -> Iterator[tuple[int, Vector]]:
     """One load case after another, warm, and all at once where the solver can; yields the forces."""
@@ -224,7 +230,7 @@ def _check_solver(
         (x,) = session.problem.recover([answer.lam], [answer.x], [loads[k]])
         assert x is not None
         assert answer.lam is not None
-        limit = allowed[k][name]
+        limit = min(allowed[k][name]) if variant in USUAL else allowed[k][name][0]
         error = max_error(x, given[k].x)
         if not error <= Fraction(limit):
             log.fault("wrong but solved", f"{variant}: {float(error):.3e} mm off, allowed {limit:.3e} mm")
@@ -238,13 +244,10 @@ def _check_solver(
 
 def _check_interface(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
     """As a user's own matrices, once as they are and once with a contact twice; Q and p by themselves."""
-    import scipy.sparse as sp
-
     assembly, each = made.assembly, made.loads[0]
     K = sp.block_diag(assembly.blocks)
-    scene = own_matrices(K, assembly.A, each.load.f, each.load.g)
     try:
-        data = prepared(scene)
+        data = prepared(own_matrices(K, assembly.A, each.load.f, each.load.g))
         known = refined_active_set(data, each.load)
     except InputError:
         if made.ordinary:
@@ -277,14 +280,16 @@ def test_a_dual_program_alone_is_solved_to_its_promise() -> None:
         if options.get("start") == "algorithm_4":
             continue  # it needs K
         with contained(log):
-            answer = solve_dual(Q, Q @ lam - y, name, options=options, tolerance=TOLERANCES[name])
+            try:
+                answer = solve_dual(Q, Q @ lam - y, name, options=options, tolerance=TOLERANCES[name])
+            except InputError as refused:
+                assert "gave no answer" in str(refused)
+                continue
             if answer.status == "solved":
                 assert answer.lam is not None
                 low, high = np.linalg.eigvalsh(Q)[[0, -1]]
-                error, tolerance = answer.lam - lam, TOLERANCES[name]
-                delta = max(tolerance, 1e-13 * high * max(1, lam.max()))
-                allowed = np.sqrt(m * delta**2 / low) + (np.sqrt(m * tolerance) if name == "ipm" else 0.0)
-                if not np.sqrt(error @ Q @ error) <= allowed:
+                error, rounding = answer.lam - lam, 1e-14 * high * max(1, lam.sum())
+                if not np.sqrt(error @ Q @ error) <= _promised(name, 1.0, m, low, lam.sum(), rounding):
                     log.fault("wrong but solved", f"{abs(error).max():.3e} N")
                 solved += 1
     assert not log.faults, "\n".join([str(dict(log.faults)), *log.words])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,7 @@ def into_place(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     `out` is no regular file or folder, is of the other kind, or is one of the inputs.
     """
     _check([out], inputs)
-    target = out.resolve()
+    target = Path(os.path.realpath(out))  # Path.resolve raises RuntimeError on a loop of links
     target.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=target.parent, prefix=".rivetbench.") as folder:
         new = Path(folder) / target.name

@@ -15,6 +15,7 @@ import os
 import zlib
 from collections.abc import Iterator, Sequence
 from io import BytesIO
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -75,9 +76,13 @@ def read_series(directory: Path) -> dict[str, Any]:
     path = directory / SERIES
     try:
         content = json.loads(path.read_text("utf-8"))
-        whole = isinstance(content["identity"], dict) and isinstance(content["cases"], int)
+        identity = content["identity"]
+        whole = 0 <= content["cases"] <= MAX_CASES and 0 < identity["tolerance"] < inf
+        whole &= all(type(content[name]) is int for name in ("cases", "threads"))
+        whole &= all(isinstance(content[name], str) for name in ("scene", "title", "machine"))
+        whole &= all(isinstance(identity[name], str) for name in ("solver", "form"))
     except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError.one(path, "content", str(error)[:80], DELETE) from error
+        raise InputError.one(path, "content", repr(error)[:80], DELETE) from error
     if not whole:
         raise InputError.one(path, "content", "not what was written", DELETE)
     return dict(content)

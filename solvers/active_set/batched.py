@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.linalg import blas
@@ -113,7 +114,9 @@ class BatchedSweeps:
             y = product(self.Q, lam) - load.p
         # `kkt_status` bounds the same rounding by |Q|λ, which is slow to compute.
         status, residual = kkt_status(self.Q, load.p, lam, y, max(tolerance, _rounding_bound(load.p, y)))
-        details = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
+        details: dict[str, Any] = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
+        if status != "solved":
+            details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
         return Answer(status, lam, iterations=case.sweeps, inner_iterations=case.sets, details=details)
 
 
@@ -163,10 +166,17 @@ def _update(case: Case, lam: Vector, Qlam: Vector, compliance: Vector, tolerance
     rounding = float(abs(y[case.C]).max(initial=0.0))
     stagnating = rounding > case.trial.rounding / 2
     case.trial, case.sweeps = TrialSolution(lam, y, rounding), case.sweeps + 1
-    if rounding <= max(RESIDUAL_TARGET * tolerance, _rounding_bound(case.p, y)) or (
-        stagnating and rounding <= tolerance
-    ):
-        case.settled = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
+    bound = _rounding_bound(case.p, y)
+    if rounding <= max(RESIDUAL_TARGET * tolerance, bound) or (stagnating and rounding <= tolerance):
+        right = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
+        residual = max(rounding, float(-y.min(initial=0.0))) + _cut_off(lam, compliance)
+        case.settled = right and residual <= max(tolerance, bound)  # else the answer would be inaccurate
+
+
+def _cut_off(lam: Vector, compliance: Vector) -> float:
+    """Bound on the change of y = Qλ − p, mm, if forces below zero are set to 0: |q_ij| ≤ √(q_ii q_jj)."""
+    root = np.sqrt(compliance)
+    return float(root.max(initial=0.0) * (root @ np.maximum(-lam, 0.0)))
 
 
 def _rounding_bound(p: Vector, y: Vector) -> float:
