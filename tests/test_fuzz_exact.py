@@ -66,8 +66,10 @@ class Log:
 
     def fault(self, kind: str, what: object) -> None:
         self.faults[kind] += 1
+        said = f"{kind}: {self.where}: {what}"
+        print(said, flush=True)
         if len(self.words) < WORST_SHOWN:
-            self.words.append(f"{kind}: {self.where}: {what}")
+            self.words.append(said)
 
     def bound(self, what: str, x: Vector, bound_mm: float, exact: Vector) -> None:
         """A fault unless max|x − x*| ≤ bound, in rational numbers."""
@@ -108,7 +110,10 @@ def test_nothing_wrong_is_called_solved_and_no_bound_is_too_small() -> None:
         with contained(log):
             _check(log, made, np.random.default_rng([SEED, index, 1]))
         if index % 1000 == 999:
-            print(f"{index + 1} of {count // LOADS}, {time.monotonic() - start:.0f} s, {dict(log.faults)}", flush=True)
+            print(
+                f"{index + 1} of {count // LOADS}, {time.monotonic() - start:.0f} s, {dict(log.faults)}",
+                flush=True,
+            )
     print(count, f"load cases, {time.monotonic() - start:.0f} s:", dict(log.faults), dict(log.seen))
     assert not log.faults, "\n".join([str(dict(log.faults)), *log.words])
     # Else the assertion above says little.
@@ -161,7 +166,9 @@ def _check_certificate(
     lam = abs(each.lam * (1 + size * random.normal(size=len(each.lam))))
     active: NDArray[np.bool_] = (each.lam > 0) ^ (random.random(len(lam)) < 0.1)
     zero_x, zero_lam = np.zeros_like(x), np.zeros_like(lam)
-    proof = certify(data.assembly, each.load, DoubleDouble(x, zero_x), DoubleDouble(lam, zero_lam), active, kappa)
+    proof = certify(
+        data.assembly, each.load, DoubleDouble(x, zero_x), DoubleDouble(lam, zero_lam), active, kappa
+    )
     log.bound("certificate", proof.x.hi, proof.bound_mm, each.x)
     y = each.load.g - data.assembly.A.T @ each.x  # exact: integers times powers of two
     if (proof.closed & (each.lam == 0)).any() or (proof.open & (y == 0)).any():
@@ -274,7 +281,9 @@ def test_a_dual_program_alone_is_solved_to_its_promise() -> None:
         L = np.tril(random.integers(-2, 3, (m, m)), -1) + np.diag(random.integers(1, 4, m))
         Q = L @ L.T
         lam = np.where(random.random(m) < random.choice([0.0, 0.5, 1.0]), random.integers(1, 50, m), 0)
-        y = np.where((lam > 0) | (random.random(m) < random.choice([0.0, 0.5, 1.0])), 0, random.integers(1, 50, m))
+        y = np.where(
+            (lam > 0) | (random.random(m) < random.choice([0.0, 0.5, 1.0])), 0, random.integers(1, 50, m)
+        )
         name, _, options = [*USUAL, *OTHERS][random.integers(len(USUAL) + len(OTHERS))]
         log.where = f"dual {index}, {name} {options}"
         if options.get("start") == "algorithm_4":

@@ -171,7 +171,10 @@ def own(root: Path, form: str, suffix: str) -> Target:
     commands = [("import", *(f"@{name}" for name in files), "--out", "@out.npz")] * 2
     if suffix == ".npz":
         commands += [("import", "@own.npz", "--out", "@own.npz"), ("validate", "@own.npz")]
-        commands += [("solve", "@own.npz", "--out", "@out"), ("solve", "@own.npz", "--solver", "gi", "--out", "@out")]
+        commands += [
+            ("solve", "@own.npz", "--out", "@out"),
+            ("solve", "@own.npz", "--solver", "gi", "--out", "@out"),
+        ]
     if form == "mtx":
         text = "".join(f'{name} = "own/{name}.mtx"\n' for name in "KAfg")
         (folder / "scene.toml").write_text(f"[matrices]\n{text}")
@@ -194,7 +197,9 @@ def cached(root: Path) -> Target:
         patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
         assert invoke(folder, ("solve", "@own.npz", "--out", "@answer"))[0] == 0
     files = [
-        str(path.relative_to(folder)) for path in (folder / "cache").rglob("*") if path.suffix in (".npy", ".json")
+        str(path.relative_to(folder))
+        for path in (folder / "cache").rglob("*")
+        if path.suffix in (".npy", ".json")
     ]
 
     def same_answer(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
@@ -205,7 +210,13 @@ def cached(root: Path) -> Target:
 
     commands = (("solve", "@own.npz", "--out", "@out"), ("validate", "@own.npz"))
     return Target(
-        "cache", 0.08, folder, tuple(files), commands, lambda name: not name.startswith(("out", "cache")), same_answer
+        "cache",
+        0.08,
+        folder,
+        tuple(files),
+        commands,
+        lambda name: not name.startswith(("out", "cache")),
+        same_answer,
     )
 
 
@@ -242,7 +253,9 @@ def results(root: Path) -> Target:
                         raise Fault("wrong", f"passed {row['key']}")
 
     names = tuple(
-        str(path.relative_to(folder)) for path in (folder / "done").rglob("*") if path.suffix in (".jsonl", ".toml", ".json", ".npz")
+        str(path.relative_to(folder))
+        for path in (folder / "done").rglob("*")
+        if path.suffix in (".jsonl", ".toml", ".json", ".npz")
     )
     commands = (*[("gate", "@done")] * 4, ("report", "@done"))
     return Target("results", 0.18, folder, names, commands, lambda name: "report/" not in name, accurate)
@@ -285,8 +298,14 @@ def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
         patch.setattr(style, "DPI", 30)
         patch.setattr("harness.measurement.describe.TIME_LIMIT_S", 20, raising=False)
         made = [scene(root), cached(root), results(root), series(root)]
-        made += [own(root, form, suffix) for form, suffix in (("npz", ".npz"), ("qpsolvers", ".npz"), ("mtx", ".mtx"))]
-        made += [own(root, form, suffix) for form, suffix in (("abaqus", ".mtx"), ("op4", ".op4"), ("dmig", ".pch"))]
+        made += [
+            own(root, form, suffix)
+            for form, suffix in (("npz", ".npz"), ("qpsolvers", ".npz"), ("mtx", ".mtx"))
+        ]
+        made += [
+            own(root, form, suffix)
+            for form, suffix in (("abaqus", ".mtx"), ("op4", ".op4"), ("dmig", ".pch"))
+        ]
         before = resource.getrlimit(resource.RLIMIT_AS)
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, before[1]))
         yield made
@@ -319,6 +338,7 @@ def test_every_hostile_file_is_refused_or_right(
         except Fault as fault:
             faults[fault.kind] += 1
             words.append(f"{fault.kind}: draw {index}, {target.name}: {fault.what}")
+            print(words[-1], flush=True)
         spent[target.name] += time.monotonic() - begun  # type: ignore[assignment]
         if index % 1000 == 999:
             print(f"{index + 1} of {count}, {time.monotonic() - start:.0f} s, {dict(faults)}", flush=True)
@@ -359,7 +379,9 @@ def _one(
         import traceback
 
         where = traceback.extract_tb(error.__traceback__)
-        mine = [f"{Path(f.filename).name}:{f.lineno}" for f in where if "/site-packages/" not in f.filename][-3:]
+        mine = [f"{Path(f.filename).name}:{f.lineno}" for f in where if "/site-packages/" not in f.filename][
+            -3:
+        ]
         raise Fault("traceback", f"{said}: {error!r:.200} at {' '.join(mine)}") from error
     if code not in CODES:
         raise Fault("words", f"{said}: exit code {code}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,7 +47,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             allowed = ", ".join(map(str, sorted(set(sizes.values()))))
             faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
         data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
-    plugin = str(change.plugin.resolve()) if change.plugin else suite.plugin
+    plugin = os.path.realpath(change.plugin) if change.plugin else suite.plugin
     if change.solvers:
         data["solver"] = [entry for entry in data["solver"] if entry["name"] in change.solvers]
     named = {entry["name"] for entry in data["solver"]}

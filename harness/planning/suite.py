@@ -11,6 +11,7 @@ forms = ["dual"]
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -129,7 +130,7 @@ def suite_from(data: dict[str, Any], path: Path) -> Suite:
     if isinstance(data.get("scenes"), list):
         data["scenes"] = resolved_scenes(data["scenes"], str(path), "scenes", path.parent, faults)
     if isinstance(data.get("plugin"), str):
-        data["plugin"] = str((path.parent / data["plugin"]).resolve())
+        data["plugin"] = os.path.realpath(path.parent / data["plugin"])
     faults += _unknown_solvers(data, path)
     return validated(data, path, faults)
 
@@ -164,7 +165,7 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
     found: dict[str, None] = {}
     for pattern in map(str, patterns):
         if Path(pattern).suffix in (".toml", ".npz"):
-            path = (base / pattern).resolve()
+            path = Path(os.path.realpath(base / pattern))
             if not path.is_file():
                 faults.append(Fault(where, key, pattern, "no such file"))
             found[str(path)] = None

@@ -181,8 +181,8 @@ def read_mtx(path: Path) -> Any:
 
 def _refuse_wrong_lines(path: Path, entries: int, layout: str, field: str) -> None:
     """Raise ValueError unless the lines after the sizes are `entries` entries: indices, if any, and values."""
-    values = {"pattern": [], "integer": [int], "complex": [float, float]}.get(field, [float])
-    kinds: list[Callable[[bytes], float]] = [*([int, int] if layout == "coordinate" else []), *values]
+    kinds: list[Callable[[bytes], float]] = [int, int] if layout == "coordinate" else []
+    kinds += {"pattern": [], "integer": [int], "complex": [float, float]}.get(field, [float])
     found = -1  # the size line
     with path.open("rb") as file:
         for number, line in enumerate(file, start=1):
