@@ -1,4 +1,4 @@
-"""How many draws a fuzzer makes: a few hundred, or with RIVETBENCH_LONG many (1) or so many (a larger number)."""
+"""The number of draws of a fuzzer: a few hundred, or with RIVETBENCH_LONG many."""
 
 from __future__ import annotations
 

@@ -423,7 +423,10 @@ def test_rows_of_another_series_among_its_own_are_named(series: Path) -> None:
     [
         *((store.SERIES, text) for text in (b"", b"[]", b"[" * 100_000, b'{"identity": 1}', b"\xff")),
         (store.SERIES, b'{"identity": {"solver": "gi", "form": "dual", "tolerance": 1.0}, "cases": 12}'),
-        (store.SERIES, b'{"identity": {}, "cases": 1, "threads": 1, "scene": "", "title": "", "machine": ""}'),
+        (
+            store.SERIES,
+            b'{"identity": {}, "cases": 1, "threads": 1, "scene": "", "title": "", "machine": ""}',
+        ),
         *(("contacts.npz", text) for text in (b"", b"PK\x03\x04")),
         *((store.CASES, text) for text in (b"[" * 100_000 + b"\n", b"[]\n", b"1\n", b'{"case": "a"}\n')),
         (store.CASES, b'{"case": 0, "verdict": {}}\n'),

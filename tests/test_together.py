@@ -269,7 +269,9 @@ def test_what_sweeps_settle_is_solved() -> None:
     x = np.array([[-1, -2, -2, -2, -2, -2, -2, -2], [-61, 14, 49, -36, -47, 61, -13, -7]]) / 4096
     lam = np.array([[0.25, 0, 0, 0, 0, 0, 0, 0], [0, 11.25, 0, 0, 0, 0, 0, 0]])
     y = np.array([[0, 1, 1, 1, 1, 1, 1, 1], [0, 0, 14, 60, 0, 27, 97, 0]]) / 4096
-    cases = [LoadCase(data.assembly.multiply_K(u) + A @ v, A.T @ u + w) for u, v, w in zip(x, lam, y, strict=True)]
+    cases = [
+        LoadCase(data.assembly.multiply_K(u) + A @ v, A.T @ u + w) for u, v, w in zip(x, lam, y, strict=True)
+    ]
     session = SolverSession(make_solver("newton", {}), in_form(data, "dual"), TOLERANCE)
     session.open(batched=True)
     answers = session.solve_batch(session.problem.loads([*cases, cases[0]]))

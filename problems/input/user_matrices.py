@@ -163,12 +163,15 @@ def _read_mtx(path: Path, key: str) -> Any:
         raise InputError.one(path, key, str(error), "a readable Matrix Market file") from error
 
 
+Kind = Callable[[bytes], float]  # int or float
+
+
 def read_mtx(path: Path) -> Any:
     """A Matrix Market file, array or sparse.
 
-    Raises ValueError if entries are missing, a line holds anything else than one entry, or a symmetric matrix is
-    not square. mmread would take missing entries for zeros, read 3,5 and 3D5 as 3, and crash on a NUL, on an
-    array without entries, and on a symmetric one that is not square.
+    Raises ValueError if entries are missing, a line holds anything else than one entry, or a symmetric matrix
+    is not square. mmread would take missing entries for zeros, read 3,5 and 3D5 as 3, and crash on a NUL, on
+    an array without entries, and on a symmetric one that is not square.
     """
     rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
     if symmetry != "general" and rows != columns:
@@ -180,9 +183,9 @@ def read_mtx(path: Path) -> Any:
 
 
 def _refuse_wrong_lines(path: Path, entries: int, layout: str, field: str) -> None:
-    """Raise ValueError unless the lines after the sizes are `entries` entries: indices, if any, and values."""
-    kinds: list[Callable[[bytes], float]] = [int, int] if layout == "coordinate" else []
-    kinds += {"pattern": [], "integer": [int], "complex": [float, float]}.get(field, [float])
+    """Raise ValueError unless the lines after the sizes are `entries` entries, with indices if sparse."""
+    values: dict[str, list[Kind]] = {"pattern": [], "integer": [int], "complex": [float, float]}
+    kinds = ([int, int] if layout == "coordinate" else []) + values.get(field, [float])
     found = -1  # the size line
     with path.open("rb") as file:
         for number, line in enumerate(file, start=1):
