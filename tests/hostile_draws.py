@@ -40,6 +40,7 @@ VALUES: tuple[Any, ...] = (
 ARRAYS: tuple[Callable[[Any], Any], ...] = (
     lambda a: a * np.nan,
     lambda a: a * 1e308,
+    lambda a: a / abs(a).max(initial=1e-300) * 1.7e308,
     lambda a: a * 1e-310,
     lambda a: a * 0,
     lambda a: -a,

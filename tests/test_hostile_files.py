@@ -445,6 +445,19 @@ def test_a_damaged_file_of_a_series_is_named(name: str, content: bytes, series: 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("place", [np.nan, np.inf, 1e300])
+def test_contacts_nowhere_on_earth_are_damaged(place: float, series: Path) -> None:
+    with np.load(series / "contacts.npz") as file:
+        arrays = dict(file)
+    arrays["contact_nodes"][0, 0] = place
+    np.savez(series / "contacts.npz", **arrays)
+    refused = invoke("report", series)
+    assert refused.exit_code == 2
+    assert "contacts.npz" in refused.output
+    assert solve_series(series).exit_code == 0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["contacts.npz", store.GAPS])
 def test_a_missing_file_of_a_series_is_named_and_made_again(name: str, series: Path) -> None:
     (series / name).unlink()

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from harness.results import records
 from harness.results.schema import VERDICTS
 from problems.errors import Fault, InputError
+from problems.input.bounded import LARGEST
 from problems.load_cases.base import LoadCases
 from problems.storage.cache import digest
 
@@ -153,7 +154,8 @@ def contacts_in(directory: Path) -> int:
     except Exception:  # numpy, zipfile and zlib raise kinds of their own
         return 0
     whole = nodes.shape == (m, 2) and fasteners.ndim == 2 and fasteners.shape[1] == 2
-    return m if whole and nodes.dtype.kind == fasteners.dtype.kind == "f" else 0
+    whole = whole and nodes.dtype.kind == fasteners.dtype.kind == "f"
+    return m if whole and all((abs(places) <= LARGEST).all() for places in (nodes, fasteners)) else 0
 
 
 class GapFile:
