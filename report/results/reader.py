@@ -18,12 +18,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.results.schema import LADDERS
-from problems.input.bounded import LARGEST
 from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
 
 from .cells import cells_of
 from .rows import frame
+
+FAR_AWAY = 1e15  # mm: no picture is so large
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Results:
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
             return {}
         places = [arrays[name] for name in ("contact_nodes", "fasteners") if name in arrays]
-        if not all((abs(each) <= LARGEST).all() for each in places):  # NaN, too
+        if not all((abs(each) < FAR_AWAY).all() for each in places):  # NaN, too
             return {}
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 
