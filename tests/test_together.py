@@ -15,6 +15,7 @@ from harness.conformance.known_problems import contact_rows
 from harness.measurement.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.banded_inverse import BandedInverse, banded_inverse, order_along_joint
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.load_cases.random_gaps import random_gaps
@@ -23,7 +24,6 @@ from solvers.active_set.batched import BatchedSweeps
 from solvers.active_set.bordered_factor import Set
 from solvers.active_set.contact_sets import TrialSolution
 from solvers.base import Answer
-from solvers.linear_algebra.banded_inverse import BandedInverse, banded_inverse, order_along_joint
 from solvers.methods.newton import ActiveSetNewton
 from solvers.registry import make_solver
 

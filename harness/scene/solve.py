@@ -107,12 +107,12 @@ def solve(
         load = load_case(scene, road.form)
         p = data.dual_load(load)
     has_contact = bool((p > 0).any())
-    start = None
+    guess = None
     if has_contact and road.form == "sparse":
         with steps.step("contact set"):
-            start = answer_of("newton", _solver("newton"), data, "sparse", load, TOLERANCE).lam
+            guess = answer_of("newton", _solver("newton"), data, "sparse", load, TOLERANCE).lam
     with steps.step("answer with a proven bound"):
-        known = reference_of(scene, data, load, reference_limit_s, None if start is None else start > 0)
+        known = reference_of(scene, data, load, reference_limit_s, guess)
     if solver and chosen and has_contact:
         with steps.step(f"solving with {solver}"):
             x, lam, outcome = _answer(solver, chosen, data, road.form, load, tolerance)
@@ -121,7 +121,7 @@ def solve(
     else:
         x, lam = known.x, known.lam
         outcome = {
-            "method": SPARSE_ACTIVE_SET if start is not None else ACTIVE_SET if has_contact else LINEAR,
+            "method": SPARSE_ACTIVE_SET if guess is not None else ACTIVE_SET if has_contact else LINEAR,
             "status": "solved",
             "verdict": "within" if known.bound_mm <= LIMIT_MM else "cannot_be_judged",
             "judged_error_mm": None,

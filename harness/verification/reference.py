@@ -38,6 +38,7 @@ from .certificate import certify
 from .definite import smallest_eigenvalue
 from .exact_residual import DoubleDouble, forces, gaps
 from .principal_pivoting import Stop, contact_set
+from .sparse_bound import SparseBound
 
 #: (force, gap) → x and λ of the optimality conditions for a contact set with these right-hand sides.
 ContactSolve = Callable[[Vector, Vector], tuple[Vector, Vector]]
@@ -46,6 +47,7 @@ MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
 STOPPED = "the search for the contact set was stopped"
 UNPROVEN = "could not be proven"
+PROVEN_ENOUGH_MM = 1e-9  # a wider bound is tried to be improved by a factorisation for the contact set
 ENOUGH = 1e-20  # relative to x: a smaller correction is the last
 
 
@@ -75,7 +77,7 @@ def reference_of(
     prepared: Prepared,
     load: LoadCase,
     limit_s: float | None = None,
-    start: NDArray[np.bool_] | None = None,
+    guess: Vector | None = None,
 ) -> Reference:
     """The reference of a scene: the answer that it was made from, if any, else the refined one.
 
@@ -85,26 +87,26 @@ def reference_of(
     if isinstance(scene, MadeScene):
         made = scene.made
         if made.x is None or made.lam is None:
-            return refined_active_set(prepared, load, limit_s, start)
+            return refined_active_set(prepared, load, limit_s, guess)
         route = "chosen, exact"
         return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
-    return reference(prepared, load, limit_s, start)
+    return reference(prepared, load, limit_s, guess)
 
 
 def reference(
     prepared: Prepared,
     load: LoadCase,
     limit_s: float | None = None,
-    start: NDArray[np.bool_] | None = None,
+    guess: Vector | None = None,
 ) -> Reference:
     """The reference of a load case, from the cache if it was computed before for these matrices."""
     if prepared.key is None:
-        return refined_active_set(prepared, load, limit_s, start)
+        return refined_active_set(prepared, load, limit_s, guess)
     key = cache.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
 
     stored = cache.load(key)
     if stored is None:
-        found = refined_active_set(prepared, load, limit_s, start)
+        found = refined_active_set(prepared, load, limit_s, guess)
         if STOPPED not in found.route:  # else a longer search may find more
             made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam, "active": found.active}
             cache.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
@@ -162,15 +164,24 @@ def refined_active_set(
     prepared: Prepared,
     load: LoadCase,
     limit_s: float | None = None,
-    start: NDArray[np.bool_] | None = None,
+    guess: Vector | None = None,
 ) -> Reference:
-    """The active set, refined and certified. start : a first guess of it; the proof does not depend on it."""
+    """The active set, refined and certified.
+
+    guess : λ (m,) N of an answer, from whose set the search starts; with a sparse K the answer itself is
+        refined, if that proves enough. The proof does not depend on where it came from.
+    """
+    if guess is not None and isinstance(prepared, SparsePrepared):
+        bound = SparseBound.of(prepared, proven_lambda_min(prepared))
+        refined = None if bound is None else bound.proven(load, guess)
+        if refined is not None and refined.bound_mm <= PROVEN_ENOUGH_MM:
+            return Reference(refined.x.hi, refined.lam.hi, refined.active, refined.bound_mm, "proven")
     p = prepared.dual_load(load)
     active = np.zeros(len(p), dtype=bool)
     limit_s = default_limit_s(len(p)) if limit_s is None else limit_s
     end = time.monotonic() + limit_s
-    if start is not None:
-        active = start
+    if guess is not None:
+        active = guess > 0
     elif (p > 0).any():  # else Q is not needed
         active = _contact_set(prepared, load, p, stop=lambda: time.monotonic() > end)
     stopped = time.monotonic() > end

@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from .assembly import Assembly, Matrix
+from .assembly import Assembly, Matrix, Vector
 from .balance import balanced_units, least_eigenvalue
+from .banded_inverse import BandedInverse, Windows, of_windows
 from .compliance import Compliance
 from .near_compliance import NearCompliance, near_compliance
 from .near_inverse import Rows
 from .prepared import Prepared
 from .sparse_factor import BandFactor, Factor, NotPositiveDefinite, factored
+
+
+@dataclass(frozen=True)
+class ApproximateInverse:
+    """M ≈ Q⁻¹. diagonal : about that of Q, (m,) mm/N."""
+
+    M: BandedInverse
+    diagonal: Vector
 
 
 class SparsePrepared(Prepared):
@@ -96,6 +105,25 @@ class SparsePrepared(Prepared):
         if len(bands) < len(like.sparse_factors):
             return None
         return near_compliance(like.assembly, bands, windows)
+
+    @cached_property
+    def approximate_inverse(self) -> ApproximateInverse | None:
+        """M ≈ Q⁻¹ with a narrow band, and about the diagonal of Q; None where K has no band, or where some
+        Q_WW is not positive definite in single precision.
+        """
+        assembly = self.assembly
+        windows = Windows.of(assembly.contact_nodes, assembly.m)
+        near = self.near_compliance(windows.contacts())
+        if near is None:
+            return None
+        diagonal = np.empty(assembly.m)
+        for _, start, stop in windows.ranges():
+            line = windows.order[start:stop]
+            diagonal[line] = np.diag(near.submatrix(line))
+        try:
+            return ApproximateInverse(of_windows(windows, near.submatrix), diagonal)
+        except np.linalg.LinAlgError:
+            return None
 
     @cached_property
     def Q(self) -> Matrix:

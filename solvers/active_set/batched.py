@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
+from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.compliance import AnyQ
 from solvers.base import Answer, LoadCase
 from solvers.kkt import EPS, kkt_status
-from solvers.linear_algebra.banded_inverse import BandedInverse, BandFactor
 from solvers.linear_algebra.product import products
 
 from .block_pivoting import block_pivoting, wrong_signs

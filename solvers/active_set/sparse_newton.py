@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.banded_inverse import Contacts
 from problems.forms.problem import Problem, stacked
 from problems.forms.sparse_factor import NotPositiveDefinite
 from problems.forms.sparse_prepared import SparsePrepared
 from solvers.base import Answer, Batch, WarmStart, failed
 from solvers.kkt import EPS
-from solvers.linear_algebra.banded_inverse import BandedInverse, Contacts, Windows, of_windows
 
 from .augmented_sets import AugmentedSets
 from .batched import RESIDUAL_TARGET, BatchedSweeps, Case
@@ -51,12 +51,11 @@ class SparseState:
             _ = prepared.sparse_factors
         except NotPositiveDefinite as error:
             return failed(f"K is not positive definite: {error}")
-        M, diagonal = _banded(prepared)
-        if diagonal is None:
-            diagonal = np.ones(assembly.m)
+        approximate = prepared.approximate_inverse
+        if approximate is None:
+            return cls(problem, prepared, np.ones(assembly.m), None, max_sets)
+        M, diagonal = approximate.M, approximate.diagonal
         state = cls(problem, prepared, diagonal, None, max_sets)
-        if M is None:
-            return state
         Q = prepared.compliance
         sweeps = SparseSweeps(Q, diagonal, M, state.by_sets, MAX_SWEEPS, prepared=prepared)
         return replace(state, sweeps=sweeps)
@@ -158,20 +157,3 @@ def gaps(prepared: SparsePrepared, lam: Matrix, loads: Sequence[LoadCase]) -> Ma
     A, cases = prepared.assembly.A, stacked(loads)
     y: Matrix = cases.g - A.T @ prepared.solve_K(cases.f - A @ lam)
     return y
-
-
-def _banded(prepared: SparsePrepared) -> tuple[BandedInverse | None, Vector | None]:
-    """M and the diagonal of Q; None where K has no band, or where Q_WW is not positive definite."""
-    assembly = prepared.assembly
-    windows = Windows.of(assembly.contact_nodes, assembly.m)
-    near = prepared.near_compliance(windows.contacts())
-    if near is None:
-        return None, None
-    diagonal = np.empty(assembly.m)
-    for _, start, stop in windows.ranges():
-        line = windows.order[start:stop]
-        diagonal[line] = np.diag(near.submatrix(line))
-    try:
-        return of_windows(windows, near.submatrix), diagonal
-    except np.linalg.LinAlgError:
-        return None, diagonal

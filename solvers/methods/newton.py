@@ -18,6 +18,7 @@ import numpy as np
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
+from problems.forms.banded_inverse import banded_inverse
 from solvers.active_set.batched import BatchedSweeps
 from solvers.active_set.block_pivoting import MAX_SINGLE_EXCHANGES, block_pivoting
 from solvers.active_set.bordered_factor import Set
@@ -26,7 +27,6 @@ from solvers.active_set.nested import Cells, cells_of, representatives
 from solvers.active_set.solve import solve_from
 from solvers.base import Answer, Batch, Form, LoadCase, Problem, Solver, WarmStart, failed
 from solvers.interior_point.identify import identified_set
-from solvers.linear_algebra.banded_inverse import banded_inverse
 from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
 

@@ -26,11 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sla
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
-from harness.verification.definite import SMALLEST, smallest_eigenvalue
 from harness.verification.exact_residual import ETA, exponent, gamma
+from harness.verification.independence import independence
 from harness.verification.length import length
 from harness.verification.reference import proven_lambda_min
 from problems.forms.assembly import Assembly, Matrix, Vector
@@ -105,24 +103,3 @@ def gaps(assembly: Assembly, g: Matrix, x: Split) -> tuple[Matrix, Matrix]:
     if assembly.altered:
         error = error + assembly.altered.of_gaps(x_size)
     return s, SAFE * error
-
-
-def independence(assembly: Assembly) -> float:
-    """A proven σ² ≤ λmin(AᵀA); 0 if none was found. AᵀA is block diagonal, a block per node."""
-    G = sp.csr_array(assembly.A.T @ assembly.A)
-    count, label = connected_components(G, directed=False)
-    sizes = np.bincount(label, minlength=count)
-    groups = np.split(np.argsort(label, kind="stable"), np.cumsum(sizes)[:-1])
-    least = float(G.diagonal()[sizes[label] == 1].min(initial=np.inf))
-    for group in groups:
-        if len(group) > 1:
-            block = np.asfortranarray(G[group][:, group].toarray())
-            least = min(least, smallest_eigenvalue(block, float(np.linalg.eigvalsh(block)[0])))
-    # The entries of AᵀA are rounded themselves, and so is the difference.
-    uncertainty = (
-        SAFE * gamma(assembly.n + 1) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
-    )
-    sigma2 = least - uncertainty
-    if assembly.altered and sigma2 > 0:  # (σ − ‖ΔA‖₂)² ≥ σ² − 2σ‖ΔA‖₂
-        sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A
-    return float(sigma2) if sigma2 >= SMALLEST else 0.0

@@ -1,8 +1,7 @@
-"""Bounds on the displacement errors of answers in the sparse form, by a certified answer beside each.
+"""Bounds on the displacement errors of answers in the sparse form, by a proven answer beside each.
 
-From the contact set of the answer the optimality conditions are solved to twice the working precision and
-certified (see `reference`); the bound is the distance to that answer plus its own bound. Whatever set the
-answer has, the bound holds.
+Each answer is refined to twice the working precision, with a proven bound (see `sparse_bound`); its own bound
+is the distance to that, and this bound.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ def assess(
 def _of(prepared: SparsePrepared, load: LoadCase, lam: Vector, x: Vector | None) -> Assessment:
     assembly = prepared.assembly
     x = prepared.recover(lam, load) if x is None else x
-    known = refined_active_set(prepared, load, start=lam > 0)
+    known = refined_active_set(prepared, load, guess=lam)
     away = float(abs(assembly.at_junction(x - known.x)).max(initial=0.0))
     gap = load.g - assembly.A.T @ x
     r = load.f - assembly.multiply_K(x) - assembly.A @ lam

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
-from problems.forms.assembly import Matrix, Vector
+from .assembly import Matrix, Vector
 
 Contacts = NDArray[np.intp]
 
