@@ -22,7 +22,7 @@ from pydantic import ValidationError
 
 from problems.input.bounded import regular_file, resolved
 from problems.input.validation import UNITS, unknown, validation_faults
-from problems.manufactured.ladder import PREFIX, make_rung, rung_names
+from problems.manufactured.ladder import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
 from problems.model.joint import Joint, Table
@@ -49,8 +49,8 @@ def read_scene(name_or_path: str) -> Scene:
 
     Raises InputError naming the file, the key, the value and what is allowed, all faults at once.
     """
-    if name_or_path.startswith(PREFIX):
-        return _rung_scene(name_or_path)
+    if prefix := prefix_of(name_or_path):
+        return _rung_scene(prefix, name_or_path)
     path = Path(name_or_path)
     if path.suffix == ".npz":
         if not path.is_file():
@@ -85,9 +85,9 @@ def _as_toml(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _rung_scene(name: str) -> Scene:
-    if name not in rung_names():
-        raise _unknown_scene(name, rung_names())
+def _rung_scene(prefix: str, name: str) -> Scene:
+    if name not in (known := rung_names(prefix)):
+        raise _unknown_scene(name, known)
     rung = make_rung(name)
     if rung.made:
         return MadeScene(name, rung.title, rung.made, on_ladder=True, refused=rung.refused)

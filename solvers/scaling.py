@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
+from problems.forms.sparse_prepared import SparsePrepared
 
 from .base import Answer, Batch, Solver, WarmStart
 
@@ -46,6 +47,13 @@ class UnitContacts(Prepared):
 
     def solve_K(self, b: Matrix) -> Matrix:
         return self.base.solve_K(b)
+
+
+def unit_contacts(base: Prepared, c: Vector) -> Prepared:
+    """The prepared assembly with the columns of A divided by c."""
+    if isinstance(base, SparsePrepared):
+        return base.with_contacts(sp.csc_array(base.assembly.A @ sp.diags_array(1 / c)))
+    return UnitContacts(base, c)
 
 
 @dataclass(frozen=True)
@@ -77,7 +85,7 @@ class Scaled(Solver):
         c = contact_units(problem.assembly.A)
         if (c == 1).all():
             return _Scaled(self.solver.convert(problem), None)
-        return _Scaled(self.solver.convert(in_form(UnitContacts(problem.prepared, c), problem.form)), c)
+        return _Scaled(self.solver.convert(in_form(unit_contacts(problem.prepared, c), problem.form)), c)
 
     def prepare(self, data: _Scaled) -> _Scaled:
         return replace(data, inner=self.solver.prepare(data.inner))

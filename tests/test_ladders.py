@@ -24,6 +24,7 @@ from problems.scene import read_scene, scene_names
 from solvers.base import Form
 from solvers.registry import make_solver
 
+WHOLE = 2**1200
 RUNGS = rung_names()
 TAKEN = [name for name in RUNGS if not make_rung(name).refused]
 REFUSED = [name for name in RUNGS if make_rung(name).refused]
@@ -35,6 +36,8 @@ IN_HOUSE: list[tuple[str, Form, float]] = [
     ("newton", "dual", 1e-10),
     ("ipm-fast", "dual", 1e-10),
 ]
+#: Where the paper's interior-point method, which starts from forces of 1 N, may say that it finds no answer.
+MAY_GIVE_UP = [("ipm", name) for name in TAKEN if "/denormal/" in name or name.endswith("/chain-32")]
 
 
 @cache
@@ -43,8 +46,8 @@ def opened(name: str) -> ReferenceProblem:
 
 
 def whole(values: Any) -> Any:
-    """Whole numbers that are 2¹⁴⁰ times the values, exactly."""
-    exact = [Fraction(float(v)) * 2**140 for v in np.asarray(values).ravel()]
+    """Whole numbers that are 2¹²⁰⁰ times the values, exactly: so denormal numbers, too, become whole."""
+    exact = [Fraction(float(v)) * WHOLE for v in np.asarray(values).ravel()]
     assert all(v.denominator == 1 for v in exact)
     return np.array([v.numerator for v in exact], dtype=object).reshape(np.shape(values))
 
@@ -67,8 +70,8 @@ def test_the_answer_satisfies_the_optimality_conditions_without_rounding(name: s
     A, (x, lam, f, g) = whole(made.assembly.A.toarray()), map(whole, (made.x, made.lam, *load_of(made)))
     parts = zip(made.assembly.blocks, made.assembly.slices, strict=True)
     Kx = np.concatenate([whole(K) @ x[rows] for K, rows in parts])
-    y = g * 2**140 - A.T @ x
-    assert (Kx + A @ lam == f * 2**140).all()
+    y = g * WHOLE - A.T @ x
+    assert (Kx + A @ lam == f * WHOLE).all()
     assert (lam >= 0).all()
     assert (y >= 0).all()
     assert not (lam * y).any()
@@ -143,7 +146,7 @@ def test_in_house_solvers_hold(name: str, solver: str, form: Form, tolerance: fl
     assert np.isfinite(answer.lam).all()
     x = answer.x if answer.x is not None else data.recover(answer.lam, case)
     found = judge(data, case, base.reference, x, answer.lam, base.limit_mm(1e-7))
-    hard = data.facts["cond_K"] > 1.2e12  # type: ignore[operator]
+    hard = data.facts["cond_K"] > 1.2e12 or (solver, name) in MAY_GIVE_UP  # type: ignore[operator]
     assert found.verdict == "within" or (hard and answer.status != "solved")
     assert answer.status == "solved" or answer.details["cause"]
 
@@ -155,3 +158,26 @@ def test_the_suite_measures_every_rung_with_every_solver() -> None:
     lines = {(m.solver, m.form) for m in plan}
     assert len(plan) == len(TAKEN) * len(lines)
     assert {m.solver for m in plan if m.gated} == {"ipm", "gi", "newton", "ipm-fast"}
+
+
+@pytest.mark.parametrize("m", [8, 16, 24, 32])
+def test_the_chain_takes_quadratically_many_exchanges(m: int) -> None:
+    base = opened(f"hard/pivoting/chain-{m:02d}")
+    gi, problem = make_solver("gi", {}), in_form(base.prepared, "primal")
+    answer = gi.solve(gi.setup(gi.prepare(gi.convert(problem)), base.load, 1e-10), base.load, 1e-10)
+    assert answer.iterations == m**2 // 4 + 4
+
+
+@pytest.mark.parametrize("n", [16, 64, 256])
+def test_all_contacts_of_a_vertex_touch_and_a_third_have_a_force(n: int) -> None:
+    made = made_of(f"hard/pivoting/vertex-{n:03d}")
+    assert made.assembly.A.shape == (n, n)
+    assert not (made.load.g - made.assembly.A.T @ made.x).any()
+    assert np.count_nonzero(made.lam) == round(n / 3)
+
+
+def test_the_denormal_ladder_ends_in_denormal_numbers() -> None:
+    smallest = np.finfo(float).smallest_normal
+    f, g = made_of("hard/denormal/f-8e-314").load.f, made_of("hard/denormal/g-8e-317").load.g
+    assert (abs(f[f != 0]) < smallest).all()
+    assert (abs(g[g != 0]) < smallest).all()

@@ -59,3 +59,15 @@ def test_reference_takes_the_least_proven_eigenvalue_of_the_parts() -> None:
     assembly = Assembly(blocks, sp.csc_array(np.eye(2)))
     assert 0.8 <= proven_lambda_min(Prepared(assembly)) < 1.0
     assert 0.2 <= proven_lambda_min(Overestimated(assembly)) < 1.0
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["computed", "from the facts"])
+def test_reference_proves_each_part_by_its_own_eigenvalue(known: bool) -> None:
+    """λmin of the soft part, 1, is far below the rounding of the stiff one, 1e16 to 1e18."""
+
+    class Factored(Prepared):
+        facts = {"lambda_min": 1.0, "cond_blocks": [100.0, 100.0]}  # noqa: RUF012
+
+    soft = np.diag([1.0, 10.0, 100.0])
+    assembly = Assembly((soft, 1e16 * soft), sp.csc_array(np.eye(6)))
+    assert 0.8 <= proven_lambda_min((Factored if known else Prepared)(assembly)) < 1.0

@@ -12,7 +12,7 @@ from strip import write_strip
 
 from harness.conformance.known_problems import contact_rows
 from problems.build import load_case, prepared
-from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.load_cases.random_gaps import random_gaps
@@ -44,7 +44,7 @@ def grid(nx: int, ny: int, rng: np.random.Generator | None = None) -> np.ndarray
     return nodes if rng is None else nodes[rng.permutation(len(nodes))]
 
 
-def alone(C: Set | None, p: Vector, tolerance: float) -> Answer:
+def alone(C: Set | None, load: LoadCase, tolerance: float) -> Answer:
     raise AssertionError("all are settled together")
 
 
@@ -184,20 +184,18 @@ def test_a_near_case_is_where_the_next_one_begins() -> None:
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
 
-def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_solves_alone_is_given_the_contacts_as_they_are_numbered(tmp_path: Path) -> None:
     data, cases, loads = strip_loads(tmp_path, 6)
     M = banded_inverse(data.Q, data.assembly.contact_nodes)
     assert (M.order != np.arange(45)).any()
     starts: list[Set | None] = []
 
-    def told(C: Set | None, p: Vector, tolerance: float) -> Answer:
+    def told(C: Set | None, load: LoadCase, tolerance: float) -> Answer:
         starts.append(C)
         return Answer("solved", np.zeros(45))
 
-    monkeypatch.setattr("solvers.active_set.batched.MAX_SWEEPS", 4)  # not enough to be done, but for the set
-    batch = BatchedSweeps(data.Q, np.diag(data.Q), M, told)
+    # Four sweeps are not enough to be done, but for the set.
+    batch = BatchedSweeps(data.Q, np.diag(data.Q), M, told, max_sweeps=4)
     batch(loads[:1], TOLERANCE)
     starts.clear()
     batch.use_sweeps = True
@@ -236,9 +234,9 @@ def test_few_closed_contacts_are_solved_one_case_after_another(tmp_path: Path) -
     assert batch is not None
     own = batch.solve_one
 
-    def counted(C: Set | None, p: Vector, tolerance: float) -> Answer:
+    def counted(C: Set | None, load: LoadCase, tolerance: float) -> Answer:
         asked.append(C)
-        return own(C, p, tolerance)
+        return own(C, load, tolerance)
 
     batch.solve_one = counted
     answers = batch([LoadCase(c.f, c.g, data.dual_load(c)) for c in wide], TOLERANCE)

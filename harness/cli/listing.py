@@ -7,7 +7,7 @@ from rich.table import Table
 from harness.planning.suite import read_suite, suite_names
 from problems import formats
 from problems.errors import InputError
-from problems.manufactured.ladder import rung_names
+from problems.manufactured.ladder import PREFIXES, rung_names
 from problems.scene import read_scene, scene_names
 from solvers.registry import make_solver, modules, solver_names, solver_version
 
@@ -30,7 +30,8 @@ def _solvers() -> Table:
 
 def _scenes() -> Table:
     table = Table("scene", "n", "m", "title")
-    for name in [*scene_names(), *rung_names()]:
+    rungs = [name for prefix in PREFIXES for name in rung_names(prefix)]
+    for name in [*scene_names(), *rungs]:
         scene = read_scene(name)
         table.add_row(name, *(str(size) for size in scene.expected_size or ("", "")), scene.title)
     return table

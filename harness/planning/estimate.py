@@ -1,6 +1,8 @@
 """What a scene will need, before anything is built: memory, and time by counts of operations.
 
-The dense forms keep K and its factors, Σ 2 b² entries for blocks of b unknowns, and Q, m² entries.
+The dense forms keep K and its factors, Σ 2 b² entries for blocks of b unknowns, and Q, m² entries. The
+sparse form keeps the band factors of K̂, Σ N (b + 1) entries for blocks of N unknowns and half-bandwidth b,
+made in N b² operations.
 """
 
 from __future__ import annotations
@@ -21,6 +23,14 @@ if TYPE_CHECKING:
 
 MIB = 2**20
 
+# Of the sparse form, measured at n = 4386 and 11308.
+MODEL_S = 1e-5  # to assemble K̂, per unknown: not arithmetic, but memory and Python
+MODEL_BYTES = 1500  # while it is assembled, per unknown
+BAND_SLOWER = 2.5  # a band Cholesky factorisation than a dense one, per operation
+PROOF_COPIES = 4  # of the factors, in the proof of λmin
+PROOFS = 3  # factorisations in that proof, and of the coarser model
+SOLUTIONS = 400  # K̂⁻¹v, of an answer with its bound
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -34,14 +44,21 @@ class Estimate:
     answer_s: float
 
 
+@dataclass(frozen=True)
+class SparseEstimate(Estimate):
+    """The same in the sparse form: unknowns of the finite-element model, the largest half-bandwidth of K̂."""
+
+    unknowns: int
+    half_bandwidth: int
+
+
 def stored_mib(scene: Scene) -> float:
     """MiB of K, its factors and Q; 0 if that takes reading the matrices."""
     match scene:
         case JointScene():
             return 8 * _entries(_blocks(scene), scene.joint.size[1]) / MIB
         case MadeScene():
-            assembly = scene.made.assembly
-            return 8 * _entries([len(K) for K in assembly.blocks], assembly.m) / MIB
+            return 8 * _entries(list(scene.block_sizes), scene.expected_size[1]) / MIB
     return 0.0
 
 
@@ -84,6 +101,42 @@ def estimated(scene: JointScene, flops_per_s: float) -> Estimate:
     return Estimate(
         n, m, 8 * entries / MIB, peak, (condensing + preparing) / flops_per_s, answering / flops_per_s
     )
+
+
+def estimated_sparse(scene: JointScene, flops_per_s: float) -> SparseEstimate:
+    """From the numbering of the uncondensed model and counts of operations; good to a factor of three."""
+    n, m = scene.joint.size
+    bands = _bands(scene)
+    unknowns = sum(size for size, _ in bands)
+    entries = sum(size * (width + 1) for size, width in bands)
+    factoring = BAND_SLOWER * sum(size * width**2 for size, width in bands) / flops_per_s
+    peak = 150 + (MODEL_BYTES * unknowns + 8 * PROOF_COPIES * entries) / MIB
+    return SparseEstimate(
+        n,
+        m,
+        8 * entries / MIB,
+        peak,
+        MODEL_S * unknowns + factoring,
+        SOLUTIONS * BAND_SLOWER * 4 * entries / flops_per_s + PROOFS * factoring,
+        unknowns,
+        max(width for _, width in bands),
+    )
+
+
+def _bands(scene: JointScene) -> list[tuple[int, int]]:
+    """(unknowns, half-bandwidth) of K̂'s blocks; springs between parts are taken to make one of all.
+
+    An element joins a node, with 4 unknowns, to the next on the next line: 4 (nodes per line + 1) + 3.
+    """
+    joint = scene.joint
+    nx, ny = joint.junction.nodes
+    # The grid lines y = const of each part that are not built in.
+    lines = [
+        ny + sum(side.elements for side in (part.south, part.north) if side) - len(set(part.clamped))
+        for part in joint.part
+    ]
+    blocks = [lines] if any(scene.effects_of(TieEffect)) else [[count] for count in lines]
+    return [(4 * nx * sum(block), 4 * min(sum(block), nx * len(block)) + 7) for block in blocks]
 
 
 def _condensing(joint: Joint, part: Part) -> float:

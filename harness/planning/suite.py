@@ -22,7 +22,7 @@ from harness.results.checksums import Damaged, refuse_changed
 from problems.errors import Fault, InputError
 from problems.input.bounded import Finite, Positive, Seed, resolved
 from problems.input.validation import unknown, validation_faults
-from problems.manufactured.ladder import PREFIX, rung_names
+from problems.manufactured.ladder import prefix_of, rung_names
 from problems.scene import read_toml, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names
@@ -164,7 +164,7 @@ def read_written(path: Path) -> Suite:
 def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:
     """The scenes that match names, globs and paths (relative to `base`), in order, without duplicates.
 
-    Only patterns that begin with "hard/" match rungs of ladders.
+    Only patterns that begin with "hard/" or "hard-full/" match rungs of ladders.
     """
     found: dict[str, None] = {}
     for pattern in map(str, patterns):
@@ -174,7 +174,8 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
                 faults.append(Fault(where, key, pattern, "no such file"))
             found[str(path)] = None
             continue
-        known = rung_names() if pattern.startswith(PREFIX) else scene_names()
+        prefix = prefix_of(pattern)
+        known = rung_names(prefix) if prefix else scene_names()
         names = [name for name in known if fnmatchcase(name, pattern)]
         if not names:
             faults.append(Fault(where, key, pattern, unknown("scene", pattern, known)))

@@ -33,8 +33,8 @@ ANSWERED = VERDICTS[:-1]
 #: The forms of the quadratic program, in the order of every table.
 FORMS = ("sparse", "dual", "primal")
 
-#: The scenes that are rungs of ladders: hard/<ladder>/<rung>.
-LADDERS = "hard/"
+#: The scenes that are rungs of ladders: hard/<ladder>/<rung> and hard-full/<ladder>/<rung>.
+LADDERS = ("hard/", "hard-full/")
 
 #: The steps of a measurement, s; `form_s` is what the form costs per load case beside the solver.
 STEPS = ("convert_s", "prepare_s", "setup_s", "solve_s", "form_s")

@@ -25,7 +25,7 @@ from problems.forms.sparse_prepared import SparsePrepared
 from .interior_point import interior_contact_set
 from .principal_pivoting import Stop, pivoted
 
-STIFFER = 2.0**13  # ρ in units of the stiffest unknown at a contact
+STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
 PASSES = 3
 FEW = 2000  # contacts, for which the interior point may make Q
 ROUNDING = 2.0**-50  # of the largest term: gaps and forces that are zero but for rounding

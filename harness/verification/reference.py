@@ -120,10 +120,21 @@ def proven_lambda_min(prepared: Prepared) -> float:
 def _proven_lambda_min(prepared: Prepared) -> float:
     if isinstance(prepared, SparsePrepared):
         return sparse_definite.smallest_eigenvalue(prepared, balanced_units(prepared.assembly))
-    blocks, estimate = prepared.assembly.blocks, prepared.facts.get("lambda_min")
-    if not isinstance(estimate, float):
-        estimate = min(float(np.linalg.eigvalsh(_dense(K))[0]) for K in blocks)
-    return min(smallest_eigenvalue(_dense(K), estimate) for K in blocks)
+    estimates = _lambda_min_of_blocks(prepared)
+    blocks = map(_dense, prepared.assembly.blocks)
+    return min(smallest_eigenvalue(K, estimate) for K, estimate in zip(blocks, estimates, strict=True))
+
+
+def _lambda_min_of_blocks(prepared: Prepared) -> list[float]:
+    """An estimate for each block: λmin of all would be lost in the rounding of a much stiffer one.
+
+    Where the facts hold λmin of all blocks and each cond(K_i), that, or max_j k_jj / cond(K_i) ≤ λmin(K_i).
+    """
+    blocks, facts = prepared.assembly.blocks, prepared.facts
+    least, conditions = facts.get("lambda_min"), facts.get("cond_blocks")
+    if not (isinstance(least, float) and isinstance(conditions, list)):
+        return [float(np.linalg.eigvalsh(_dense(K))[0]) for K in blocks]
+    return [max(least, float(K.diagonal().max()) / c) for K, c in zip(blocks, conditions, strict=True)]
 
 
 def _dense(K: Any) -> Matrix:

@@ -1,8 +1,10 @@
-"""Matrices and a load that were made in memory, with their exact answer if it is known."""
+"""Matrices and a load that are made in memory, with their exact answer if it is known."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 from .assembly import Assembly, LoadCase, Vector
 
@@ -22,3 +24,21 @@ class ManufacturedProblem:
     lam: Vector | None = None
     unit_mm: Vector | float = 1.0
     gap_unit_mm: Vector | float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class DeferredProblem:
+    """A manufactured problem so large that it is made when needed only, and not kept beside another.
+
+    sizes : the unknowns of each block of K. m : the contacts. make : the same problem at every call.
+    """
+
+    sizes: tuple[int, ...]
+    m: int
+    make: Callable[[], ManufacturedProblem]
+
+
+@lru_cache(maxsize=1)
+def made(problem: DeferredProblem) -> ManufacturedProblem:
+    """The problem itself; of several, only the last one stays in memory."""
+    return problem.make()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -76,6 +77,17 @@ class SparsePrepared(Prepared):
     @property
     def compliance(self) -> Compliance:
         return Compliance(self.solve_K, self.assembly.A)
+
+    def with_contacts(self, A: sp.csc_array) -> SparsePrepared:
+        """The same K, whose factors are shared, with other contacts A (n, m') on the same unknowns."""
+        base = self
+
+        class WithContacts(SparsePrepared):
+            @cached_property
+            def sparse_factors(self) -> tuple[Factor, ...]:
+                return base.sparse_factors
+
+        return WithContacts(replace(self.assembly, A=A))
 
     def near_compliance(self, windows: Sequence[Rows]) -> NearCompliance | None:
         """Q_WW of windows of contacts to four digits, for a preconditioner; None without band factors."""

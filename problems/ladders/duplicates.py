@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from functools import partial
 
-import numpy as np
 import scipy.sparse as sp
 
 from problems.manufactured.exact import exact_model, manufacture, spectrum
@@ -18,12 +17,16 @@ DUPLICATED = 8
 CONDITION = 1e4
 
 
+def contacts(n: int, duplicated: int, tilt: float) -> sp.csc_array:
+    """A of two parts of n unknowns, in contact at each; the first contacts twice, `tilt` apart."""
+    one = sp.eye_array(n, format="csc")
+    beside = one[:, :duplicated] + tilt * one[:, duplicated : 2 * duplicated]
+    return sp.csc_array(sp.block_array([[one, one[:, :duplicated]], [-one, -beside]]))
+
+
 def _problem(tilt: float) -> ManufacturedProblem:
-    one = np.eye(N)
-    beside = one[:, :DUPLICATED] + tilt * one[:, DUPLICATED : 2 * DUPLICATED]
-    A = sp.csc_array(np.block([[one, one[:, :DUPLICATED]], [-one, -beside]]))
     d = spectrum(N, CONDITION)
-    return manufacture(exact_model(d, d, A=A), seed=3)
+    return manufacture(exact_model(d, d, A=contacts(N, DUPLICATED, tilt)), seed=3)
 
 
 def _nearly_equal(bits: int) -> Rung:

@@ -1,8 +1,18 @@
-"""Pivoting: single exchanges of signs visit exponentially many contact sets.
+"""Pivoting: contact sets by the thousand for methods that exchange one contact at a time.
 
-Q = LLᵀ, L unit lower triangular with 2 below the diagonal, p = 1 (Fathi, Math. Programming 17:335–344, 1979).
-L = (I + S)(I − S)⁻¹ with S the shift, so L⁻¹ has entries 1 and ±2, and K = Q⁻¹ = L⁻ᵀL⁻¹ is whole;
-cond(K) ≈ (4m/π)⁴. As Qe₁ = (1, 2, …, 2)ᵀ, the solution is λ = e₁, x = −Qe₁: one closed contact of m.
+fathi, murty: single exchanges of signs visit exponentially many contact sets. Q = LLᵀ, L unit lower
+triangular with 2 below the diagonal, and p = 1 (Fathi, Math. Programming 17:335–344, 1979) or pᵢ = 2 − 2⁻ⁱ,
+i from 0 (the p of Murty, Math. Programming Study 7:61–73, 1978, divided by 2ᵐ). L = (I + S)(I − S)⁻¹ with S
+the shift, so L⁻¹ has entries 1 and ±2, and K = Q⁻¹ = L⁻ᵀL⁻¹ is whole; cond(K) ≈ (4m/π)⁴. As
+Qe₁ = (1, 2, …, 2)ᵀ, the solution is λ = e₁, x = −Qe₁: one closed contact of m. Murty's gaps shrink by half
+from contact to contact, to 2¹⁻ᵐ.
+
+chain: a dual active-set method that adds the most violated contact drops it again, and again.
+K = B(2I + S + Sᵀ − eeᵀ)B with e the last unit vector, B = diag(2^−round(i/2)), and x = g, gᵢ ≈ −(3/4)ⁱ, i
+from 0: all contacts close in the end, after m²/4 + 4 exchanges of Goldfarb and Idnani's method on the primal
+problem (counted for m = 8, 16, 24, 32; found by search, no source).
+
+vertex: as many contacts as unknowns, in random directions, all of them touch, and two thirds without a force.
 """
 
 from __future__ import annotations
@@ -12,22 +22,61 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
 from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
 
-SIZES = (8, 16, 32, 48, 64, 128, 256, 512)
+GRID = 2.0**24  # the chain's gaps are multiples of 1/GRID
 
 
 def _fathi(m: int) -> Rung:
+    return Rung(f"Fathi's problem with {m} contacts, one closed", made=_triangular(m, np.ones(m)))
+
+
+def _murty(m: int) -> Rung:
+    p: Vector = 2.0 - np.exp2(-np.arange(m))
+    return Rung(f"Murty's problem with {m} contacts, one closed", made=_triangular(m, p))
+
+
+def _triangular(m: int, p: Vector) -> ManufacturedProblem:
     i, j = np.indices((m, m))
     inverse = np.where(i > j, 2.0 * (-1.0) ** (i - j), np.where(i == j, 1.0, 0.0))
-    K = np.asfortranarray(inverse.T @ inverse)
-    assembly = Assembly((K,), sp.eye_array(m, format="csc"), None, ("part 1",))
-    load = LoadCase(np.zeros(m), -np.ones(m))
     x, lam = np.full(m, -2.0), np.zeros(m)
     x[0], lam[0] = -1.0, 1.0
-    title = f"Fathi's problem with {m} contacts, one closed"
-    return Rung(title, made=ManufacturedProblem(assembly, load, x, lam))
+    return _one_to_one(inverse.T @ inverse, np.zeros(m), -p, x, lam)
 
 
-RUNGS: Ladder = {f"fathi-{m:03d}": partial(_fathi, m) for m in SIZES}
+def _chain(m: int) -> Rung:
+    i = np.arange(m)
+    B = np.exp2(-np.round(i / 2))
+    K = 2 * np.eye(m) + np.eye(m, k=1) + np.eye(m, k=-1)
+    K[-1, -1] = 1.0
+    K *= B * B[:, None]
+    g = -np.round(GRID * 0.75**i) / GRID
+    title = f"A chain of {m} springs: dual active-set methods add each contact again and again"
+    return Rung(title, made=_one_to_one(K, np.zeros(m), g, g, -K @ g))
+
+
+def _one_to_one(K: Matrix, f: Vector, g: Vector, x: Vector, lam: Vector) -> ManufacturedProblem:
+    """One part, with a contact at each unknown."""
+    assembly = Assembly((np.asfortranarray(K),), sp.eye_array(len(K), format="csc"), None, ("part 1",))
+    return ManufacturedProblem(assembly, LoadCase(f, g), x, lam)
+
+
+def _vertex(n: int) -> Rung:
+    """Contact j acts on unknown j and on up to two before it, so the columns of A are independent."""
+    random = np.random.default_rng(17)
+    A = np.eye(n)
+    for j in range(1, n):
+        A[random.integers(0, j, 2), j] = random.choice([-1.0, 1.0], 2)
+    model = exact_model(spectrum(n, 1e4), A=sp.csc_array(A))
+    made = manufacture(model, seed=18, shares=Shares(1 / 3, 2 / 3))
+    return Rung(f"A vertex of {n} contacts on {n} unknowns, a third with a force", made=made)
+
+
+RUNGS: Ladder = {
+    **{f"fathi-{m:03d}": partial(_fathi, m) for m in (8, 16, 32, 48, 64, 128, 256, 512)},
+    **{f"murty-{m:02d}": partial(_murty, m) for m in (8, 16, 32, 48)},
+    **{f"chain-{m:02d}": partial(_chain, m) for m in (8, 16, 24, 32)},
+    **{f"vertex-{n:03d}": partial(_vertex, n) for n in (16, 64, 256)},
+}

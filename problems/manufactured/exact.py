@@ -4,13 +4,15 @@ With the Hadamard matrix H (n, n), Hᵀ = H, HH = nI, entries ±1 and n a power 
 
     K = HDH/n,  D = diag(d) of integers,    x = Hc, c integer,    Kx = H(Dc),
 
-so K has the eigenvalues d, and all entries and partial sums are integers. With λ ≥ 0 and y ≥ 0, λᵢyᵢ = 0,
-on the same grid, f = Kx + Aλ and g = Aᵀx + y hold exactly in float64 as long as no sum exceeds 2⁵³: x and λ
-are the exact solution. Finally everything is scaled by powers of two.
+so K has the eigenvalues d, and all entries and partial sums are integers. (Any other n is a sum of
+powers of two; H is then block diagonal, of the Hadamard matrices of these orders.) With λ ≥ 0 and y ≥ 0,
+λᵢyᵢ = 0, on the same grid, f = Kx + Aλ and g = Aᵀx + y hold exactly in float64 as long as no sum exceeds 2⁵³:
+x and λ are the exact solution. Finally everything is scaled by powers of two.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,16 +92,38 @@ def from_solution(model: ExactModel, x: Vector, Kx: Vector, lam: Vector, y: Vect
 
 
 def _stiffness(d: Vector) -> Matrix:
-    H = sla.hadamard(len(d), dtype=float)
-    return np.asfortranarray((H * d) @ H / len(d))
+    """K_ij = (Hd)_{i xor j}/n, as h_ik h_kj = h_{k, i xor j} for Sylvester's H."""
+    blocks = []
+    for rows in _blocks(len(d)):
+        i = np.arange(rows.stop - rows.start)
+        blocks.append((_hadamard(d[rows]) / len(i))[i ^ i[:, None]])
+    return np.asfortranarray(blocks[0] if len(blocks) == 1 else sla.block_diag(*blocks))
+
+
+def _blocks(n: int) -> list[slice]:
+    """The blocks of H: the powers of two in n, the largest first."""
+    orders = [1 << bit for bit in reversed(range(n.bit_length())) if n >> bit & 1]
+    ends = np.cumsum([0, *orders]).tolist()
+    return [slice(a, b) for a, b in itertools.pairwise(ends)]
+
+
+def _hadamard(v: Vector) -> Vector:
+    """H v, block by block, by the fast Walsh–Hadamard transform."""
+    v = v.astype(float)
+    for rows in _blocks(len(v)):
+        n, half = rows.stop - rows.start, 1
+        while half < n:
+            pairs = v[rows].reshape(-1, 2, half)
+            v[rows] = np.stack([pairs[:, 0] + pairs[:, 1], pairs[:, 0] - pairs[:, 1]], axis=1).ravel()
+            half *= 2
+    return v
 
 
 def _modes(random: Random, d: Vector, force: float) -> tuple[Vector, Vector]:
     """x and Kx of a part with a force of ±½ to ±1 times `force` in each of its modes."""
-    H = sla.hadamard(len(d), dtype=float)
     share = random.integers(128, 256, len(d)) / 256
     c = np.where(random.random(len(d)) < 0.5, -1.0, 1.0) * np.round(share * force / d)
-    return H @ c, H @ (d * c)
+    return _hadamard(c), _hadamard(d * c)
 
 
 def _contacts(random: Random, model: ExactModel, shares: Shares) -> tuple[Vector, Vector]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from problems.forms.assembly import Matrix
-from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem, made
 from problems.storage.cache import digest
 
 from .effect import Effect, ForceEffect, StiffnessEffect
@@ -118,9 +119,20 @@ class MatricesScene(Scene):
 class MadeScene(Scene):
     """Matrices constructed in memory: a rung of a ladder without plates."""
 
-    made: ManufacturedProblem
+    problem: ManufacturedProblem | DeferredProblem
 
     @property
+    def made(self) -> ManufacturedProblem:
+        return self.problem if isinstance(self.problem, ManufacturedProblem) else made(self.problem)
+
+    @property
+    def block_sizes(self) -> tuple[int, ...]:
+        """The unknowns of each block of K, without making it."""
+        if isinstance(self.problem, DeferredProblem):
+            return self.problem.sizes
+        return tuple(K.shape[0] for K in self.problem.assembly.blocks)
+
+    @cached_property
     def assembly_key(self) -> str:
         assembly = self.made.assembly
         A = assembly.A
@@ -133,7 +145,8 @@ class MadeScene(Scene):
 
     @property
     def expected_size(self) -> tuple[int, int]:
-        return self.made.assembly.n, self.made.assembly.m
+        known = self.problem
+        return sum(self.block_sizes), known.m if isinstance(known, DeferredProblem) else known.assembly.m
 
 
 def plain(table: Table) -> dict[str, Any]:

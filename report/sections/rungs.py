@@ -1,4 +1,4 @@
-"""The rungs themselves, the measurements on them without a correct answer, and what the model rejects."""
+"""The rungs themselves, times, the measurements without a correct answer, and what the model rejects."""
 
 from __future__ import annotations
 
@@ -6,11 +6,15 @@ import pandas as pd
 
 from harness.results.schema import LADDERS
 from report.analysis.outcomes import with_outcomes
+from report.analysis.seconds import seconds_text
 from report.document.blocks import Block, Place, Section, Table, number, word
 from report.document.numbers import as_number, power, whole
+from report.results.labels import in_order
 from report.results.reader import Results
 
 PLACE = Place(20, "ladders")
+
+LARGE = 1000  # unknowns, from which the times are worth a table
 
 FIGURES = (
     *("label", "scene", "status", "verdict", "outcome", "displacement_error_mm", "limit_mm"),
@@ -24,6 +28,8 @@ def section(results: Results) -> Section | None:
     known = results.problems[results.problems["scene"].str.startswith(LADDERS)]
     known = known.drop_duplicates("scene", keep="last")
     blocks: list[Block] = [_taken(results, known)]
+    if len(large := results.cells[results.cells["n"] >= LARGE]):
+        blocks.append(_seconds(large))
     broken = with_outcomes(results.cells).query("verdict != 'within'")
     if len(broken):
         blocks.append(_broken(broken))
@@ -56,6 +62,16 @@ def _taken(results: Results, known: pd.DataFrame) -> Table:
         "the reference is exact; otherwise the bound is proven with the reference."
     )
     return Table("rungs", caption, table, columns)
+
+
+def _seconds(cells: pd.DataFrame) -> Table:
+    """A line per rung in the order of measurement, a column per solver."""
+    texts = cells.assign(text=[seconds_text(dict(cell)) for _, cell in cells.iterrows()])
+    labels = in_order(cells)
+    table = texts.pivot_table(index="scene", columns="label", values="text", aggfunc="first", sort=False)
+    columns = [word("rung", "scene"), *(word(label, label) for label in labels)]
+    caption = "*Seconds per load case* (set-up + solve + form), on the rungs of full size."
+    return Table("rungs-seconds", caption, table[labels].reset_index(), columns)
 
 
 def _broken(cells: pd.DataFrame) -> Table:

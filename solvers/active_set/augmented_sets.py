@@ -1,15 +1,16 @@
 """λ and y of the dual problem for a sequence of contact sets, by sparse factorisations; Q is never formed.
 
-Q_CC λ_C = p_C is the equilibrium of v = K⁻¹Aλ under prescribed overlaps A_Cᵀv = p_C. With springs of a
-stiffness ρ at the closed contacts (augmented Lagrangian; Hestenes, J. Optim. Theory Appl. 4:303–320, 1969),
+Q_CC dλ = −y_C corrects forces λ whose gaps y = g − AᵀK⁻¹(f − Aλ) are not yet closed. With springs of a
+stiffness ρ at the contacts of C (augmented Lagrangian; Hestenes, J. Optim. Theory Appl. 4:303–320, 1969),
 
-    (K + ρ A_C A_Cᵀ) v = A_C (λ_C + ρ p_C),        λ_C ← λ_C + ρ (p_C − A_Cᵀ v),
+    (K + ρ A_C A_Cᵀ) v = A_C (dλ − ρ y_C),        dλ ← dλ − ρ (y_C + A_Cᵀv),
 
 and each pass reduces the error by a factor of at least 1 + ρ λmin(Q_CC). One sparse factorisation per set.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -22,16 +23,21 @@ from problems.forms.sparse_prepared import SparsePrepared
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
-STIFFER = 1e4  # ρ in units of the stiffest unknown at a contact
-MAX_PASSES = 30
+STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
+PASSES = 3  # per correction
+MAX_CORRECTIONS = 30
+
+#: λ (m,) → y = g − AᵀK⁻¹(f − Aλ), (m,) mm.
+Gap = Callable[[Vector], Vector]
 
 
 class AugmentedSets:
     """As ContactSets, for an assembly with sparse blocks. p : (m,) mm. diagonal : of Q, mm/N."""
 
-    def __init__(self, prepared: SparsePrepared, p: Vector, diagonal: Vector) -> None:
-        self.prepared, self.p, self.compliance = prepared, p, diagonal
+    def __init__(self, prepared: SparsePrepared, p: Vector, diagonal: Vector, gap: Gap) -> None:
+        self.prepared, self.p, self.compliance, self.gap = prepared, p, diagonal, gap
         self.Q, self.factorisations = prepared.compliance, 0
+        self.factor: Factor | None = None
 
     @cached_property
     def _K(self) -> sp.csc_array:
@@ -44,36 +50,37 @@ class AugmentedSets:
         return STIFFER * stiffest / float((A.data**2).max(initial=1.0))
 
     def at(self, C: Set) -> TrialSolution:
-        """λ and y of the set C, with |y_C| no larger than after the last pass that halved it."""
+        """λ and y of the set C, with |y_C| no larger than after the last correction that halved it."""
         assembly = self.prepared.assembly
-        A_C = assembly.A[:, np.flatnonzero(C)]
-        self.factor: Factor | None = None
+        self.A_C, self.factor = assembly.A[:, np.flatnonzero(C)], None
         if C.any():
-            augmented = sp.csc_array(self._K + self._rho * (A_C @ A_C.T))
+            augmented = sp.csc_array(self._K + self._rho * (self.A_C @ self.A_C.T))
             self.factor = factored(augmented, assembly.nodes)
             self.factorisations += 1
-        return self._continued(C, TrialSolution(np.zeros_like(self.p), -self.p, np.inf), 0.0)
+        open_everywhere = TrialSolution(
+            np.zeros_like(self.p), -self.p, float(abs(self.p[C]).max(initial=0.0))
+        )
+        return self.refined(C, open_everywhere, 0.0)
 
     def refined(self, C: Set, trial: TrialSolution, target: float) -> TrialSolution:
-        """The trial solution of the last `at`, with |y_C| ≤ target mm or no longer halving."""
-        return self._continued(C, trial, target)
-
-    def _continued(self, C: Set, trial: TrialSolution, target: float) -> TrialSolution:
+        """From the trial solution of the last `at`: |y_C| ≤ target mm, or no longer halving."""
         if self.factor is None:
-            return TrialSolution(np.zeros_like(self.p), -self.p, 0.0)
-        rows, A = np.flatnonzero(C), self.prepared.assembly.A
-        A_C, best = A[:, rows], trial
-        for _ in range(MAX_PASSES):
+            return trial
+        rows, best = np.flatnonzero(C), trial
+        for _ in range(MAX_CORRECTIONS):
             if best.rounding <= target:
                 break
-            # (K + ρ A_C A_Cᵀ) v = A_C (λ_C + ρ p_C)
-            v = self.factor.solve(A_C @ (best.lam[rows] + self._rho * self.p[rows]))
+            y_C, correction = best.y[rows], np.zeros(rows.size)
+            for _ in range(PASSES):
+                # (K + ρ A_C A_Cᵀ) v = A_C (dλ − ρ y_C)
+                v = self.factor.solve(self.A_C @ (correction - self._rho * y_C))
+                correction = correction - self._rho * (y_C + self.A_C.T @ v)
             lam = best.lam.copy()
-            lam[rows] += self._rho * (self.p[rows] - A_C.T @ v)
-            y = self.Q @ lam - self.p
+            lam[rows] += correction
+            y = self.gap(lam)
             trial = TrialSolution(lam, y, float(abs(y[rows]).max(initial=0.0)))
-            improving = trial.rounding < best.rounding / 2
+            halved = trial.rounding < best.rounding / 2
             best = min(best, trial, key=lambda each: each.rounding)
-            if not improving:
+            if not halved:
                 break
         return best

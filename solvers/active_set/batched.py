@@ -37,8 +37,9 @@ SIGN_UNCERTAINTY = 1e-5  # of |y_C| before a sweep: smaller values have no relia
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further sweep
 MIN_CLOSED = 1 / 16  # of the contacts: with fewer closed, solving case by case is faster
 
-#: (C, p, tolerance) → the answer of one case, from the contact set C, or from a guess of its own if None.
-SolveOne = Callable[[Set | None, Vector, float], Answer]
+#: (C, load with p, tolerance) → the answer of one case, from the contact set C, or from a guess of its own if
+#: None.
+SolveOne = Callable[[Set | None, LoadCase, float], Answer]
 
 
 @dataclass
@@ -83,7 +84,7 @@ class BatchedSweeps:
             self.last = [self.cold(loads[0], tolerance)]
             self.use_sweeps = self.pay(self.last)
         if not self.use_sweeps:
-            return [self.solve_one(None, load.p, tolerance) for load in loads]
+            return [self.solve_one(None, load, tolerance) for load in loads]
         started = [_warm_started(nearest(self.last, p), load, p) for load, p in self._ordered(loads)]
         self.last = self._sweep(started, tolerance)
         self.use_sweeps = self.pay(self.last)
@@ -149,7 +150,7 @@ class BatchedSweeps:
         if not case.settled:
             C = np.zeros(len(order), dtype=bool)
             C[order] = case.C
-            return self.solve_one(C, load.p, tolerance)
+            return self.solve_one(C, load, tolerance)
         lam, y = np.empty(len(order)), np.empty(len(order))
         lam[order], y[order] = np.maximum(case.trial.lam, 0.0), case.trial.y
         if (case.trial.lam < 0).any():

@@ -61,22 +61,26 @@ class SparseState:
         sweeps = SparseSweeps(Q, diagonal, M, state.by_sets, MAX_SWEEPS, prepared=prepared)
         return replace(state, sweeps=sweeps)
 
-    def by_sets(self, C: Set | None, p: Vector, tolerance: float) -> Answer:
-        """Block pivoting from C, or from all contacts that overlap."""
-        sets = AugmentedSets(self.prepared, p, self.diagonal)
-        return solve_from(p > 0 if C is None else C, sets, tolerance, self.max_sets)
+    def by_sets(self, C: Set | None, load: LoadCase, tolerance: float) -> Answer:
+        """Block pivoting from C, or from all contacts that overlap. load : with p."""
+
+        def gap(lam: Vector) -> Vector:
+            return gaps(self.prepared, lam[:, None], [load])[:, 0]
+
+        sets = AugmentedSets(self.prepared, load.p, self.diagonal, gap)
+        return solve_from(load.p > 0 if C is None else C, sets, tolerance, self.max_sets)
 
     def solve(self, load: LoadCase, tolerance: float) -> Answer:
         """The answer with x."""
         given = self._with_p([load])[0]
         if self.sweeps is None:
-            answer = self.by_sets(None, given.p, tolerance)
+            answer = self.by_sets(None, given, tolerance)
         elif self.start is None:
             answer = self.sweeps.answer(self.sweeps.cold(given, tolerance), given, tolerance)
         else:
             solved = self._solved(self.start, self.sweeps.M.order)
             answer = self.sweeps.answer(self.sweeps.warm(solved, given, tolerance), given, tolerance)
-        return self._with_x([answer], [load])[0]
+        return self._with_x([answer], [load], tolerance)[0]
 
     def batched(self) -> Batch | None:
         if self.sweeps is None:
@@ -84,7 +88,7 @@ class SparseState:
         sweeps = self.sweeps
 
         def solve(loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
-            return self._with_x(sweeps(self._with_p(loads), tolerance), loads)
+            return self._with_x(sweeps(self._with_p(loads), tolerance), loads, tolerance)
 
         return solve
 
@@ -98,15 +102,33 @@ class SparseState:
         columns = self.prepared.dual_load(stacked(loads)).T
         return [LoadCase(load.f, load.g, p) for load, p in zip(loads, columns, strict=True)]
 
-    def _with_x(self, answers: Sequence[Answer], loads: Sequence[LoadCase]) -> list[Answer]:
-        """With û = K̂⁻¹(f̂ − Bλ)."""
+    def _with_x(self, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
+        """With x = K⁻¹(f − Aλ) refined by δ, and judged by it: "solved" if the KKT residual of y = g − Aᵀx is
+        at most max(tolerance, 4ε max(|g| + |A|ᵀ|x|) + max|A|ᵀ|δ|).
+        """
         known = [k for k, answer in enumerate(answers) if answer.lam is not None]
         found = list(answers)
-        if known:
-            lam = np.column_stack([np.asarray(answers[k].lam) for k in known])
-            x = self.prepared.recover(lam, stacked([loads[k] for k in known]))
-            for column, k in enumerate(known):
-                found[k] = replace(answers[k], x=x[:, column])
+        if not known:
+            return found
+        assembly, cases = self.prepared.assembly, stacked([loads[k] for k in known])
+        lam = np.column_stack([np.asarray(answers[k].lam) for k in known])
+        b = cases.f - assembly.A @ lam
+        x = self.prepared.solve_K(b)
+        delta = self.prepared.solve_K(b - assembly.multiply_K(x))
+        x = x + delta
+        y, size = cases.g - assembly.A.T @ x, abs(assembly.A).T
+        rounding = 4 * EPS * (abs(cases.g) + size @ abs(x)).max(axis=0) + (size @ abs(delta)).max(axis=0)
+        missed = np.where(lam > 0, abs(y), -y).max(axis=0, initial=0.0)
+        for column, k in enumerate(known):
+            status, residual = found[k].status, float(missed[column])
+            if status in ("solved", "inaccurate"):
+                status = "solved" if residual <= max(tolerance, rounding[column]) else "inaccurate"
+            details = found[k].details | {"kkt_residual_mm": residual}
+            if status == "solved":
+                details.pop("cause", None)
+            elif "cause" not in details:
+                details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
+            found[k] = replace(found[k], status=status, x=x[:, column], details=details)
         return found
 
 
@@ -118,9 +140,7 @@ class SparseSweeps(BatchedSweeps):
 
     def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
         assert self.prepared is not None
-        A, cases = self.prepared.assembly.A, stacked(loads)
-        y: Matrix = cases.g - A.T @ self.prepared.solve_K(cases.f - A @ lam)
-        return y
+        return gaps(self.prepared, lam, loads)
 
     def settled(self, case: Case, tolerance: float, stagnating: bool) -> bool:
         """Far below the tolerance; or no longer smaller, and below it or the rounding of Qλ − p."""
@@ -131,6 +151,13 @@ class SparseSweeps(BatchedSweeps):
     def pay(self, cases: Sequence[Case]) -> bool:
         """Always: the alternative is a factorisation per contact set."""
         return True
+
+
+def gaps(prepared: SparsePrepared, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
+    """y = g − AᵀK⁻¹(f − Aλ), (m, k) mm."""
+    A, cases = prepared.assembly.A, stacked(loads)
+    y: Matrix = cases.g - A.T @ prepared.solve_K(cases.f - A @ lam)
+    return y
 
 
 def _banded(prepared: SparsePrepared) -> tuple[BandedInverse | None, Vector | None]:

@@ -25,9 +25,9 @@ class SinglePrecision:
         self.Q = Q
         self.compliance = np.diag(Q).copy()
         self.T = 1.0 / np.sqrt(self.compliance)
-        self.scaled = np.array(Q, dtype=np.float32, order="F")
-        self.scaled *= self.T.astype(np.float32)
-        self.scaled *= self.T.astype(np.float32)[:, None]
+        self.scaled = np.empty(Q.shape, dtype=np.float32, order="F")
+        for j, t in enumerate(self.T):  # column by column, before the cast: Q may be beyond float32
+            self.scaled[:, j] = self.T * Q[:, j] * t
         self.double = Direct(Q)
         self.begin()
 

@@ -45,8 +45,8 @@ class GoldfarbIdnani(Solver):
     Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) beyond rounding. In
     the dual form the answer λ ≥ 0, y = Qλ − p is then checked: "solved" if max(max(−y), max_{λ>0} |y|) ≤
     max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are changes of the active set. If
-    rounding in Q⁻¹ leaves it inaccurate, block principal pivoting continues from its set (details:
-    finishing_sets).
+    rounding in Q⁻¹ leaves it inaccurate, or in the primal form an open contact has a slack barely below zero,
+    block principal pivoting continues from its set (details: finishing_sets).
 
     Options
     -------
@@ -87,8 +87,10 @@ class GoldfarbIdnani(Solver):
             return failed("rounding: the multipliers are no longer finite", result.pivots)
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is None:
-            x = data.prepared.recover(result.u, load)
-            return Answer(result.status, result.u, x, result.pivots, details=details)
+            lam = _certain(ready, slacks, result, tolerance, details)
+            return Answer(
+                result.status, lam, data.prepared.recover(lam, load), result.pivots, details=details
+            )
         if result.status == "inaccurate":
             return _finished(ready, load, result, tolerance, details)
         lam = _on_support(ready, load, slacks(result.u)[0], result)
@@ -114,6 +116,33 @@ def _finished(
     else:
         details |= {"cause": answer.details["cause"]}
     return replace(answer, iterations=result.pivots, details=details)
+
+
+def _certain(
+    ready: _Prepared, slacks: Slacks, result: GiResult, tolerance: float, details: dict[str, Any]
+) -> Vector:
+    """λ of the primal form: from block pivoting, if slacks within rounding left the active set in doubt.
+
+    With nearly dependent constraints, an open contact with a slack barely below zero may stand for another
+    that is active. λ of the final set of block pivoting is taken if its slacks from the original data are
+    no worse.
+    """
+    s = slacks(result.u)[0]
+    closed = np.zeros(len(s), dtype=bool)
+    closed[result.active] = True
+    if result.status != "solved" or not (s[~closed] < 0).any():
+        return result.u
+    sets = ContactSets(ready.G, -slacks(np.zeros(len(s)))[0])
+    answer = solve_from(closed, sets, tolerance, FINISHING_SETS)
+    if answer.lam is None or _violation(slacks(answer.lam)[0], answer.lam) > _violation(s, result.u):
+        return result.u
+    details["finishing_sets"] = answer.iterations
+    return answer.lam
+
+
+def _violation(s: Vector, lam: Vector) -> float:
+    """max(max(−s), max_{λ>0} |s|), mm."""
+    return max(float((-s).max(initial=0.0)), float(abs(s[lam > 0]).max(initial=0.0)))
 
 
 def _primal_slacks(ready: _Prepared, load: LoadCase) -> Slacks:

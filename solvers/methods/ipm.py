@@ -50,7 +50,8 @@ class Ipm(Solver):
     4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). In addition each contact must be closed or open:
     min(y_i, q_ii λ_i) / max_j |a_ji| at most that or √(0.1 mm/N · ε_μ). A contact that touches without a
     force is off by √(μ q_ii), more than ε_μ guarantees if the contact is compliant; and a gap of y_i is
-    y_i / max_j |a_ji| of displacement, whatever the unit of the contact.
+    y_i / max_j |a_ji| of displacement, whatever the unit of the contact. For the same reason the root mean
+    square of √(q_ii λ_i y_i) / max_j |a_ji| has that limit; with q_ii ≤ 0.1 mm/N, ε_μ implies it.
 
     If the iteration stalls, because the error of inexact systems in s1 outlasts y or because a step ended
     too close to the boundary, it restarts with a smaller cg_tolerance and theta (details: restarts).
@@ -183,6 +184,7 @@ class Ipm(Solver):
                 point.mu / tolerance,
                 point.infeasibility / max(feasibility, rounding),
                 _undecided(newton, point, units) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
+                _gap(newton, point, units) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
             )
             if measure <= 1:
                 return "solved", "", point
@@ -215,6 +217,12 @@ def _start_details(start: Start, point: Point) -> dict[str, float]:
 def _undecided(newton: NewtonSteps, point: Point, units: Vector) -> float:
     """max min(y_i, q_ii λ_i) / max_j |a_ji|: the largest distance from being closed or open, mm."""
     return float((np.minimum(point.y, np.diag(newton.Q) * point.lam) / units).max())
+
+
+@np.errstate(over="ignore")
+def _gap(newton: NewtonSteps, point: Point, units: Vector) -> float:
+    """√(Σ q_ii λ_i y_i / m) / max_j |a_ji|: μ as a displacement, mm."""
+    return float(np.sqrt((np.diag(newton.Q) * point.lam * point.y / units**2).mean()))
 
 
 def _rounding(newton: NewtonSteps, lam: Vector) -> float:

@@ -105,10 +105,10 @@ class ActiveSetNewton(Solver):
             return state.batched()
         Q, nodes, inverse = state.problem.Q, state.problem.assembly.contact_nodes, state.inverse
 
-        def solve_one(C: Set | None, p: Vector, tolerance: float) -> Answer:
+        def solve_one(C: Set | None, load: LoadCase, tolerance: float) -> Answer:
             if C is None:
-                C, _ = _first_guess(state, p, tolerance)
-            sets = ContactSets(Q, p, inverse)
+                C, _ = _first_guess(state, load.p, tolerance)
+            sets = ContactSets(Q, load.p, inverse)
             return self._settled(solve_from(C, sets, tolerance, self.max_sets), sets, tolerance)
 
         return BatchedSweeps(Q, np.diag(Q), banded_inverse(Q, nodes), solve_one)

@@ -1,0 +1,150 @@
+"""The ladders at full size: as exact as the small ones, made when needed only, and all in the suite."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+import scipy.sparse as sp
+
+from harness.planning.plan import expand
+from harness.planning.suite import read_suite
+from harness.verification.judge import conditioned_limit, judge
+from harness.verification.reference import Reference
+from problems.forms import manufactured_problem
+from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from problems.ladders.full_size import degeneracy, duplicates
+from problems.manufactured.exact import Shares, exact_model, spectrum
+from problems.manufactured.ladder import ladder_names, make_rung, rung_names
+from problems.scene import read_scene
+from solvers.base import Form
+from solvers.registry import make_solver
+
+RUNGS = rung_names("hard-full/")
+OF_BOTH_SIZES = ["degeneracy", "duplicates", "supports", "thickness"]
+N = 300  # unknowns per part: 256 + 32 + 8 + 4
+SMALL = {
+    **{
+        f"{percent} % weak": degeneracy.touching(N, 1e6, Shares(min(0.4, 1 - percent / 100), percent / 100))
+        for percent in (25, 50, 75, 100)
+    },
+    **{f"cond {cond:g}": degeneracy.touching(N, cond, Shares()) for cond in (1e10, 1e12)},
+    **{f"2^-{bits} apart": duplicates._make(N, 2.0**-bits) for bits in (4, 12, 16)},
+}
+IN_HOUSE: list[tuple[str, Form, float]] = [
+    *(("newton", "dual", 1e-10), ("ipm-fast", "dual", 1e-10), ("ipm", "dual", 1e-14)),
+    *(("gi", "dual", 1e-10), ("gi", "primal", 1e-10)),
+]
+
+
+def exactly(values: Any) -> Any:
+    """Whole numbers that are 2⁶⁰ times the values."""
+    found = [Fraction(float(v)) * 2**60 for v in np.asarray(values).ravel()]
+    assert all(v.denominator == 1 for v in found)
+    return np.array([v.numerator for v in found], dtype=object).reshape(np.shape(values))
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_the_answer_is_exact(name: str) -> None:
+    made = SMALL[name]
+    A, (x, lam) = exactly(made.assembly.A.toarray()), map(exactly, (made.x, made.lam))
+    Kx = np.concatenate(
+        [exactly(K) @ x[s] for K, s in zip(made.assembly.blocks, made.assembly.slices, strict=True)]
+    )
+    y = exactly(made.load.g) * 2**60 - A.T @ x
+    assert (Kx + A @ lam == exactly(made.load.f) * 2**60).all()
+    assert (lam >= 0).all()
+    assert (y >= 0).all()
+    assert not (lam * y).any()
+
+
+@pytest.mark.parametrize("percent", [25, 50, 75, 100])
+def test_the_share_without_a_force_is_as_named(percent: int) -> None:
+    made = SMALL[f"{percent} % weak"]
+    y = made.load.g - made.assembly.A.T @ made.x
+    assert np.count_nonzero((made.lam == 0) & (y == 0)) == round(percent / 100 * N)
+
+
+def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_of_two() -> None:
+    for n in (1, 22, 64):
+        d = spectrum(n, 1e4)
+        (K,) = exact_model(d).assembly().blocks
+        np.testing.assert_allclose(np.linalg.eigvalsh(K), 64 * np.sort(d), rtol=1e-9)
+    H = sla.hadamard(64, dtype=float)
+    np.testing.assert_array_equal(K, (H * d) @ H)  # 64 = the stiffness of the grid's smallest eigenvalue
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_the_problem_is_one_whole(name: str) -> None:
+    """The Hadamard blocks of one part overlap those of the other, so that no contact stands alone."""
+    assembly = SMALL[name].assembly
+    K = sp.block_diag([K != 0 for K in assembly.blocks])
+    graph = sp.block_array([[K, assembly.A != 0], [(assembly.A != 0).T, None]])
+    assert sp.csgraph.connected_components(graph, directed=False)[0] == 1
+
+
+@pytest.mark.parametrize(("solver", "form", "tolerance"), IN_HOUSE, ids=str)
+@pytest.mark.parametrize("name", SMALL)
+def test_in_house_solvers_are_right(name: str, solver: str, form: Form, tolerance: float) -> None:
+    made = SMALL[name]
+    assert made.x is not None
+    assert made.lam is not None
+    data = Prepared(made.assembly)
+    problem, used = in_form(data, form), make_solver(solver, {})
+    (load,) = problem.loads([made.load])
+    state = used.prepare(used.convert(problem))
+    answer = used.solve(used.setup(state, load, tolerance), load, tolerance)
+    assert answer.status == "solved"
+    assert answer.lam is not None
+    x = answer.x if answer.x is not None else data.recover(answer.lam, made.load)
+    known = Reference(made.x, made.lam, made.lam > 0, 0.0, "chosen, exact")
+    condition = max(float(np.linalg.cond(K)) for K in made.assembly.blocks)
+    limit = conditioned_limit(1e-7, condition, float(abs(made.x).max()))
+    assert judge(data, made.load, known, x, answer.lam, limit).verdict == "within"
+
+
+def test_a_rung_is_named_by_its_size_and_has_it() -> None:
+    assert ladder_names("hard-full/") == ["conditioning", *OF_BOTH_SIZES]
+    for name in RUNGS:
+        size = int(name.split("/")[2].split("-")[0])
+        assert (read_scene(name).expected_size or ())[0] == size
+        assert read_scene(name).on_ladder
+    for ladder in OF_BOTH_SIZES:
+        assert any(name.startswith(f"hard-full/{ladder}/11308-") for name in RUNGS)
+
+
+def test_nothing_is_made_before_it_is_needed_and_one_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+
+    def make(name: str) -> ManufacturedProblem:
+        made.append(name)
+        return SMALL["25 % weak"]
+
+    for name in RUNGS:
+        problem = make_rung(name).made
+        if isinstance(problem, DeferredProblem):
+            monkeypatch.setitem(vars(problem), "make", lambda name=name: make(name))
+    expand(read_suite("hard-full"))
+    assert not made
+    first, second = read_scene("hard-full/degeneracy/4386-025"), read_scene("hard-full/degeneracy/4386-050")
+    for scene in (first, first, second, second, first):
+        _ = scene.made  # type: ignore[attr-defined]
+    assert made == [first.name, second.name, first.name]
+    manufactured_problem.made.cache_clear()
+
+
+def test_the_suite_measures_every_rung_with_every_solver_of_ours() -> None:
+    suite = read_suite("hard-full")
+    plan = expand(suite)
+    assert {m.scene for m in plan} == set(RUNGS)
+    for name in RUNGS:
+        ours = {(m.solver, m.form) for m in plan if m.scene == name and m.gated}
+        due = {(solver, form) for solver, form, _ in IN_HOUSE}
+        assert ours == (due - {("gi", "primal")} if "/11308-" in name else due)
+    assert len({m.solver for m in plan if not m.gated}) <= 2
+    assert not any(scene.startswith("hard-full/") for scene in read_suite("hard").scenes)
