@@ -14,7 +14,7 @@ def symmetric(random: np.random.Generator, rows: Matrix, columns: Matrix, n: int
     off = sp.coo_array((random.uniform(-1, 1, apart.sum()), (rows[apart], columns[apart])), shape=(n, n))
     off = sp.csc_array(off + off.T)
     K = off + sp.diags_array(abs(off).sum(axis=0) + random.uniform(0.05, 1.0, n))
-    unit = np.exp(random.uniform(-2, 2, n))
+    unit = np.exp2(random.integers(-2, 3, n))
     return sp.csc_array(sp.diags_array(unit) @ K @ sp.diags_array(unit))
 
 

@@ -24,6 +24,7 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from problems.forms import balance
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.balance import balanced_units
 from problems.forms.compliance import dense_submatrix
@@ -143,7 +144,7 @@ def _dense(K: Any) -> Matrix:
 
 def _code() -> str:
     """The fingerprint of the code for references: those of other code are recomputed."""
-    return fingerprint([Path(__file__)], within=["harness/verification"])
+    return fingerprint([Path(__file__), Path(balance.__file__)], within=["harness/verification"])
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -28,6 +28,7 @@ def prepared(scene: Scene) -> SparsePrepared:
     """K̂ and B of a scene; factors when first needed. Raises InputError if K is dense or cannot be read."""
     start = time.perf_counter()
     coarser: Callable[[], Assembly] | None = None
+    folders: tuple[str, ...] = ("problems/fem", "problems/model", "problems/effects", "problems/uncondensed")
     match scene:
         case JointScene():
             model = WholeModel.of(scene)
@@ -35,11 +36,11 @@ def prepared(scene: Scene) -> SparsePrepared:
             coarser = _graded(model)
         case MatricesScene():
             assembly = _own(scene)[0]
+            folders += ("problems/input", "problems/formats")
         case MadeScene():
             assembly = _sparse(scene.made.assembly, scene)
         case _:
             raise TypeError(type(scene).__name__)
-    folders = ("problems/fem", "problems/model", "problems/effects", "problems/uncondensed")
     code = fingerprint([Path(__file__)], within=folders)
     key = digest("uncondensed", scene.assembly_key, code)
     return SparsePrepared(assembly, key, {"model": time.perf_counter() - start}, coarser)
