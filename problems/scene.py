@@ -60,9 +60,10 @@ def read_scene(name_or_path: str) -> Scene:
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
             raise _unknown_scene(name_or_path, scene_names())
+    table = read_toml(path)
     is_users = not resolved(path).is_relative_to(SCENES)
     name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()
-    return _scene(name, path, read_toml(path))
+    return _scene(name, path, table)
 
 
 def scene_of(table: Mapping[str, Any], name: str = "scene") -> Scene:

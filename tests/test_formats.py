@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -403,3 +404,41 @@ def test_a_built_problem_is_exported_with_all_its_terms(tmp_path: Path) -> None:
     bare = sla.block_diag(*base.assembly.blocks)
     assert abs(found["K"] - bare).max() == pytest.approx(5.0)
     assert abs(wanted["f"]).max() == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("form", ["op4", "dmig", "npz", "qpsolvers"])
+def test_what_a_damaged_file_makes_a_library_raise_is_refused(form: str, tmp_path: Path) -> None:
+    """Cut off anywhere, or a byte changed: struct.error, TypeError, zlib.error …"""
+    data = make_prepared(3, 3, tools=1)
+    path = tmp_path / PATHS[form]
+    formats.write(form, path, matrices(data, make_load(3, data)[0]))
+    whole = path.read_bytes()
+    random = np.random.default_rng(0)
+    for k in range(40):
+        content = bytearray(whole)
+        if k % 2:
+            content[random.integers(len(whole))] ^= 1 << random.integers(8)
+        else:
+            del content[random.integers(len(whole)) :]
+        path.write_bytes(content)
+        with suppress(InputError):
+            formats.read(path)
+
+
+def test_an_op4_that_ends_early_has_whole_matrices_or_is_refused(tmp_path: Path) -> None:
+    """Within a matrix pyyeti warns or raises what it likes."""
+    data = make_prepared(3, 3, tools=1)
+    path = tmp_path / "p.op4"
+    formats.write("op4", path, matrices(data, make_load(3, data)[0]))
+    whole, wanted = path.read_bytes(), formats.read(path)
+    refused = 0
+    for length in range(len(whole)):
+        path.write_bytes(whole[:length])
+        try:
+            found = formats.read(path)
+        except InputError:
+            refused += 1
+        else:
+            for name, values in found.items():
+                np.testing.assert_array_equal(values, wanted[name])
+    assert refused > 0.99 * len(whole)

@@ -422,6 +422,11 @@ def test_rows_of_another_series_among_its_own_are_named(series: Path) -> None:
     ("name", "content"),
     [
         *((store.SERIES, text) for text in (b"", b"[]", b"[" * 100_000, b'{"identity": 1}', b"\xff")),
+        (store.SERIES, b'{"identity": {"solver": "gi", "form": "dual", "tolerance": 1.0}, "cases": 12}'),
+        (
+            store.SERIES,
+            b'{"identity": {}, "cases": 1, "threads": 1, "scene": "", "title": "", "machine": ""}',
+        ),
         *(("contacts.npz", text) for text in (b"", b"PK\x03\x04")),
         *((store.CASES, text) for text in (b"[" * 100_000 + b"\n", b"[]\n", b"1\n", b'{"case": "a"}\n')),
         (store.CASES, b'{"case": 0, "verdict": {}}\n'),
@@ -437,6 +442,19 @@ def test_a_damaged_file_of_a_series_is_named(name: str, content: bytes, series: 
     mended = name == "contacts.npz"
     assert solve_series(series).exit_code == (0 if mended else 2)
     assert invoke("report", series).exit_code == (0 if mended else 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", [np.nan, np.inf, 1e300])
+def test_contacts_nowhere_on_earth_are_damaged(place: float, series: Path) -> None:
+    with np.load(series / "contacts.npz") as file:
+        arrays = dict(file)
+    arrays["contact_nodes"][0, 0] = place
+    np.savez(series / "contacts.npz", **arrays)
+    refused = invoke("report", series)
+    assert refused.exit_code == 2
+    assert "contacts.npz" in refused.output
+    assert solve_series(series).exit_code == 0
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from harness.planning.suite import read_suite
 from problems.errors import InputError
 from problems.load_cases.sweep import sweep
 from problems.scene import read_scene
+from problems.storage import cache
 
 SCENE = """
 title = "TITLE"
@@ -175,3 +176,52 @@ def test_a_table_with_a_million_bad_rows_shows_the_first(tmp_path: Path) -> None
     assert done.exit_code == 2
     assert "and 2900 more" in done.output
     assert done.output.count("line ") == 100
+
+
+@pytest.mark.parametrize("name", ["gaps.csv", "gaps.npz", "gaps.npy"])
+def test_measured_gaps_from_a_pipe_or_a_device_are_not_read(name: str, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "device").mkdir()
+    os.mkfifo(tmp_path / name)
+    (tmp_path / "device" / name).symlink_to("/dev/zero")
+    for path in (tmp_path / name, tmp_path / "device" / name):
+        words = ["series", str(tmp_path / "scene.toml"), "--gaps", str(path), "--out", str(tmp_path / "out")]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 2
+        assert "no regular file" in done.output
+
+
+def test_rows_from_a_pipe_are_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "measurements.jsonl")
+    done = CliRunner().invoke(app, ["gate", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "no regular file" in done.output
+
+
+def test_a_manifest_of_the_cache_from_a_pipe_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
+    (tmp_path / "key").mkdir()
+    os.mkfifo(tmp_path / "key" / cache.MANIFEST)
+    with pytest.raises(InputError, match=r"manifest\.json.*delete"):
+        cache.load("key")
+
+
+def test_a_loop_of_links_is_no_file(tmp_path: Path) -> None:
+    for name in ("scene.toml", "own.npz", "out.npz", "mine.py"):
+        (tmp_path / name).symlink_to(name)
+    (tmp_path / "good.toml").write_text(SCENE)
+    (tmp_path / "suite.toml").write_text('plugin = "mine.py"\nscenes = ["scene.toml"]\n')
+    for words in (
+        ["validate", "scene.toml"],
+        ["validate", "own.npz"],
+        ["run", "suite.toml"],
+        ["run", "gate", "--scene", "scene.toml"],
+        ["run", "gate", "--plugin", "mine.py"],
+        ["export", "good.toml", "--format", "npz", "--out", "out.npz/file.npz"],
+    ):
+        given = [str(tmp_path / word) if "." in word else word for word in words]
+        done = CliRunner().invoke(app, given)
+        assert done.exit_code == 2, (words, done.exception)
+        assert done.output.strip()

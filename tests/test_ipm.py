@@ -254,3 +254,12 @@ def test_all_wrong_options_are_named_at_once() -> None:
     with pytest.raises(InputError) as error:
         Ipm(theta=2.0, sigma=-1.0, preconditioner="none", ordering="open_last")
     assert {fault.key for fault in error.value.faults} == {"theta", "sigma", "ordering"}
+
+
+def test_a_large_y_does_not_hide_an_overlap() -> None:
+    """y − s1 would be Qλ − p in exact arithmetic; of a y of 1e20 mm, rounding leaves none of it."""
+    newton = NewtonSteps(np.eye(2), np.array([3.0, 1.0]), SYSTEMS["direct"](np.eye(2)), 0.9, 0.1, 1e-3, 100)
+    point = newton.at(np.ones(2), np.full(2, 1e20))
+    np.testing.assert_array_equal(point.gap, [-2.0, 0.0])
+    assert point.infeasibility >= 2.0
+    assert Point(np.ones(2), np.ones(2), np.array([-2.0, 0.0])).s1.tolist() == [3.0, 1.0]

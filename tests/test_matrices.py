@@ -214,3 +214,26 @@ def test_bad_matrix_market_names_its_file(tmp_path: Path, key: str, value: Any, 
         opened(write_mtx(tmp_path, **{key: value}))
     assert [fault.where for fault in error.value.faults] == [str(tmp_path / f"{key}.mtx")]
     assert said in str(error.value)
+
+
+@pytest.mark.parametrize("form", ["dense", "sparse"])
+@pytest.mark.parametrize("entry", ["3k", "3,5", "3D5", "0x3", "1_0", "1e", "3 4", "3\0", "3\r4"])
+def test_an_entry_that_mmread_would_misread_is_named(tmp_path: Path, form: str, entry: str) -> None:
+    """It reads 3,5 and 3D5 as 3, and crashes on a NUL."""
+    value = DATA["f"][:, None]
+    path = write_mtx(tmp_path, f=sp.coo_array(value) if form == "sparse" else value)
+    file = tmp_path / "f.mtx"
+    lines = file.read_text().strip().splitlines()
+    lines[-1] = " ".join([*lines[-1].split()[:-1], entry])
+    file.write_text("\n".join(lines) + "\n", newline="")
+    with pytest.raises(InputError, match=f"f.mtx.*line {len(lines)}"):
+        opened(path)
+
+
+def test_a_symmetric_matrix_market_file_must_be_square(tmp_path: Path) -> None:
+    """mmread would write beyond the end of its array."""
+    path = write_mtx(tmp_path)
+    numbers = "\n".join("12345")
+    (tmp_path / "A.mtx").write_text(f"%%MatrixMarket matrix array real symmetric\n2 3\n{numbers}\n")
+    with pytest.raises(InputError, match="not square"):
+        opened(path)

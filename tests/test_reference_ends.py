@@ -121,3 +121,9 @@ def test_a_row_says_why_it_cannot_be_judged(tmp_path: Path) -> None:
     wide = replace(problem, reference=replace(problem.reference, bound_mm=1e-3, route=f"proven, {STOPPED}"))
     assert _why_not_judged(judgement, wide) == f"reference error bound 1e-03 mm: proven, {STOPPED}"
     assert _why_not_judged(Judgement("within"), problem) is None
+
+
+def test_the_interior_point_ends_where_its_products_underflow() -> None:
+    """λ and y of 1e-200: their product is 0, and so is the duality gap."""
+    Q, p = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([1e-200, -1e-200])
+    assert interior_contact_set(Q, p, lambda: False).shape == (2,)

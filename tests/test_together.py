@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from small import make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
 from harness.conformance.known_problems import contact_rows
+from harness.measurement.solver_session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
@@ -23,6 +25,7 @@ from solvers.active_set.contact_sets import TrialSolution
 from solvers.base import Answer
 from solvers.linear_algebra.banded_inverse import BandedInverse, banded_inverse, order_along_joint
 from solvers.methods.newton import ActiveSetNewton
+from solvers.registry import make_solver
 
 TOLERANCE = 1e-10
 
@@ -253,3 +256,21 @@ def test_newton_has_no_such_way_without_a_factor() -> None:
     broken = type(data)(data.assembly, data.factors, -data.Q)
     solver = ActiveSetNewton()
     assert solver.batched(solver.prepare(in_form(broken, "dual"))) is None
+
+
+def test_what_sweeps_settle_is_solved() -> None:
+    """A beam with nearly dependent contacts: gaps within the rounding of y, and beyond the tolerance."""
+    D = np.eye(8) - 2 * np.eye(8, k=-1) + np.eye(8, k=-2)
+    A = np.eye(8)
+    A[range(0, 8, 2), range(1, 8, 2)] = 512.0, 2048.0, 8.0, 64.0
+    data = Prepared(Assembly((1024 * D.T @ D,), sp.csc_array(A)))
+    x = np.array([[-1, -2, -2, -2, -2, -2, -2, -2], [-61, 14, 49, -36, -47, 61, -13, -7]]) / 4096
+    lam = np.array([[0.25, 0, 0, 0, 0, 0, 0, 0], [0, 11.25, 0, 0, 0, 0, 0, 0]])
+    y = np.array([[0, 1, 1, 1, 1, 1, 1, 1], [0, 0, 14, 60, 0, 27, 97, 0]]) / 4096
+    cases = [
+        LoadCase(data.assembly.multiply_K(u) + A @ v, A.T @ u + w) for u, v, w in zip(x, lam, y, strict=True)
+    ]
+    session = SolverSession(make_solver("newton", {}), in_form(data, "dual"), TOLERANCE)
+    session.open(batched=True)
+    answers = session.solve_batch(session.problem.loads([*cases, cases[0]]))
+    assert [answer.status for answer in answers] == ["solved"] * 3

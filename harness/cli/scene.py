@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import ReferenceLimit, SceneName, error_reporting, option
+from harness.terminal.console import FormName, ReferenceLimit, SceneName, error_reporting, option
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -22,6 +22,10 @@ def solve(
         str | None, option("NAME", "A solver by name.  [default: the active-set method of the references]")
     ] = None,
     tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
+    form: Annotated[
+        FormName | None,
+        option("FORM", "primal, dual or sparse: without condensation.  [default: the cheaper one]"),
+    ] = None,
     reference_limit: ReferenceLimit = None,
 ) -> None:
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
@@ -41,7 +45,9 @@ def solve(
     with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.solve import solve as solve_scene
 
-        raise typer.Exit(solve_scene(scene, solver, tolerance, out, console, reference_limit))
+        raise typer.Exit(
+            solve_scene(scene, solver, tolerance, out, console, reference_limit, form.value if form else None)
+        )
 
 
 @app.command()

@@ -88,11 +88,13 @@ def series(
     """
     with error_reporting() as console:
         from harness.measurement.describe import described
+        from harness.planning.road import chosen_form
         from harness.series.run import run
         from harness.series.session import Job
-        from harness.series.store import CASES
+        from harness.series.store import CASES, SERIES, read_series
         from harness.terminal.waiting import waiting
         from problems.errors import Fault, InputError
+        from problems.load_cases.sweep import sweep as swept
         from problems.scene import read_scene
 
         random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
@@ -108,22 +110,26 @@ def series(
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         with waiting(console) as show:
             (made,) = described([(solver, {})], plugin, "--solver", show)
-        taken: Any = form.value if form else made.default_form
-        if taken not in made.forms:
-            faults.append(Fault("--form", "form", taken, f"{solver} takes {' and '.join(made.forms)}"))
+        if form and form.value not in made.forms:
+            faults.append(Fault("--form", "form", form.value, f"{solver} takes {' and '.join(made.forms)}"))
         if not (0 < tolerance < inf and 0 < limit < inf):
             allowed = "must be positive and finite"
             faults.append(Fault("series", "tolerance, limit", (tolerance, limit), allowed))
         if faults:
             raise InputError(faults)
         read = read_scene(scene)
+        before = read_series(out)["identity"]["form"] if (out / SERIES).is_file() else None
+        asked: Any = form.value if form else before if before in made.forms else None
+        count = swept(read, sweep).count if sweep else cases or 100
+        road = chosen_form(read, made.forms, asked, count)
+        if road.why:
+            console.print(f"In the sparse form, without condensation: {road.why}.", style="dim")
+        taken: Any = road.form
         if gaps:
             from problems.load_cases.measured_gaps import measured_gaps
 
             chosen: LoadCases = measured_gaps(read, gaps, cases, taken)
         elif sweep:
-            from problems.load_cases.sweep import sweep as swept
-
             chosen = swept(read, sweep, taken)
         else:
             from problems.load_cases.random_gaps import random_gaps

@@ -18,6 +18,7 @@ import filelock
 import numpy as np
 
 from problems.errors import InputError
+from problems.input.bounded import regular_file
 
 from .checksums import DAMAGED, Damaged, parsed, sealed, with_arrays
 
@@ -26,6 +27,7 @@ Row = dict[str, Any]
 MEASUREMENTS = "measurements.jsonl"
 TORN = "measurements.torn"
 OUTDATED = "measurements.outdated.jsonl"
+ROWS_MIB = 4096
 
 
 def to_line(row: Row) -> str:
@@ -106,7 +108,7 @@ def move_torn_line(path: Path) -> bool:
 
 def _split(path: Path) -> tuple[list[Row], bytes]:
     """The complete rows, and the bytes of a torn last line."""
-    content = path.read_bytes() if path.exists() else b""
+    content = regular_file(path, "file", ROWS_MIB).read_bytes() if path.exists() else b""
     *lines, last = content.split(b"\n")
     rows: list[Row] = []
     for number, line in enumerate(lines, start=1):

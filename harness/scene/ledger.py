@@ -9,11 +9,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from problems.build import load_case
 from problems.forms.assembly import Vector
+from problems.forms.names import Form
 from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect, effect_kinds
 from problems.model.joint import Joint
+from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 
 BALANCE = 1e-9  # a sum smaller than this, relative to its terms, is rounding
@@ -50,11 +53,11 @@ def measured() -> Iterator[Cost]:
         tracemalloc.stop()
 
 
-def ledger(scene: Scene, built: bool) -> list[Entry]:
+def ledger(scene: Scene, built: bool, form: Form = "dual") -> list[Entry]:
     """An entry for each thing that an effect adds. built : the stiffness was computed now, not loaded."""
     if not isinstance(scene, JointScene):
         return []
-    return [entry for effect in scene.effects for entry in _entries(effect, scene, built)]
+    return [entry for effect in scene.effects for entry in _entries(effect, scene, built, form)]
 
 
 def not_called_for(scene: JointScene) -> list[str]:
@@ -63,7 +66,7 @@ def not_called_for(scene: JointScene) -> list[str]:
     return [kind for kind in effect_kinds() if kind not in named]
 
 
-def _entries(effect: Effect, scene: JointScene, built: bool) -> Iterator[Entry]:
+def _entries(effect: Effect, scene: JointScene, built: bool, form: Form) -> Iterator[Entry]:
     joint = scene.joint
     name = " ".join(filter(None, [effect.kind, getattr(effect, "part", None)]))
     for first, second in effect.contacts:
@@ -83,11 +86,15 @@ def _entries(effect: Effect, scene: JointScene, built: bool) -> Iterator[Entry]:
         yield Entry(name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", cost.seconds, cost.mib)
     alone = replace(scene, effects=(*scene.stiffness_effects, effect))
     with measured() as cost:
-        load = load_case(alone)
+        load = load_case(alone, form)
     if isinstance(effect, GapEffect):
         yield Entry(name, "gap", _gap(load.g), cost.seconds, cost.mib)
+    elif form == "sparse" and isinstance(effect, PartLoadEffect):
+        amount = f"on {np.count_nonzero(load.f)} unknowns of {effect.part}"
+        yield Entry(name, "load", amount, cost.seconds, cost.mib)
     else:
-        yield Entry(name, "load", _forces(load.f, joint), cost.seconds, cost.mib)
+        f = load.f[_junction(alone)] if form == "sparse" else load.f
+        yield Entry(name, "load", _forces(f, joint), cost.seconds, cost.mib)
 
 
 def _gap(g: Vector) -> str:
@@ -108,3 +115,9 @@ def _sum(f: Vector) -> str:
     if abs(f.sum()) < BALANCE * abs(f).sum():
         return f"±{abs(f).max():.4g} N in balance"
     return f"{f.sum():+.4g} N"
+
+
+def _junction(scene: JointScene) -> NDArray[np.intp]:
+    from problems.uncondensed.whole_model import WholeModel  # only for the sparse form
+
+    return WholeModel.of(scene).junction

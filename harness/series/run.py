@@ -182,7 +182,7 @@ def metadata(job: Job) -> dict[str, Any]:
 
 def record_contacts(job: Job, directory: Path) -> int:
     """DIRECTORY/contacts.npz: the positions of contacts and fasteners, for the figures. Returns m."""
-    assembly = prepared(job.scene).assembly
+    assembly = prepared(job.scene, form=job.form).assembly
     arrays = {"m": np.array(assembly.m)}
     if assembly.contact_nodes is not None:
         arrays["contact_nodes"] = assembly.contact_nodes

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from harness.measurement.solver_session import SolverSession
 from harness.results.provenance import provenance
 from harness.results.records import Row
+from harness.verification.batched import sparse
 from harness.verification.batched.assess import Assessment, assess
 from harness.verification.batched.bound import Bound
 from harness.verification.judge import judge
@@ -25,6 +27,7 @@ from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.forms.sparse_prepared import SparsePrepared
 from problems.load_cases.base import LoadCases
 from problems.model.scene import Scene
 from solvers.base import Answer, Form, Solver, failed
@@ -68,6 +71,16 @@ class Result:
     gap: Gaps | None
 
 
+#: (load cases, their λ, their x) → their assessments.
+Assess = Callable[[Sequence[LoadCase], Sequence[Vector], Sequence[Vector | None]], list[Assessment]]
+
+
+def _assessor(data: Prepared) -> Assess:
+    if isinstance(data, SparsePrepared):
+        return partial(sparse.assess, data)
+    return partial(assess, Bound.of(data))
+
+
 @dataclass(frozen=True)
 class Attempt:
     case: int
@@ -85,8 +98,8 @@ class SeriesSession:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
         self.code = provenance()
-        self.data: Prepared = prepared(job.scene)
-        self.bound = Bound.of(self.data)
+        self.data: Prepared = prepared(job.scene, form=job.form)
+        self.assess = _assessor(self.data)
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.options, job.plugin)
         self.row: Row = {}  # of the case being solved
@@ -149,7 +162,7 @@ class SeriesSession:
         """The rows and gaps, with a proven error bound for each answer."""
         start = time.perf_counter()
         known = self._assessed(attempts)
-        if self.session.batch is not None:
+        if self.session.batch is not None and not isinstance(self.data, SparsePrepared):
             self._retry(attempts, known)
         share = (time.perf_counter() - start) / len(attempts)
         return [self._result(each, known.get(each.case), share) for each in attempts]
@@ -183,7 +196,7 @@ class SeriesSession:
             return {}
         lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
         own = [each.answer.x if "x" in needs else None for each in answered]
-        found = assess(self.bound, [each.load for each in answered], lams, own)
+        found = self.assess([each.load for each in answered], lams, own)
         return {each.case: assessment for each, assessment in zip(answered, found, strict=True)}
 
     def _result(self, attempt: Attempt, assessment: Assessment | None, assess_s: float) -> Result:

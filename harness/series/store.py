@@ -15,6 +15,7 @@ import os
 import zlib
 from collections.abc import Iterator, Sequence
 from io import BytesIO
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from harness.results import records
 from harness.results.checksums import DAMAGED, Damaged, arrays_in, parsed
 from harness.results.schema import VERDICTS
 from problems.errors import Fault, InputError
-from problems.input.bounded import regular_file
+from problems.input.bounded import LARGEST, regular_file
 from problems.load_cases.base import LoadCases
 from problems.storage.cache import digest
 
@@ -75,8 +76,12 @@ def read_series(directory: Path) -> dict[str, Any]:
     path = directory / SERIES
     try:
         content = parsed(path.read_bytes())
-        whole = isinstance(content["identity"], dict) and isinstance(content["cases"], int)
-    except (ValueError, TypeError, KeyError) as error:
+        identity = content["identity"]
+        whole = 0 <= content["cases"] <= MAX_CASES and 0 < identity["tolerance"] < inf
+        whole &= all(type(content[name]) is int for name in ("cases", "threads"))
+        whole &= all(isinstance(content[name], str) for name in ("scene", "title", "machine"))
+        whole &= all(isinstance(identity[name], str) for name in ("solver", "form"))
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise InputError.one(path, "content", str(error)[:80], DELETE) from error
     if not whole:
         raise InputError.one(path, "content", "not what was written", DELETE)
@@ -148,7 +153,8 @@ def contacts_in(directory: Path) -> int:
     nodes = arrays.get("contact_nodes", np.zeros((m, 2)))
     fasteners = arrays.get("fasteners", np.zeros((0, 2)))
     whole = nodes.shape == (m, 2) and fasteners.ndim == 2 and fasteners.shape[1] == 2
-    return m if whole and nodes.dtype.kind == fasteners.dtype.kind == "f" else 0
+    whole = whole and nodes.dtype.kind == fasteners.dtype.kind == "f"
+    return m if whole and all((abs(places) <= LARGEST).all() for places in (nodes, fasteners)) else 0
 
 
 class GapFile:

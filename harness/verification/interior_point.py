@@ -37,10 +37,10 @@ def interior_contact_set(Q: AnyQ, p: Vector, stop: Callable[[], bool] = lambda: 
     for _ in range(MAX_ITERATIONS):
         residual = H @ lam - q - y
         mu = float(lam @ y) / len(p)
-        merit = max(mu / first, float(abs(residual).max()) / size)
+        merit = max(mu / first if first else 0.0, float(abs(residual).max()) / size)
         if merit < least:
             best, least = lam > y, merit
-        if stop() or mu < SMALLEST_MU * first:
+        if stop() or mu <= SMALLEST_MU * first:  # 0, too, where products underflow
             break
         try:
             factor = sla.cho_factor(H + np.diag(y / lam), lower=True, overwrite_a=True, check_finite=False)

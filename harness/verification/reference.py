@@ -71,7 +71,13 @@ def default_limit_s(m: int) -> float:
     return 0.06 * max(m, 1000)
 
 
-def reference_of(scene: Scene, prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
+def reference_of(
+    scene: Scene,
+    prepared: Prepared,
+    load: LoadCase,
+    limit_s: float | None = None,
+    start: NDArray[np.bool_] | None = None,
+) -> Reference:
     """The reference of a scene: the answer that it was made from, if any, else the refined one.
 
     limit_s : of the search for the contact set, by default `default_limit_s(m)`. What it has found by then is
@@ -80,21 +86,26 @@ def reference_of(scene: Scene, prepared: Prepared, load: LoadCase, limit_s: floa
     if isinstance(scene, MadeScene):
         made = scene.made
         if made.x is None or made.lam is None:
-            return refined_active_set(prepared, load, limit_s)
+            return refined_active_set(prepared, load, limit_s, start)
         route = "chosen, exact"
         return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
-    return reference(prepared, load, limit_s)
+    return reference(prepared, load, limit_s, start)
 
 
-def reference(prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
+def reference(
+    prepared: Prepared,
+    load: LoadCase,
+    limit_s: float | None = None,
+    start: NDArray[np.bool_] | None = None,
+) -> Reference:
     """The reference of a load case, from the cache if it was computed before for these matrices."""
     if prepared.key is None:
-        return refined_active_set(prepared, load, limit_s)
+        return refined_active_set(prepared, load, limit_s, start)
     key = cache.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
 
     stored = cache.load(key)
     if stored is None:
-        found = refined_active_set(prepared, load, limit_s)
+        found = refined_active_set(prepared, load, limit_s, start)
         if STOPPED not in found.route:  # else a longer search may find more
             made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam, "active": found.active}
             cache.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})

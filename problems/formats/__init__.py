@@ -18,7 +18,6 @@ import pkgutil
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -55,7 +54,7 @@ def read(path: Path) -> Data:
         return module_of(path).read(path)
     except InputError:
         raise
-    except (OSError, ValueError, KeyError, IndexError, RuntimeError, EOFError, BadZipFile) as error:
+    except Exception as error:  # of the libraries, which raise whatever a damaged file leads to
         raise InputError.one(
             path, "file", f"{type(error).__name__}: {error}", "a readable matrix file"
         ) from error

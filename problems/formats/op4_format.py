@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 from problems.formats import Data, pyyeti, vector
@@ -17,6 +18,8 @@ def write(path: Path, data: Data) -> None:
 
 
 def read(path: Path) -> Data:
-    found = pyyeti(path).op4.OP4().dctload(str(path), justmatrix=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # such as a premature end
+        found = pyyeti(path).op4.OP4().dctload(str(path), justmatrix=True)
     data = {name.upper() if name in "ka" else name: matrix for name, matrix in found.items()}
     return {name: vector(matrix) if name in "fg" else matrix for name, matrix in data.items()}

@@ -58,6 +58,16 @@ class Assembly:
         return x if self.junction is None else x[self.junction]
 
     @property
+    def asked_contacts(self) -> sp.csc_array:
+        """A at the displacements that are asked for, (asked, m)."""
+        return self.A if self.junction is None else sp.csc_array(self.A[self.junction])
+
+    @property
+    def asked_nodes(self) -> Matrix | None:
+        """The coordinates of the displacements that are asked for, (asked, 2) mm."""
+        return None if self.nodes is None else self.at_junction(self.nodes)
+
+    @property
     def slices(self) -> list[slice]:
         """The unknowns of each block."""
         ends = np.cumsum([0, *(K.shape[0] for K in self.blocks)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from .bounded import LARGEST
 
 U = 2.0**-53  # relative rounding error of float64
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
+LONGEST_LINE = 60  # characters quoted in a message
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
 
 
@@ -163,17 +164,45 @@ def _read_mtx(path: Path, key: str) -> Any:
         raise InputError.one(path, key, str(error), "a readable Matrix Market file") from error
 
 
+Kind = Callable[[bytes], float]  # int or float
+
+
 def read_mtx(path: Path) -> Any:
     """A Matrix Market file, array or sparse.
 
-    Raises ValueError if entries are missing: mmread would take them for zeros or crash, as it does on an
-    array without entries.
+    Raises ValueError if entries are missing, a line holds anything else than one entry, or a symmetric matrix
+    is not square. mmread would take missing entries for zeros, read 3,5 and 3D5 as 3, and crash on a NUL, on
+    an array without entries, and on a symmetric one that is not square.
     """
-    rows, columns, entries, layout, _, symmetry = scipy.io.mminfo(path)
+    rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
+    if symmetry != "general" and rows != columns:
+        raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
     if layout == "array":
         entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
-    with path.open("rb") as file:
-        found = sum(1 for line in file if line.strip() and not line.startswith(b"%")) - 1  # the size line
-    if found < entries:
-        raise ValueError(f"truncated: {found} of {entries} entries")
+    _refuse_wrong_lines(path, entries, layout, field)
     return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))
+
+
+def _refuse_wrong_lines(path: Path, entries: int, layout: str, field: str) -> None:
+    """Raise ValueError unless the lines after the sizes are `entries` entries, with indices if sparse."""
+    values: dict[str, list[Kind]] = {"pattern": [], "integer": [int], "complex": [float, float]}
+    kinds = ([int, int] if layout == "coordinate" else []) + values.get(field, [float])
+    found = -1  # the size line
+    with path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            words = line.split()
+            if not words or line.startswith(b"%"):
+                continue
+            found += 1
+            if found == 0:
+                continue
+            try:
+                for kind, word in zip(kinds, words, strict=True):
+                    kind(word)
+                if b"_" in line:
+                    raise ValueError
+            except ValueError:
+                text = line[:LONGEST_LINE].decode(errors="replace").rstrip()
+                raise ValueError(f"line {number}: {text!r}; each line must hold one entry") from None
+    if found != entries:
+        raise ValueError(f"truncated: {found} of {entries} entries")

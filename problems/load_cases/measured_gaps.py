@@ -13,6 +13,7 @@ from problems.build import load_case
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.names import Form
+from problems.input.bounded import regular_file
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
@@ -22,6 +23,7 @@ from .base import LoadCases
 ALLOWED = "every gap must be a finite number, in mm"
 MAX_FAULTS = 10  # reported one by one; the rest are counted
 ROWS_AT_A_TIME = 256
+TABLE_MIB = 2**15
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def measured_gaps(scene: Scene, path: Path, count: int | None = None, form: Form
     An .npz must hold an array `gaps`, or a single array; an .npy is memory-mapped, the others are read into
     memory. Raises InputError naming the cases with faults.
     """
-    gaps = _read(path)
+    gaps = _read(regular_file(path, "file", TABLE_MIB))
     if isinstance(scene, JointScene):
         forces_only = tuple(e for e in scene.effects if not isinstance(e, GapEffect))
         scene = replace(scene, effects=forces_only)

@@ -107,6 +107,8 @@ def load(key: str) -> Entry | None:
 def _manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
+        if not path.is_file():
+            raise OSError("no regular file")
         manifest = json.loads(path.read_text())
         known = {name: manifest[name] for name in ("files", "sha256", "facts") if name in manifest}
         whole = "hash" in manifest and digest(known) == manifest["hash"]

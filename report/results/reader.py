@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -24,6 +23,8 @@ from report.document.numbers import tidy_power
 
 from .cells import cells_of
 from .rows import frame
+
+FAR_AWAY = 1e15  # mm: no picture is so large
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,12 @@ class Results:
                 return None
             with np.load(path) as file:
                 arrays = {name: file[name] for name in file.files}
-        except (OSError, ValueError, BadZipFile):
+        except Exception:  # numpy, zipfile and zlib raise kinds of their own
             return {}
         if any(array.dtype.kind not in "fiu" for array in arrays.values()):
+            return {}
+        places = [arrays[name] for name in ("contact_nodes", "fasteners") if name in arrays]
+        if not all((abs(each) < FAR_AWAY).all() for each in places):  # NaN, too
             return {}
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 

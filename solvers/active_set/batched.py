@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -142,7 +143,10 @@ class BatchedSweeps:
         stagnating = rounding > case.trial.rounding / 2
         case.trial, case.sweeps = TrialSolution(lam, y, rounding), case.sweeps + 1
         if self.settled(case, tolerance, stagnating):
-            case.settled = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
+            right = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
+            residual = max(rounding, float(-y.min(initial=0.0))) + _cut_off(lam, compliance)
+            # Else the answer would be inaccurate.
+            case.settled = right and residual <= max(tolerance, _rounding_bound(case.p, y))
 
     def answer(self, case: Case, load: LoadCase, tolerance: float) -> Answer:
         """The answer of a case; one that is unsettled is solved from its set."""
@@ -157,7 +161,9 @@ class BatchedSweeps:
             y = self.gaps(lam[:, None], [load])[:, 0]
         # `kkt_status` bounds the same rounding by |Q|λ, which is slow to compute.
         status, residual = kkt_status(self.Q, load.p, lam, y, max(tolerance, _rounding_bound(load.p, y)))
-        details = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
+        details: dict[str, Any] = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
+        if status != "solved":
+            details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
         return Answer(status, lam, iterations=case.sweeps, inner_iterations=case.sets, details=details)
 
 
@@ -193,6 +199,12 @@ def _banded_step(case: Case, M: BandedInverse, compliance: Vector, tolerance: fl
     found = block_pivoting(banded.at, case.C, compliance, tolerance, SETS_PER_SWEEP)
     case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
     return found.trial.lam
+
+
+def _cut_off(lam: Vector, compliance: Vector) -> float:
+    """Bound on the change of y = Qλ − p, mm, if forces below zero are set to 0: |q_ij| ≤ √(q_ii q_jj)."""
+    root = np.sqrt(compliance)
+    return float(root.max(initial=0.0) * (root @ np.maximum(-lam, 0.0)))
 
 
 def _rounding_bound(p: Vector, y: Vector) -> float:

@@ -23,11 +23,18 @@ class CgExhausted(Exception):
 
 @dataclass(frozen=True)
 class Point:
-    """λ and y with the residual s1 = −(Qλ − p − y) and the gap μ = λᵀy/m."""
+    """λ, y and the gap Qλ − p, which y converges to: a y far larger must not hide it.
+
+    The residual is s1 = −(Qλ − p − y), the duality gap μ = λᵀy/m.
+    """
 
     lam: Vector
     y: Vector
-    s1: Vector
+    gap: Vector
+
+    @property
+    def s1(self) -> Vector:
+        return self.y - self.gap
 
     @property
     def mu(self) -> float:
@@ -39,7 +46,7 @@ class Point:
 
         At an open gap λ → 0, and s1 does not matter as long as the gap stays open.
         """
-        overlap = float((self.s1 - self.y).max())
+        overlap = float((-self.gap).max())
         return max(overlap, float(self.lam @ abs(self.s1)) / float(self.lam.sum()))
 
 
@@ -61,7 +68,7 @@ class NewtonSteps:
     unconverged: int = 0
 
     def at(self, lam: Vector, y: Vector) -> Point:
-        return Point(lam, y, y - (product(self.Q, lam) - self.p))
+        return Point(lam, y, product(self.Q, lam) - self.p)
 
     def direction(self, point: Point, s3: Vector, kind: str) -> tuple[Vector, Vector]:
         """(Δλ, Δy) of Algorithm 2, step 1, where (14) reads (Q + D) Δλ = s1 + Λ⁻¹s3 with D = YΛ⁻¹."""

@@ -95,7 +95,7 @@ class FastIpm(Solver):
         for k in range(MAX_ITERATIONS):
             ratio = compliance * point.lam / point.y
             undecided = int(((ratio > 0.1) & (ratio < 10)).sum())
-            residual = float(abs(np.minimum(compliance * point.lam, point.y - point.s1)).max())
+            residual = float(abs(np.minimum(compliance * point.lam, point.gap)).max())
             stalled = 0 if residual < least else stalled + 1
             least = min(least, residual)
             details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}

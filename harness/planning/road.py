@@ -1,0 +1,66 @@
+"""Which costs less: condensing onto the junction once, or the whole sparse model for each load case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from harness.results.machine import physical_memory_mib
+from problems.condensation.build import built
+from problems.errors import InputError
+from problems.forms.names import DENSE_FORMS, Form, default_form
+from problems.model.scene import JointScene, Scene
+
+from .estimate import estimated, estimated_sparse, refuse_what_cannot_fit
+
+FLOPS_PER_S = 2e10  # the comparison hardly depends on it
+WORTH_S = 1.0  # a smaller saving is not worth another road
+SWEEPS, PRODUCTS = 3, 6  # with Q and with K, per load case of a series on dense matrices
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A form, and a sentence that says why; "" where there was no choice."""
+
+    form: Form
+    why: str = ""
+
+
+def chosen_form(scene: Scene, taken: Sequence[Form], asked: Form | None, cases: int = 1) -> Choice:
+    """The form asked for, else the cheaper one of those that a solver takes. Raises InputError."""
+    if asked is None:
+        return cheaper(scene, taken, cases)
+    if asked not in taken:
+        raise InputError.one("--form", "form", asked, f"the solver takes {' and '.join(taken)}")
+    if asked in DENSE_FORMS:
+        refuse_what_cannot_fit(scene, scene.name)
+    return Choice(asked)
+
+
+def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1) -> Choice:
+    """The form for some load cases, of those that a solver takes; estimated, from the scene alone.
+
+    Raises InputError if the only form that this machine's memory could hold is not among them.
+    """
+    usual = default_form([form for form in taken if form in DENSE_FORMS] or taken)
+    if not isinstance(scene, JointScene):
+        return Choice(usual)
+    condensed, sparse = estimated(scene, FLOPS_PER_S), estimated_sparse(scene, FLOPS_PER_S)
+    physical = physical_memory_mib()
+    if condensed.peak_mib > physical:
+        why = f"its condensed matrices would take {condensed.peak_mib:.0f} MiB"
+        if "sparse" in taken and sparse.peak_mib <= physical:
+            return Choice("sparse", f"{why}, the sparse model takes {sparse.peak_mib:.0f} MiB")
+        nodes = list(scene.joint.junction.nodes)
+        instead = "" if sparse.peak_mib > physical else "; `newton` takes the sparse form, which would fit"
+        allowed = f"fewer nodes: {why}, this machine has {physical} MiB{instead}"
+        raise InputError.one(scene.name, "junction.nodes", nodes, allowed)
+    if "sparse" not in taken or usual == "sparse" or sparse.peak_mib > physical:
+        return Choice(usual)
+    build_s = 0.0 if built(scene) else condensed.build_s
+    per_case = (2 * SWEEPS * condensed.m**2 + 2 * PRODUCTS * condensed.n**2) / FLOPS_PER_S
+    dense_s = build_s + (condensed.answer_s if cases == 1 else cases * per_case)
+    sparse_s = sparse.build_s + cases * sparse.answer_s
+    if sparse_s + WORTH_S > dense_s:
+        return Choice(usual)
+    return Choice("sparse", f"about {sparse_s:.0f} s, where condensing first would take {dense_s:.0f} s")

@@ -1,0 +1,240 @@
+"""Folders of valid files, the commands on them, and what must hold if one succeeds on damaged files."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tiny
+from rich.console import Console
+from small import make_load, make_prepared
+from test_hostile_input import SCENE
+from typer.testing import CliRunner
+
+from harness.cli.app import app
+from harness.measurement.run import run
+from harness.planning.suite import read_suite
+from harness.results import records
+from harness.scene.exchange import matrices
+from problems import formats
+
+QUIET = Console(file=StringIO())
+POINTS = "x,y\n20.0,10.0\n50.0,25.0\n80.0,40.0\n"
+RANDOM = "mean = 0.1\nrandom = { sd = 0.05, correlation_length = 30.0, seed = 1 }"
+FASTENERS = '[[effect]]\nkind = "fasteners"\npreload = 20.0\nfile = "points.csv"\n'
+JOINT = SCENE.replace("mean = 0.1", RANDOM) + FASTENERS
+
+
+class Fault(Exception):
+    """What the test exists to find. kind : hang, traceback, lost, wrong or words."""
+
+    def __init__(self, kind: str, what: object) -> None:
+        super().__init__(kind, what)
+        self.kind, self.what = kind, what
+
+
+@dataclass(frozen=True)
+class Target:
+    """A folder of valid files, those to damage, the commands on it, and what must hold if one succeeds.
+
+    keeps : which files no command may change. checked : (folder, words, exit code, output) → Fault, or none.
+    """
+
+    name: str
+    share: float
+    folder: Path
+    damaged: tuple[str, ...]
+    commands: tuple[tuple[str, ...], ...]
+    keeps: Callable[[str], bool] = lambda name: not name.startswith("out")
+    checked: Callable[[Path, tuple[str, ...], int, str], None] = lambda *_: None
+
+
+def invoke(folder: Path, words: tuple[str, ...]) -> tuple[int, str]:
+    """Exit code and output of a command; `@name` is a path in the folder."""
+    done = CliRunner().invoke(app, [word.replace("@", f"{folder}/") for word in words])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.exit_code, done.output
+
+
+def own_matrices() -> formats.Data:
+    """K (7, 7), A (7, 4), f, g."""
+    data = make_prepared(3, 3, tools=1)
+    return matrices(data, make_load(3, data)[0])
+
+
+def scene(root: Path) -> Target:
+    folder = root / "scene"
+    folder.mkdir()
+    (folder / "scene.toml").write_text(JOINT)
+    (folder / "points.csv").write_text(POINTS)
+    (folder / "gaps.csv").write_text("\n".join(",".join(["0.1"] * 12) for _ in range(3)) + "\n")
+    series = ("series", "@scene.toml", "--threads", "1", "--check", "0", "--out", "@out")
+    commands = (
+        *[("validate", "@scene.toml")] * 6,
+        ("solve", "@scene.toml", "--out", "@out"),
+        ("export", "@scene.toml", "--format", "npz", "--out", "@out.npz"),
+        (*series, "--gaps", "@gaps.csv"),
+        (*series, "--sweep", "initial_gap.mean=0.1:0.2:2"),
+    )
+    return Target("scene", 0.3, folder, ("scene.toml", "scene.toml", "points.csv", "gaps.csv"), commands)
+
+
+def own(root: Path, form: str, suffix: str) -> Target:
+    folder = root / form
+    folder.mkdir()
+    made = folder / ("own" if suffix == ".mtx" else f"own{suffix}")
+    formats.write(form, made, own_matrices())
+    files = [f"own/{name}.mtx" for name in "KAfg"] if suffix == ".mtx" else [made.name]
+    commands = [("import", *(f"@{name}" for name in files), "--out", "@out.npz")] * 2
+    if suffix == ".npz":
+        commands += [("import", "@own.npz", "--out", "@own.npz"), ("validate", "@own.npz")]
+        commands += [
+            ("solve", "@own.npz", "--out", "@out"),
+            ("solve", "@own.npz", "--solver", "gi", "--out", "@out"),
+        ]
+    if form == "mtx":
+        text = "".join(f'{name} = "own/{name}.mtx"\n' for name in "KAfg")
+        (folder / "scene.toml").write_text(f"[matrices]\n{text}")
+        files.append("scene.toml")
+        commands += [("validate", "@scene.toml"), ("solve", "@scene.toml", "--out", "@out")]
+    return Target(form, 0.08, folder, tuple(files), tuple(commands), checked=archive_is_whole)
+
+
+def archive_is_whole(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
+    if "nan mm" in output or "inf mm, proven" in output:
+        raise Fault("wrong", output[-200:])
+
+
+def cached(root: Path) -> Target:
+    """Own matrices whose cache is damaged: the answer is what it was, or there is none."""
+    folder = root / "cached"
+    folder.mkdir()
+    formats.write("npz", folder / "own.npz", own_matrices())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
+        assert invoke(folder, ("solve", "@own.npz", "--out", "@answer"))[0] == 0
+    files = [
+        str(path.relative_to(folder))
+        for path in (folder / "cache").rglob("*")
+        if path.suffix in (".npy", ".json")
+    ]
+
+    def same_answer(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
+        if code == 0 and words[0] == "solve":
+            with np.load(folder / "out/solution.npz") as new, np.load(folder / "answer/solution.npz") as old:
+                if abs(new["x"] - old["x"]).max() > 1e-14:
+                    raise Fault("wrong", f"off by {abs(new['x'] - old['x']).max()}")
+
+    commands = (("solve", "@own.npz", "--out", "@out"), ("validate", "@own.npz"))
+    return Target(
+        "cache",
+        0.08,
+        folder,
+        tuple(files),
+        commands,
+        lambda name: not name.startswith(("out", "cache")),
+        same_answer,
+    )
+
+
+def results(root: Path) -> Target:
+    """A finished run of two rows."""
+    folder = root / "results"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RIVETBENCH_CACHE", str(root / "cache"))
+        text = '[[solver]]\nname = "exact"\nforms = ["dual"]\n'
+        suite = read_suite(str(tiny.write_suite(folder, text, tolerances=[1e-6, 1e-8])))
+        assert run(suite, folder / "done", QUIET) == 0
+        assert invoke(folder, ("gate", "@done"))[0] == 0
+    rows = records.read(folder / "done" / records.MEASUREMENTS)
+    exact = {}
+    for row in rows:
+        with np.load(folder / "done" / row["answer"]) as saved:
+            exact[row["key"]] = saved["x"]
+    keys = set(exact)
+    suite_text = (folder / "done" / "suite.toml").read_bytes()
+
+    def accurate(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
+        """The gate passes only what is there, complete and right."""
+        if code or words[0] != "gate":
+            return
+        found = records.read(folder / "done" / records.MEASUREMENTS)
+        path = folder / "done" / "suite.toml"
+        same_suite = path.is_file() and path.read_bytes() == suite_text
+        if not path.is_file():
+            raise Fault("wrong", "passed, and nobody knows which rows there should be")
+        if same_suite and {row["key"] for row in found if row["gated"]} != keys:
+            raise Fault("wrong", "passed without all rows")
+        for row in found:
+            if row["gated"] and row["key"] in exact:
+                with np.load(folder / "done" / row["answer"]) as saved:
+                    if not abs(saved["x"] - exact[row["key"]]).max() <= 2e-7:
+                        raise Fault("wrong", f"passed {row['key']}")
+
+    names = tuple(
+        str(path.relative_to(folder))
+        for path in (folder / "done").rglob("*")
+        if path.suffix in (".jsonl", ".toml", ".json", ".npz")
+    )
+    commands = (*[("gate", "@done")] * 8, ("report", "@done"))
+    return Target("results", 0.18, folder, names, commands, lambda name: "report/" not in name, accurate)
+
+
+def series(root: Path) -> Target:
+    """A finished series of six cases: gone on with, it is what it was."""
+    folder = root / "series"
+    folder.mkdir()
+    (folder / "scene.toml").write_text(JOINT)
+    (folder / "points.csv").write_text(POINTS)
+    words = ("series", "@scene.toml", "--cases", "6", "--threads", "1", "--check", "0", "--out", "@done")
+    assert invoke(folder, words)[0] == 0
+    shutil.rmtree(folder / "done" / "report")
+    (folder / "done" / ".lock").unlink(missing_ok=True)
+    gaps = np.fromfile(folder / "done" / "gaps.f4", np.float32)
+    whole = (folder / "done" / "gaps.f4").read_bytes()
+
+    def same_gaps(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
+        path = folder / "done" / "gaps.f4"
+        if code == 0 and words[0] == "report" and path.read_bytes() != whole:
+            raise Fault("wrong", "reported on damaged gaps")
+        if code == 0 and "--sd" in words:
+            rows = records.read(folder / "done" / "cases.jsonl")
+            if len({row["series"] for row in rows if "series" in row}) > 1:
+                raise Fault("wrong", "rows of two series")
+        elif code == 0 and words[0] == "series":
+            found = np.fromfile(path, np.float32)
+            if found.size < gaps.size or abs(found[: gaps.size] - gaps).max() > 1e-6:
+                raise Fault("wrong", "went on with damaged gaps")
+
+    names = ("done/series.json", "done/gaps.f4", "done/cases.jsonl", "done/contacts.npz", "scene.toml")
+    commands = (("report", "@done"), words, (*words[:3], "9", *words[4:]), (*words, "--sd", "0.02"))
+    return Target(
+        "series", 0.04, folder, names, commands, lambda name: not name.startswith("done/"), same_gaps
+    )
+
+
+def suite(root: Path) -> Target:
+    """Read and refused: no scene has that name."""
+    folder = root / "suite"
+    tiny.write_suite(folder, tolerances=[1e-6, 1e-8], gated=False)
+    command = ("run", "@small.toml", "--scene", "nowhere", "--out", "@out")
+    return Target("suite", 0.08, folder, ("small.toml",), (command,))
+
+
+def all_targets(root: Path) -> list[Target]:
+    forms = {
+        "npz": ".npz",
+        "qpsolvers": ".npz",
+        "mtx": ".mtx",
+        "abaqus": ".mtx",
+        "op4": ".op4",
+        "dmig": ".pch",
+    }
+    of_formats = [own(root, form, suffix) for form, suffix in forms.items()]
+    return [scene(root), cached(root), results(root), series(root), suite(root), *of_formats]

@@ -1,0 +1,42 @@
+"""How far from the exact answer a solver that calls it solved may be."""
+
+from __future__ import annotations
+
+import numpy as np
+from exact_draws import ExactLoad
+from solving import TOLERANCES
+
+from harness.verification.judge import conditioned_limit
+from problems.forms.prepared import Prepared
+
+COMPLIANCE = 0.1  # mm/N, as in ipm's CONTACT_COMPLIANCE
+
+
+def promised(name: str, D: float, m: int, weakest: float, force: float, rounding: float) -> float:
+    """√D ‖x − x*‖_K, which max|x − x*| does not exceed, of a solver that kept its word; D = 1: ‖λ − λ*‖_Q.
+
+    With contacts of unit length and |y_C| ≤ δ, y ≥ −δ: the answer is that of gaps changed by δ, and off by
+    √(mδ²/λmin(Q)) in the norm of K at most (batched/bound.py). Of ipm, λᵀy ≤ m ε_μ, and feasible to δ: from
+    ‖e‖²_K = (λ − λ*)ᵀ(y − y*) ≤ λᵀy − λ*ᵀy ≤ m ε_μ + δ Σ(λ + λ*).
+    """
+    tolerance = TOLERANCES[name]
+    if name == "ipm":
+        delta = max(1e-3 * np.sqrt(tolerance), rounding)
+        return float(np.sqrt(D * (m * tolerance + 2.1 * delta * force)))
+    return float(np.sqrt(D * m / weakest) * max(tolerance, rounding)) if weakest > 0 else np.inf
+
+
+def promises(data: Prepared, each: ExactLoad, condition: float) -> dict[str, tuple[float, float]]:
+    """max|x − x*|, mm, that each solver's promise and the judge's limit leave; the latter is for joints no
+    more compliant than ipm assumes.
+    """
+    m, c = data.assembly.m, abs(data.assembly.A).max(axis=0).toarray().ravel()
+    D = float(np.diag(data.solve_K(np.eye(data.assembly.n))).max())
+    weakest = float(np.linalg.eigvalsh(data.Q / c / c[:, None])[0])
+    size = float(max(abs(v).max() for v in (each.x, data.solve_K(each.load.f), each.load.g / c)))
+    rounding = conditioned_limit(0.0, condition, size)
+    judged = conditioned_limit(1e-7, condition, size) if D <= COMPLIANCE else np.inf
+    force = float((c * each.lam).sum())
+    return {
+        name: (promised(name, D, m, weakest, force, rounding / 10) + rounding, judged) for name in TOLERANCES
+    }

@@ -1,0 +1,244 @@
+"""Exact problems without end: no bound is below the true error, and nothing wrong is called solved.
+
+A few hundred problems; RIVETBENCH_LONG=1 takes 50 000 load cases, RIVETBENCH_LONG=N takes N.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from exact_draws import LOADS, ExactLoad, ExactProblem, exact_problem
+from fuzz_log import Log, contained, max_error
+from long import draws
+from numpy.typing import NDArray
+from promises import promised, promises
+from solving import TOLERANCES
+
+from harness import InputError, own_matrices, solve_dual
+from harness.measurement.solver_session import SolverSession
+from harness.verification.batched.assess import assess
+from harness.verification.batched.bound import Bound
+from harness.verification.certificate import certify
+from harness.verification.exact_residual import DoubleDouble
+from harness.verification.judge import judge
+from harness.verification.reference import Reference, refined_active_set
+from problems.build import load_case, prepared
+from problems.forms.assembly import Vector
+from problems.forms.names import Form
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.registry import in_house, make_solver, modules
+
+SEED = 16
+LARGEST_CONDITION = 1e13  # the commands refuse 1e14
+
+Variant = tuple[str, Form, dict[str, Any]]
+USUAL: list[Variant] = [
+    (name, form, {}) for name in modules() if in_house(name) for form in make_solver(name, {}).forms
+]
+OTHERS: list[Variant] = [
+    ("newton", "dual", {"nested": False}),
+    *(("ipm-fast", "dual", {key: False}) for key in ("finish", "single", "start_at_gaps")),
+    *(("ipm", "dual", {"start": name}) for name in ("algorithm_4", "stp1", "stp2", "mehrotra")),
+    *(("ipm", "dual", {"scheme": name}) for name in ("algorithm_2", "mehrotra")),
+    *(("ipm", "dual", {"preconditioner": name}) for name in ("U", "none", "splitting", "direct")),
+    ("ipm", "dual", {"ordering": "open_last"}),
+]
+
+
+def test_nothing_wrong_is_called_solved_and_no_bound_is_too_small() -> None:
+    log, count, start = Log(), draws(300, 50_000), time.monotonic()
+    for index in range(count // LOADS):
+        made = exact_problem(SEED, index)
+        log.where = f"exact_problem({SEED}, {index}), {made.kind}"
+        with contained(log):
+            _check(log, made, np.random.default_rng([SEED, index, 1]))
+        if index % 1000 == 999:
+            print(
+                f"{index + 1} of {count // LOADS}, {time.monotonic() - start:.0f} s, {dict(log.faults)}",
+                flush=True,
+            )
+    print(count, f"load cases, {time.monotonic() - start:.0f} s:", dict(log.faults), dict(log.seen))
+    assert not log.faults, "\n".join([str(dict(log.faults)), *log.words])
+    # Else the assertion above says little.
+    assert log.seen["proven"] > 0.95 * log.seen["ordinary"] > 0.7 * count
+    for name, form, _ in USUAL:
+        assert log.seen[f"{name} {form}"] > 0.95 * log.seen["ordinary"], (name, form)
+
+
+def _check(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
+    data = Prepared(made.assembly)
+    spectra = [np.linalg.eigvalsh(K) for K in made.assembly.blocks]
+    condition = max(each[-1] for each in spectra) / min(each[0] for each in spectra)
+    if not 0 < condition < LARGEST_CONDITION:
+        return
+    bound = Bound.of(data)
+    references = [_check_reference(log, data, each) for each in made.loads]
+    for each in made.loads:
+        _check_certificate(log, data, bound.kappa, each, random)
+    lams: list[list[Vector]] = [[each.lam, *_hostile_forces(each, random)] for each in made.loads]
+    if made.ordinary:
+        log.seen["ordinary"] += len(made.loads)
+        other = OTHERS[random.integers(len(OTHERS))]
+        allowed = [promises(data, each, condition) for each in made.loads]
+        for variant in (*USUAL, other):
+            for k, lam in _check_solver(log, data, made.loads, references, allowed, variant):
+                lams[k].append(lam)
+        log.seen["proven"] += sum(known.bound_mm < np.inf for known in references)
+    for each, tried in zip(made.loads, lams, strict=True):
+        vouched = assess(bound, [each.load] * len(tried), tried, [None] * len(tried))
+        given = [each.x * (1 + random.normal(0, 10.0 ** -random.integers(1, 16))) for _ in tried]
+        vouched += assess(bound, [each.load] * len(tried), tried, given)
+        for found in vouched:
+            log.bound("series", found.x, found.bound_mm, each.x)
+    if random.random() < 0.05:
+        _check_interface(log, made, random)
+    if random.random() < 0.1:
+        _check_altered(log, random)
+
+
+def _check_reference(log: Log, data: Prepared, each: ExactLoad) -> Reference:
+    known = refined_active_set(data, each.load)
+    log.bound("reference", known.x, known.bound_mm, each.x)
+    return known
+
+
+def _check_certificate(
+    log: Log, data: Prepared, kappa: float, each: ExactLoad, random: np.random.Generator
+) -> None:
+    """Of an answer that is wrong on purpose, with a set that may be."""
+    size = 10.0 ** -random.integers(0, 20)
+    x = each.x * (1 + size * random.normal(size=len(each.x)))
+    lam = abs(each.lam * (1 + size * random.normal(size=len(each.lam))))
+    active: NDArray[np.bool_] = (each.lam > 0) ^ (random.random(len(lam)) < 0.1)
+    zero_x, zero_lam = np.zeros_like(x), np.zeros_like(lam)
+    proof = certify(
+        data.assembly, each.load, DoubleDouble(x, zero_x), DoubleDouble(lam, zero_lam), active, kappa
+    )
+    log.bound("certificate", proof.x.hi, proof.bound_mm, each.x)
+    y = each.load.g - data.assembly.A.T @ each.x  # exact: integers times powers of two
+    if (proof.closed & (each.lam == 0)).any() or (proof.open & (y == 0)).any():
+        log.fault("proven wrongly", "a contact is called closed or open")
+
+
+def _hostile_forces(each: ExactLoad, random: np.random.Generator) -> list[Vector]:
+    """Forces near the exact ones, and far from them."""
+    scale = abs(each.lam).max(initial=0.0)
+    noise = random.normal(size=(3, len(each.lam))) * scale
+    return [each.lam + 1e-12 * noise[0], each.lam + 1e-3 * noise[1], noise[2], np.zeros_like(each.lam)]
+
+
+def _check_solver(
+    log: Log,
+    data: Prepared,
+    given: tuple[ExactLoad, ...],
+    references: list[Reference],
+    allowed: list[dict[str, tuple[float, float]]],
+    variant: Variant,
+) -> Iterator[tuple[int, Vector]]:
+    """One load case after another, warm, and all at once where the solver can; yields the forces."""
+    name, form, options = variant
+    session = SolverSession(make_solver(name, options), in_form(data, form), TOLERANCES[name])
+    session.open(batched=True)
+    loads = session.problem.loads([each.load for each in given])
+    answers = [session.next(load, session.nearest(load), k) for k, load in enumerate(loads)]
+    if session.batch is not None:
+        answers += session.solve_batch(loads)
+    for k, answer in zip([*range(LOADS)] * 2, answers, strict=False):
+        if answer.status != "solved":
+            if answer.status != "failed" and "cause" not in answer.details:
+                log.fault("no cause", variant)
+            continue
+        log.seen[f"{name} {form} {options or ''}".strip()] += 1
+        (x,) = session.problem.recover([answer.lam], [answer.x], [loads[k]])
+        assert x is not None
+        assert answer.lam is not None
+        limit = min(allowed[k][name]) if variant in USUAL else allowed[k][name][0]
+        error = max_error(x, given[k].x)
+        if not error <= Fraction(limit):
+            log.fault("wrong but solved", f"{variant}: {float(error):.3e} mm off, allowed {limit:.3e} mm")
+        judged = judge(data, given[k].load, references[k], x, answer.lam, limit)
+        if judged.verdict == "within" and error > Fraction(limit) + Fraction(references[k].bound_mm):
+            log.fault("judged wrongly", f"{variant}: {float(error):.3e} mm off, limit {limit:.3e} mm")
+        if judged.verdict == "outside" and error <= Fraction(limit) - Fraction(references[k].bound_mm):
+            log.fault("judged wrongly", f"{variant}: {float(error):.3e} mm off, limit {limit:.3e} mm")
+        yield k, answer.lam
+
+
+def _check_interface(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
+    """As a user's own matrices, once as they are and once with a contact twice; Q and p by themselves."""
+    assembly, each = made.assembly, made.loads[0]
+    K = sp.block_diag(assembly.blocks)
+    try:
+        data = prepared(own_matrices(K, assembly.A, each.load.f, each.load.g))
+        known = refined_active_set(data, each.load)
+    except InputError:
+        if made.ordinary:
+            raise
+        return
+    log.bound("own matrices", known.x, known.bound_mm, each.x)
+    j = int(random.integers(assembly.m))
+    twice = sp.hstack([assembly.A, assembly.A[:, [j]] * 2.0 ** random.integers(-3, 4)])
+    g = np.append(each.load.g, each.load.g[j])
+    with pytest.raises(InputError, match="depend"):
+        _ = prepared(own_matrices(K, twice, each.load.f, g)).Q
+
+
+def _check_altered(log: Log, random: np.random.Generator) -> None:
+    """Integers beyond 2⁵³ are rounded and K is symmetrised: the bound is for what was given.
+
+    K = 2ᵇLLᵀ + E with small integers E, b and E such that all numbers are below 2⁶³.
+    """
+    n = int(random.integers(1, 7))
+    L = np.tril(random.integers(-3, 4, (n, n)), -1) + np.diag(random.integers(1, 4, n))
+    E = random.integers(-40, 41, (n, n))
+    if random.random() < 0.5:
+        E = np.tril(E) + np.tril(E, -1).T
+    K = (L @ L.T) * 2 ** int(random.integers(42, 53)) + E
+    x = random.integers(-1, 2, n)
+    lam = np.where(random.random(n) < 0.5, random.integers(1, 100, n), 0)
+    y = np.where(lam > 0, 0, random.integers(0, 3, n))
+    data = prepared(scene := own_matrices(K, np.eye(n), K @ x + lam, x + y))
+    known = refined_active_set(data, load_case(scene))
+    log.bound("altered", known.x, known.bound_mm, x.astype(float))
+
+
+def test_a_dual_program_alone_is_solved_to_its_promise() -> None:
+    """Q, λ and y in integers, so p = Qλ − y is exact."""
+    log, count = Log(), draws(60, 5_000)
+    solved = 0
+    for index in range(count):
+        random = np.random.default_rng([SEED, index, 2])
+        m = int(random.integers(1, 13))
+        L = np.tril(random.integers(-2, 3, (m, m)), -1) + np.diag(random.integers(1, 4, m))
+        Q = L @ L.T
+        lam = np.where(random.random(m) < random.choice([0.0, 0.5, 1.0]), random.integers(1, 50, m), 0)
+        y = np.where(
+            (lam > 0) | (random.random(m) < random.choice([0.0, 0.5, 1.0])), 0, random.integers(1, 50, m)
+        )
+        name, _, options = [*USUAL, *OTHERS][random.integers(len(USUAL) + len(OTHERS))]
+        log.where = f"dual {index}, {name} {options}"
+        if options.get("start") == "algorithm_4":
+            continue  # it needs K
+        with contained(log):
+            try:
+                answer = solve_dual(Q, Q @ lam - y, name, options=options, tolerance=TOLERANCES[name])
+            except InputError as refused:
+                if "gave no answer" in str(refused):
+                    continue
+                raise
+            if answer.status == "solved":
+                assert answer.lam is not None
+                low, high = np.linalg.eigvalsh(Q)[[0, -1]]
+                error, rounding = answer.lam - lam, 1e-14 * high * max(1, lam.sum())
+                if not np.sqrt(error @ Q @ error) <= promised(name, 1.0, m, low, lam.sum(), rounding):
+                    log.fault("wrong but solved", f"{abs(error).max():.3e} N")
+                solved += 1
+    assert not log.faults, "\n".join([str(dict(log.faults)), *log.words])
+    assert solved > 0.8 * count
