@@ -1,4 +1,4 @@
-"""The coarser model of the preconditioner: the same junction, nearly the same compliance, never a softer one."""
+"""The coarser model of the preconditioner: the same junction, nearly the same compliance, no softer."""
 
 from __future__ import annotations
 
