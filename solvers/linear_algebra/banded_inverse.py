@@ -86,14 +86,15 @@ def of_windows(windows: Windows, Q_WW: Callable[[Contacts], Matrix]) -> BandedIn
     """
     m, across = len(windows.order), windows.across
     band = np.zeros((min((WINDOW_LINES + 1) * across, m) + 1, m), order="F")
+    entries = band.ravel(order="K")
     for first, start, stop in windows.ranges():
         L, info = lapack.dpotrf(Q_WW(windows.order[first:stop]), lower=1, overwrite_a=1)
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} of Q_WW is not positive definite")
         rows = lapack.dtrtri(L, lower=1)[0][start - first :]
         added = rows.T @ rows
-        for j in range(stop - first):
-            band[: stop - first - j, first + j] += added[j:, j]
+        column, row = np.triu_indices(stop - first)  # of the lower triangle, column by column
+        entries[row - column + (first + column) * len(band)] += added[row, column]
     return BandedInverse(windows.order, band)
 
 
