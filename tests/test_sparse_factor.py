@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from sparse_matrices import band_matrix, chain, graph_matrix, renumbered
 
+from problems.build import load_case, prepared
+from problems.errors import InputError
 from problems.forms.assembly import Assembly, Matrix
+from problems.forms.names import FORMS
 from problems.forms.sparse_factor import (
     BandFactor,
     GeneralFactor,
@@ -19,6 +25,7 @@ from problems.forms.sparse_factor import (
     narrowest_order,
 )
 from problems.forms.sparse_prepared import SparsePrepared
+from problems.scene import read_scene
 
 
 def close(found: Matrix, expected: Matrix) -> None:
@@ -118,3 +125,25 @@ def test_what_is_indefinite_or_singular_has_no_factor(K: list[list[float]], movi
         with pytest.raises(NotPositiveDefinite) as caught:
             made(matrix)
         assert caught.value.unknown in moving
+
+
+@pytest.mark.parametrize("with_nodes", [False, True])
+def test_a_scene_with_a_mechanism_is_bad_input_that_says_where_it_moves(
+    with_nodes: bool, tmp_path: Path
+) -> None:
+    """A user's own matrices: of parts, supports are checked before. Both roads refuse in the same words."""
+    n, loose = 60, 4
+    K = sp.block_diag([band_matrix(np.random.default_rng(1), n, 2), chain(loose)]).toarray()
+    nodes = np.column_stack([np.arange(n + loose), np.zeros(n + loose)])
+    given = {"K": K, "A": np.eye(n + loose)[:, :9], "f": np.ones(n + loose), "g": np.zeros(9)}
+    np.savez(tmp_path / "own.npz", **given, **({"nodes": nodes} if with_nodes else {}))
+    scene = read_scene(str(tmp_path / "own.npz"))
+    allowed = []
+    for form in FORMS:
+        with pytest.raises(InputError) as caught:
+            prepared(scene, form=form).dual_load(load_case(scene, form))
+        (fault,) = caught.value.faults
+        assert str(tmp_path / "own.npz") in str(caught.value)
+        allowed.append(fault.allowed)
+    assert set(allowed) == {allowed[0]}
+    assert re.fullmatch(r"x\[6[0-3]\]" + (r" at \(6[0-3], 0\) mm" if with_nodes else ""), fault.key)
