@@ -12,6 +12,9 @@ EXACT = "harness/verification/exact_residual.py"
 LENGTH = "harness/verification/length.py"
 DEFINITE = "harness/verification/definite.py"
 JUDGE = "harness/verification/judge.py"
+SPARSE_DEFINITE = "harness/verification/sparse_definite.py"
+AUGMENTED = "harness/verification/augmented.py"
+BALANCE = "problems/forms/balance.py"
 REFERENCE = "harness/verification/reference.py"
 BLOCK = "harness/verification/batched/bound.py"
 COMPLIANCE = "harness/verification/batched/compliance.py"
@@ -66,6 +69,13 @@ MUTANTS = [
     Mutant(CERTIFICATE, "1.01 * norms * error", "1.01 * error"),
     Mutant(CERTIFICATE, "(np.sqrt(diagonal) * np.sqrt(trace))[single] * error + ", ""),
     Mutant(CERTIFICATE, "error + abs(r.value[single]) +", "error +"),
+    # The units of unknowns
+    Mutant(CERTIFICATE, "at_junction(units * error + abs(x.lo))", "at_junction(units * (error + abs(x.lo)))"),
+    Mutant(CERTIFICATE, "float(units.max()) ** 2 *", "float(units.max()) *"),
+    Mutant(CERTIFICATE, "float(units.max()) ** 2 *", "float(units.min()) ** 2 *"),
+    Mutant(CERTIFICATE, "sp.csc_array(sp.diags_array(units) @ A)", "A"),
+    Mutant(CERTIFICATE, "scaled = diagonal * units**2", "scaled = diagonal"),
+    Mutant(CERTIFICATE, "scaled[rows].sum()", "scaled[rows].max()"),
     # Residuals in twice the working precision
     Mutant(EXACT, "error = U * abs(value) + gamma", "error = gamma"),
     Mutant(EXACT, "error = U * abs(value) + gamma", "error = U / 2 * abs(value) + gamma"),
@@ -108,6 +118,37 @@ MUTANTS = [
     ),
     Mutant(REFERENCE, "return min(smallest_eigenvalue(", "return max(smallest_eigenvalue("),
     Mutant(REFERENCE, "if not np.isfinite(proof.bound_mm):", "if False:"),
+    # λmin(DKD) of a band
+    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(band) + 1)) * _norm(L) + ", ""),
+    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(band) + 1))", "gamma(len(band) + 1)"),
+    Mutant(SPARSE_DEFINITE, "_norm(L) + U * (largest + abs(s))", "_norm(L)"),
+    Mutant(SPARSE_DEFINITE, "U * (largest + abs(s))", "U * abs(s)"),
+    Mutant(SPARSE_DEFINITE, "U * (largest + abs(s))", "U * largest"),
+    Mutant(SPARSE_DEFINITE, "s - 1.01 * rounding", "s - rounding"),
+    Mutant(SPARSE_DEFINITE, "s - 1.01 * rounding", "s"),
+    Mutant(SPARSE_DEFINITE, "float(abs(shifted[0]).max())", "float(abs(shifted[0]).min())"),
+    Mutant(SPARSE_DEFINITE, "if info == 0:", "if True:"),
+    Mutant(SPARSE_DEFINITE, "(w / v).max()", "(w / v).min()"),
+    Mutant(SPARSE_DEFINITE, "np.abs(L, out=L)", "pass"),
+    Mutant(SPARSE_DEFINITE, "if bound >= SMALLEST:", "if bound > 0:"),
+    Mutant(SPARSE_DEFINITE, "least = min(least, _of_band", "least = max(0, _of_band"),
+    Mutant(SPARSE_DEFINITE, "sp.diags_array(d) @ K @ sp.diags_array(d)", "K"),
+    Mutant(SPARSE_DEFINITE, "sp.diags_array(d) @ K @ sp.diags_array(d)", "sp.diags_array(d) @ K"),
+    Mutant(SPARSE_DEFINITE, "scaled[order][:, order]", "scaled"),
+    # The equations of a contact set: no proof rests on them, but a bound that is tight does
+    Mutant(AUGMENTED, "self.rho * g - lam_C", "self.rho * g"),
+    Mutant(AUGMENTED, "self.rho * (self.A_C.T @ x - g)", "self.rho * (self.A_C.T @ x)"),
+    Mutant(AUGMENTED, "x, lam = x + dx, lam + dlam", "pass"),
+    Mutant(AUGMENTED, "missed = float(abs(y[active]).max(initial=0.0))", "missed = 0.0"),
+    Mutant(
+        BALANCE,
+        "np.log2(np.where(positive, diagonal, 1.0)) / 2",
+        "np.log2(np.where(positive, diagonal, 1.0))",
+    ),
+    Mutant(
+        BALANCE, "return np.exp2(np.where(positive, -np.round", "return np.exp2(np.where(positive, np.round"
+    ),
+    Mutant(BALANCE, "solve(v / D) / D", "solve(v)"),
     # √D (‖r‖/√κ + ‖z‖_K + ‖δ − Aᵀz‖ √(‖K‖/σ²))
     Mutant(BLOCK, "(force / np.sqrt(self.kappa) + distance)", "distance"),
     Mutant(BLOCK, "(force / np.sqrt(self.kappa) + distance)", "(force / np.sqrt(self.kappa) / 2 + distance)"),
@@ -229,10 +270,13 @@ MUTANTS = [
 
 #: Which tests must fail.
 TESTS = {
-    CERTIFICATE: ("terms_certificate", "terms_residual", "altered"),
+    CERTIFICATE: ("terms_certificate", "terms_residual", "sparse_terms", "altered"),
     EXACT: ("terms_residual", "altered", "exact_residual"),
     LENGTH: ("terms_residual",),
     DEFINITE: ("terms_definite",),
+    SPARSE_DEFINITE: ("sparse_terms", "sparse_certificate"),
+    AUGMENTED: ("sparse_terms", "sparse_certificate"),
+    BALANCE: ("sparse_terms", "sparse_certificate"),
     REFERENCE: ("terms_verdict", "altered"),
     BLOCK: ("terms_batched", "altered"),
     COMPLIANCE: ("terms_batched",),

@@ -24,6 +24,7 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from problems.forms import balance
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.balance import balanced_units
 from problems.forms.compliance import dense_submatrix
@@ -156,7 +157,7 @@ def _dense(K: Any) -> Matrix:
 
 def _code() -> str:
     """The fingerprint of the code for references: those of other code are recomputed."""
-    return fingerprint([Path(__file__)], within=["harness/verification"])
+    return fingerprint([Path(__file__), Path(balance.__file__)], within=["harness/verification"])
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -188,7 +189,7 @@ def refined_active_set(
     for _ in range(MAX_SET_CORRECTIONS):
         x, lam = _refine(prepared, load, active)
         s = gaps(prepared.assembly, load.g, x)
-        tiny = ENOUGH * abs(x.hi).max(initial=0) + s.error
+        tiny = ENOUGH * abs(prepared.assembly.at_junction(x.hi)).max(initial=0) + s.error
         wrong = np.where(active, lam.hi < 0, s.value < -tiny)
         if not wrong.any():
             break
@@ -216,7 +217,7 @@ def _contact_set(prepared: Prepared, load: LoadCase, p: Vector, stop: Stop) -> N
 def _refine(
     prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]
 ) -> tuple[DoubleDouble, DoubleDouble]:
-    assembly = prepared.assembly
+    assembly, units = prepared.assembly, units_of(prepared)
     solve: ContactSolve = (
         augmented.ContactSystem(prepared, active).solve
         if isinstance(prepared, SparsePrepared)
@@ -229,8 +230,8 @@ def _refine(
     for _ in range(MAX_REFINEMENTS):
         dx, dlam = solve(force, gap)
         x, lam = x.plus(dx), lam.plus(dlam)
-        step = float(abs(dx).max(initial=0))
-        if step >= before / 2 or step <= ENOUGH * float(abs(x.hi).max(initial=0)):
+        step = float(abs(dx / units).max(initial=0))
+        if step >= before / 2 or step <= ENOUGH * float(abs(x.hi / units).max(initial=0)):
             break
         before = step
         force = forces(assembly, load.f, x, lam).value

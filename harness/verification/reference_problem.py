@@ -122,12 +122,13 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     }
     before = _recorded(directory, scene)
     x = assembly.at_junction(known.x)
+    sparse = before.get("sparse", {}) if before else {}
     if problem.form == "sparse":
-        row = (before or row) | {"sparse": {"unknowns": assembly.n, **of_road}}
-    elif before and "sparse" in before:
-        row["sparse"] = before["sparse"]
-    if before and (problem.form == "sparse") != ("sparse" in before):
-        with suppress(OSError, KeyError, ValueError), np.load(contacts) as other:
+        row = (before or row) | {"sparse": sparse | {"unknowns": assembly.n, **of_road}}
+    elif sparse:
+        row["sparse"] = sparse
+    if before and (problem.form == "sparse") != bool(sparse) and "from_condensed_mm" not in sparse:
+        with suppress(OSError, KeyError, ValueError), np.load(contacts) as other:  # of the other road
             row["sparse"]["from_condensed_mm"] = float(abs(other["x"] - x).max())
     _put(row, directory)
     arrays = {

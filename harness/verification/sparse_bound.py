@@ -10,7 +10,7 @@ the answer of the problem with f − r and g + δ is x, and from g to g + δ its
 with ‖d‖_K ≤ ‖δ‖ √(‖DKD‖_∞/σ²).
 
 A refinement step is λ_C ← λ_C − P y_C, P the inverse of Q_CC that M ≈ Q⁻¹ gives, and reduces y_C to about a
-tenth. Forces that become negative are set to zero, overlapping contacts join C: the bound holds whatever C is.
+tenth. Forces that become negative are set to zero, overlapping contacts join C; the bound holds for any C.
 """
 
 from __future__ import annotations

@@ -90,5 +90,6 @@ def _blocks(L: NDArray[np.float64], start: int, stop: int, width: int) -> tuple[
     )
     whole = np.array(slanted, dtype=np.float32, order="F")
     diagonal = np.asfortranarray(np.tril(whole[: stop - start]))
-    below = np.asfortranarray(np.triu(whole[stop - start :], k=stop - start - (L.shape[0] - 1)))
+    # Its entries are those at most len(L) − 1 from the diagonal: none, where K is diagonal and `width` is 1.
+    below = np.asfortranarray(np.triu(whole[stop - start :], k=stop - start - (len(L) - 1)))
     return diagonal, below

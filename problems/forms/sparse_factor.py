@@ -22,6 +22,8 @@ from .assembly import Matrix
 Order = NDArray[np.intp]
 
 BAND_TO_ROW = 20  # a band at most this many times longer than K's mean row is worth it
+LOST = 2.0**-50  # of an unknown's stiffness: a smaller pivot is but the rounding of a zero
+SOFT = 2.0**-30  # of an unknown's stiffness: springs that hold a mechanism
 
 
 class NotPositiveDefinite(np.linalg.LinAlgError):
@@ -93,9 +95,13 @@ class BandFactor:
     """L, lower triangular with K = LLᵀ, stored as (b + 1, N): L[j + d, j] in row d. Overwrites `band`."""
 
     def __init__(self, band: Matrix) -> None:
+        smallest = LOST * band[0]
         self.L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
         if info:
             raise NotPositiveDefinite(int(info) - 1)
+        lost = np.flatnonzero(self.L[0] ** 2 <= smallest)
+        if lost.size:
+            raise NotPositiveDefinite(int(lost[0]))
 
     @property
     def numbers(self) -> int:
@@ -134,11 +140,13 @@ class GeneralFactor:
         try:
             self.lu = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
         except RuntimeError as error:  # exactly singular
-            raise NotPositiveDefinite(_idle_unknown(K)) from error
-        pivots = self.lu.U.diagonal()
-        wrong = np.flatnonzero(~(pivots > 0))
+            raise NotPositiveDefinite(_moving_unknown(K)) from error
+        order = np.argsort(self.lu.perm_c)
+        # Where a pivot on the diagonal is zero, SuperLU takes another row, whose entry may be positive.
+        exchanged = np.argsort(self.lu.perm_r) != order
+        wrong = np.flatnonzero(~(self.lu.U.diagonal() > LOST * abs(K.diagonal()[order])) | exchanged)
         if wrong.size:
-            raise NotPositiveDefinite(int(np.flatnonzero(self.lu.perm_c == wrong[0])[0]))
+            raise NotPositiveDefinite(int(order[wrong[0]]))
 
     @property
     def numbers(self) -> int:
@@ -149,6 +157,10 @@ class GeneralFactor:
         return x
 
 
-def _idle_unknown(K: sp.csc_array) -> int:
-    """The unknown with the smallest diagonal entry."""
-    return int(K.diagonal().argmin())
+def _moving_unknown(K: sp.csc_array) -> int:
+    """Where K is singular, the unknown that moves most, each in its own unit, if nothing else holds it."""
+    size = abs(K).max(axis=1).toarray().ravel()
+    size = np.where(size > 0, size, size.max(initial=0.0) or 1.0)
+    held = sp.csc_array(K + SOFT * sp.diags_array(size))
+    force = np.sqrt(size) * np.random.default_rng(0).standard_normal(len(size))
+    return int(np.argmax(abs(splu(held).solve(force)) * np.sqrt(size)))

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.sparse_factor import Factor, NotPositiveDefinite
 from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 from problems.storage.cache import digest
@@ -25,9 +28,12 @@ SMALL = 200  # unknowns up to which any K is taken
 
 
 def prepared(scene: Scene) -> SparsePrepared:
-    """K̂ and B of a scene; factors when first needed. Raises InputError if K is dense or cannot be read."""
+    """K̂ and B of a scene. Raises InputError if K is dense or cannot be read, and where factors are first
+    needed if it is not positive definite.
+    """
     start = time.perf_counter()
     coarser: Callable[[], Assembly] | None = None
+    folders: tuple[str, ...] = ("problems/fem", "problems/model", "problems/effects", "problems/uncondensed")
     match scene:
         case JointScene():
             model = WholeModel.of(scene)
@@ -35,14 +41,34 @@ def prepared(scene: Scene) -> SparsePrepared:
             coarser = _graded(model)
         case MatricesScene():
             assembly = _own(scene)[0]
+            folders += ("problems/input", "problems/formats")
         case MadeScene():
             assembly = _sparse(scene.made.assembly, scene)
         case _:
             raise TypeError(type(scene).__name__)
-    folders = ("problems/fem", "problems/model", "problems/effects", "problems/uncondensed")
     code = fingerprint([Path(__file__)], within=folders)
     key = digest("uncondensed", scene.assembly_key, code)
-    return SparsePrepared(assembly, key, {"model": time.perf_counter() - start}, coarser)
+    return _OfScene(scene, assembly, key, {"model": time.perf_counter() - start}, coarser)
+
+
+class _OfScene(SparsePrepared):
+    """Says of a mechanism where it moves, as an error of the scene."""
+
+    def __init__(self, scene: Scene, *given: Any) -> None:
+        super().__init__(*given)
+        self.scene = scene
+
+    @cached_property
+    def sparse_factors(self) -> tuple[Factor, ...]:
+        try:
+            return super().sparse_factors
+        except NotPositiveDefinite as error:
+            from problems.forms.stages import indefinite  # which imports the code of dense factors
+
+            nodes, unknown = self.assembly.nodes, error.unknown
+            where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[unknown])
+            key, moves = f"x[{unknown}]{where}", "moves without a force"
+            raise indefinite(self.scene.source_of("K"), key, moves) from error
 
 
 def _graded(model: WholeModel) -> Callable[[], Assembly]:

@@ -60,7 +60,7 @@ class WholeModel:
             for T, k in springs:
                 T_here = self._at_junction(T)[start:stop]
                 K = K + T_here @ sp.diags_array(k) @ T_here.T
-            blocks.append(sp.csc_array(K))
+            blocks.append(sp.csc_array((K + K.T) / 2))  # the order of sums is another in K_ji: proofs see it
             names.append(" + ".join(self.scene.joint.part[part].name for part in parts))
         B = self._at_junction(self.scene.joint.contact_matrix())
         return Assembly(tuple(blocks), B, self._nodes(), tuple(names), junction=self.junction)

@@ -1,0 +1,149 @@
+"""Factors of a sparse K, each against the dense matrix, and what they say of a mechanism."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from sparse_matrices import band_matrix, chain, graph_matrix, renumbered
+
+from problems.build import load_case, prepared
+from problems.errors import InputError
+from problems.forms.assembly import Assembly, Matrix
+from problems.forms.names import FORMS
+from problems.forms.sparse_factor import (
+    BandFactor,
+    GeneralFactor,
+    NotPositiveDefinite,
+    Renumbered,
+    factored,
+    half_bandwidth,
+    lower_band,
+    narrowest_order,
+)
+from problems.forms.sparse_prepared import SparsePrepared
+from problems.scene import read_scene
+
+
+def close(found: Matrix, expected: Matrix) -> None:
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * abs(expected).max())
+
+
+def scattered(random: np.random.Generator, n: int, half: int) -> tuple[sp.csc_array, Matrix]:
+    """A band matrix in a random order, and where its unknowns lie along the model."""
+    order = random.permutation(n)
+    return renumbered(band_matrix(random, n, half), order), np.column_stack([order / 1.0, order % 2])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_each_factor_solves_as_the_dense_matrix_does(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    n = int(random.integers(300, 500))
+    band, (far, nodes), graph = band_matrix(random, n, 3), scattered(random, n, 3), graph_matrix(random, n)
+    for K, where, kind in (
+        (band, None, BandFactor),
+        (far, None, Renumbered),
+        (far, nodes, Renumbered),
+        (graph, None, GeneralFactor),
+    ):
+        factor = factored(K, where)
+        assert type(factor) is kind
+        assert factor.numbers < n * n / 2
+        for b in (random.standard_normal(n), random.standard_normal((n, 3))):
+            close(factor.solve(b), np.linalg.solve(K.toarray(), b))
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 9])
+@pytest.mark.parametrize("half", [0, 1, 4, 8])
+@pytest.mark.parametrize("seed", range(3))
+def test_small_matrices_of_any_band(n: int, half: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    K = band_matrix(random, n, half)
+    dense, b = K.toarray(), random.standard_normal(n)
+    rows, columns = dense.nonzero()
+    assert half_bandwidth(K) == max(rows - columns)
+    band = lower_band(K)
+    assert band.shape == (half_bandwidth(K) + 1, n)
+    for d in range(len(band)):
+        np.testing.assert_array_equal(band[d, : n - d], np.diag(dense, -d))
+    for factor in (factored(K), GeneralFactor(K), Renumbered(np.arange(n)[::-1], lower_band(K[::-1, ::-1]))):
+        close(factor.solve(b), np.linalg.solve(dense, b))
+
+
+def test_the_narrowest_order_is_one_and_is_no_wider() -> None:
+    random = np.random.default_rng(4)
+    K, nodes = scattered(random, 400, 2)
+    for where in (None, nodes):
+        order = narrowest_order(K, where)
+        assert order is not None
+        assert sorted(order) == list(range(400))
+        assert half_bandwidth(renumbered(K, order)) <= 8 < half_bandwidth(K)
+    assert narrowest_order(band_matrix(random, 400, 3)) is None
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_mechanism_is_named_by_an_unknown_that_moves(seed: int) -> None:
+    """A chain that nothing holds, among unknowns that are held, in each of the three kinds of factor."""
+    random = np.random.default_rng(seed)
+    n, loose = 300, int(random.integers(2, 6))
+    for held, order in (
+        (band_matrix(random, n, 2), np.arange(n + loose)),
+        (band_matrix(random, n, 2), random.permutation(n + loose)),
+        (graph_matrix(random, n), random.permutation(n + loose)),
+    ):
+        K = renumbered(sp.csc_array(sp.block_diag([held, 1e3 * chain(loose)])), order)
+        with pytest.raises(NotPositiveDefinite) as caught:
+            factored(K)
+        assert order[caught.value.unknown] >= n
+
+
+def test_the_block_of_a_mechanism_counts() -> None:
+    blocks = (band_matrix(np.random.default_rng(1), 7, 2), chain(3))
+    with pytest.raises(NotPositiveDefinite) as caught:
+        _ = SparsePrepared(Assembly(blocks, sp.csc_array((10, 0)))).sparse_factors
+    assert 7 <= caught.value.unknown < 10
+    assert str(caught.value.unknown) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("K", "moving"),
+    [
+        ([[0.0, 1.0], [1.0, 0.0]], {0, 1}),  # another row's pivot is positive
+        ([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]], {0, 1, 2}),
+        ([[4.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 2.0]], {1}),
+        ([[1e-3, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, -1.0, 1.0]], {1, 2}),  # the softest one is held
+        ([[2.0, 2.0, 0.0], [2.0, 2.0, 0.0], [0.0, 0.0, 1e-3]], {0, 1}),
+        ([[5.0, 0.0], [0.0, 0.0]], {1}),
+    ],
+)
+def test_what_is_indefinite_or_singular_has_no_factor(K: list[list[float]], moving: set[int]) -> None:
+    matrix = sp.csc_array(np.array(K))
+    for made in (factored, GeneralFactor):
+        with pytest.raises(NotPositiveDefinite) as caught:
+            made(matrix)
+        assert caught.value.unknown in moving
+
+
+@pytest.mark.parametrize("with_nodes", [False, True])
+def test_a_scene_with_a_mechanism_is_bad_input_that_says_where_it_moves(
+    with_nodes: bool, tmp_path: Path
+) -> None:
+    """A user's own matrices: of parts, supports are checked before. Both roads refuse in the same words."""
+    n, loose = 60, 4
+    K = sp.block_diag([band_matrix(np.random.default_rng(1), n, 2), chain(loose)]).toarray()
+    nodes = np.column_stack([np.arange(n + loose), np.zeros(n + loose)])
+    given = {"K": K, "A": np.eye(n + loose)[:, :9], "f": np.ones(n + loose), "g": np.zeros(9)}
+    np.savez(tmp_path / "own.npz", **given, **({"nodes": nodes} if with_nodes else {}))
+    scene = read_scene(str(tmp_path / "own.npz"))
+    allowed = []
+    for form in FORMS:
+        with pytest.raises(InputError) as caught:
+            prepared(scene, form=form).dual_load(load_case(scene, form))
+        (fault,) = caught.value.faults
+        assert str(tmp_path / "own.npz") in str(caught.value)
+        allowed.append(fault.allowed)
+    assert set(allowed) == {allowed[0]}
+    assert re.fullmatch(r"x\[6[0-3]\]" + (r" at \(6[0-3], 0\) mm" if with_nodes else ""), fault.key)

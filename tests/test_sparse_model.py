@@ -1,0 +1,162 @@
+"""The uncondensed model against the condensed one, whose code for K, loads and springs is another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from joints import make_joint, make_scene
+from scipy.sparse.linalg import splu
+from test_only_what_is_called_for import TABLES, scene_of
+
+from harness.verification.reference import refined_active_set
+from problems.build import load_case, prepared
+from problems.effects.installed_fasteners import InstalledFasteners
+from problems.effects.self_weight import SelfWeight
+from problems.forms.assembly import Assembly, Matrix
+from problems.forms.sparse_factor import half_bandwidth
+from problems.forms.sparse_prepared import SparsePrepared
+from problems.model.scene import JointScene
+from problems.scene import read_scene, scene_names
+from problems.uncondensed.whole_model import WholeModel
+
+GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
+END = {"length": 90.0, "elements": 2}
+HELD = {"north": END, "clamped": ["north"]}
+
+
+def condensed(model: Assembly, V: Matrix) -> Matrix:
+    """SV, V (n, k), S the Schur complement of K̂ on the junction: the other unknowns go by SuperLU."""
+    assert model.junction is not None
+    K = sp.csc_array(sp.block_diag(model.blocks))
+    inner = np.setdiff1d(np.arange(model.n), model.junction)
+    K_jj, K_ij = K[model.junction][:, model.junction], sp.csc_array(K[inner][:, model.junction])
+    eliminated: Matrix = K_jj @ V - K_ij.T @ splu(sp.csc_array(K[inner][:, inner])).solve(K_ij @ V)
+    return eliminated
+
+
+def check_same(scene: JointScene) -> None:
+    """K, A, p, Qv and K⁻¹f of both."""
+    dense, whole = prepared(scene), prepared(scene, form="sparse")
+    assert isinstance(whole, SparsePrepared)
+    case, load = load_case(scene), load_case(scene, "sparse")
+    random, model, K = np.random.default_rng(1), whole.assembly, sp.block_diag(dense.assembly.blocks)
+    junction = model.junction
+    assert (model.asked, model.m) == (dense.assembly.n, dense.assembly.m)
+    assert not any((block != block.T).nnz for block in model.blocks)  # to the last bit: proofs rely on it
+    V = np.eye(model.asked) if model.n < 3000 else random.standard_normal((model.asked, 9))
+    np.testing.assert_allclose(condensed(model, V), K @ V, rtol=0, atol=1e-9 * abs(K).max())
+    np.testing.assert_array_equal(model.at_junction(model.A.toarray()), dense.assembly.A.toarray())
+    assert abs(model.A).sum() == abs(dense.assembly.A).sum()
+    np.testing.assert_array_equal(load.g, case.g)
+    force = random.standard_normal(dense.assembly.n)
+    whole_force = np.zeros(model.n)
+    whole_force[junction] = force
+    lam = random.standard_normal(model.m)
+    for found, expected in (
+        (model.at_junction(whole.solve_K(load.f)), dense.solve_K(case.f)),
+        (model.at_junction(whole.solve_K(whole_force)), dense.solve_K(force)),
+        (whole.dual_load(load), dense.dual_load(case)),
+        (whole.compliance @ lam, dense.Q @ lam),
+    ):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-9 * abs(expected).max(initial=0.0))
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_a_scene_of_the_gallery(name: str) -> None:
+    scene = read_scene(name)
+    assert isinstance(scene, JointScene)
+    check_same(scene)
+
+
+@pytest.mark.parametrize("kind", sorted(TABLES))
+def test_every_effect(kind: str, tmp_path: Path) -> None:
+    scene = read_scene(str(scene_of(tmp_path, *{kind, "supports"} if kind == "support_shift" else {kind})))
+    assert isinstance(scene, JointScene)
+    check_same(scene)
+    without = replace(scene, effects=())
+    if kind not in ("rigid_tool", "shims", "initial_gap", "measured_gap"):
+        K, f = (prepared(scene, form="sparse").assembly.blocks, load_case(scene, "sparse").f)
+        K0, f0 = (prepared(without, form="sparse").assembly.blocks, load_case(without, "sparse").f)
+        assert len(K) != len(K0) or (f != f0).any() or any((a != b).nnz for a, b in zip(K, K0, strict=True))
+
+
+def test_springs_past_a_part_in_between_and_loads_beyond_the_junction() -> None:
+    """The first and the third of three parts are one block, the second another: blocks out of order."""
+    parts = [HELD | {"name": name, "thickness": 3.0 + k, "south": END} for k, name in enumerate("abc")]
+    pairs = [("a", "b"), ("b", "c"), ("a", "c")]
+    scene = make_scene(
+        make_joint(*parts, contacts=pairs, nodes=(6, 4)),
+        InstalledFasteners.model_validate(
+            {"kind": "installed_fasteners", "between": ["a", "c"], "points": [[10.0, 10.0], [300.0, 90.0]]}
+        ),
+        SelfWeight.model_validate({"kind": "self_weight", "part": "c"}),
+    )
+    check_same(scene)
+    assert prepared(scene, form="sparse").assembly.parts == ("a + c", "b")
+    f = load_case(scene, "sparse").f
+    beyond = np.delete(f, WholeModel.of(scene).junction)
+    assert np.count_nonzero(beyond) > len(beyond) / 4
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_the_numbering_is_one_and_narrow(name: str) -> None:
+    """Every free unknown has one number; the band is that of a line of nodes, and two nodes, across."""
+    scene = read_scene(name)
+    assert isinstance(scene, JointScene)
+    model = WholeModel.of(scene)
+    numbers = np.concatenate(model.numbering.places)
+    assert sorted(numbers[numbers >= 0]) == list(range(model.numbering.size))
+    for place, part in zip(model.numbering.places, model.models, strict=True):
+        clamped = [part.plate.line_dofs(line) for line in part.clamped]
+        assert (
+            np.flatnonzero(place < 0) == np.sort(np.concatenate([*clamped, np.zeros(0, dtype=int)]))
+        ).all()
+    for parts, K in zip(model.numbering.blocks, model.assembly().blocks, strict=True):
+        along = sum(len(model.models[part].plate.x) for part in parts)
+        across = sum(len(model.models[part].free_lines) for part in parts)
+        assert half_bandwidth(K) <= 4 * (min(along, across) + 2) - 1
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("clamped", [["north"], ["south", "north"]])
+def test_what_is_built_in_is_left_out(turned: bool, clamped: list[str]) -> None:
+    nodes = (4, 9) if turned else (9, 4)
+    one = {"south": END, "north": END, "clamped": clamped}
+    scene = make_scene(make_joint(one, HELD | {"name": "b"}, contacts=[("a", "b")], nodes=nodes))
+    model = prepared(scene, form="sparse").assembly
+    lines = nodes[1] + 4 - len(clamped), nodes[1] + 2 - 1
+    assert [K.shape[0] for K in model.blocks] == [4 * nodes[0] * count for count in lines]
+    assert model.junction is not None
+    assert model.nodes is not None
+    np.testing.assert_array_equal(model.nodes[model.junction], np.tile(scene.joint.nodes, (2, 1)))
+    check_same(scene)
+
+
+def test_a_beam_that_lies_on_a_tool() -> None:
+    """Lift-off length a = (72 EI g/q)^¼ at each end, reaction q (L − 2a) + 2qa/3: without the dense road."""
+    scene = read_scene("gallery/heavy-sheet-on-tool")
+    found = refined_active_set(prepared(scene, form="sparse"), load_case(scene, "sparse"))
+    q, EI, L, gap = 2700e-9 * 9.80665 * 2.0, 70e3 * 2.0**3 / 12, 2000.0, 0.5
+    a = (72 * EI * gap / q) ** 0.25
+    assert found.bound_mm < 1e-10
+    assert found.lam.sum() == pytest.approx(100.0 * (q * (L - 2 * a) + 2 * q * a / 3), rel=2e-3)
+
+
+def test_a_plate_on_a_frame() -> None:
+    """Simply supported square plate: 0.00406235 q a⁴/D in the middle."""
+    scene = read_scene("gallery/plate-on-frame")
+    whole = prepared(scene, form="sparse")
+    x = whole.assembly.at_junction(whole.solve_K(load_case(scene, "sparse").f)).reshape(17, 17)
+    D = 70e3 * 5.0**3 / (12 * (1 - 0.3**2))
+    assert x[8, 8] == pytest.approx(0.00406235 * 2700e-9 * 9.80665 * 5.0 * 1000.0**4 / D, rel=2e-3)
+
+
+def test_no_force_beyond_what_the_scene_names() -> None:
+    scene = make_scene(make_joint(HELD, HELD | {"name": "b"}, contacts=[("a", "b")]))
+    load = load_case(scene, "sparse")
+    assert not load.f.any()
+    assert not load.g.any()

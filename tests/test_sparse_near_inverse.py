@@ -1,0 +1,86 @@
+"""Entries of K⁻¹ and Q near the diagonal, from band factors, against the dense inverse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from sparse_matrices import band_matrix, graph_matrix
+
+from problems.forms.assembly import Assembly
+from problems.forms.near_compliance import near_compliance
+from problems.forms.near_inverse import near_inverse
+from problems.forms.sparse_factor import BandFactor, lower_band
+from problems.forms.sparse_prepared import SparsePrepared
+
+SINGLE = 2e-5  # of √(Z_ii Z_jj): float32, through a few dozen blocks
+
+
+def inverse_of(K: sp.csc_array) -> tuple[np.ndarray, np.ndarray]:
+    """K⁻¹ and √diag(K⁻¹)."""
+    Z = np.linalg.inv(K.toarray())
+    return Z, np.sqrt(np.diag(Z))
+
+
+@pytest.mark.parametrize("half", [0, 1, 2, 3, 7, 15])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_inverse_near_the_diagonal(half: int, seed: int) -> None:
+    """Sizes that the half-bandwidth divides, and others; any rows; from the diagonal alone to all of K⁻¹."""
+    random = np.random.default_rng(100 * half + seed)
+    n = int(random.integers(1, 60)) if seed else 4 * (half + 1)
+    K = band_matrix(random, n, half)
+    Z, scale = inverse_of(K)
+    factor = BandFactor(lower_band(K))
+    for reach in {0, 1, half, 2 * half + 1, n - 1, n}:
+        rows = np.flatnonzero(random.random(n) < random.choice([0.3, 1.0]))
+        near = near_inverse(factor, rows, reach)
+        for start in range(len(rows)):
+            last = int(np.searchsorted(rows, rows[start] + reach, side="right"))
+            for stop in {start + 1, (start + 1 + last) // 2, last}:
+                here = rows[start:stop]
+                error = near.submatrix(start, stop) - Z[np.ix_(here, here)]
+                assert (abs(error) <= SINGLE * np.outer(scale[here], scale[here])).all()
+
+
+def test_it_is_symmetric_to_the_last_bit() -> None:
+    K = band_matrix(np.random.default_rng(5), 40, 4)
+    Z = near_inverse(BandFactor(lower_band(K)), np.arange(40), 40).submatrix(0, 40)
+    np.testing.assert_allclose(Z, Z.T, rtol=0, atol=SINGLE * abs(Z).max())
+
+
+def contacts(random: np.random.Generator, n: int, m: int) -> sp.csc_array:
+    """Each contact on one to four unknowns within twelve of each other, with coefficients of any size."""
+    A = np.zeros((n, m))
+    for j in range(m):
+        start = int(random.integers(0, n - 12))
+        where = start + random.choice(12, int(random.integers(1, 5)), replace=False)
+        A[where, j] = random.uniform(0.1, 3.0, len(where)) * random.choice([-1, 1], len(where))
+    return sp.csc_array(A)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_compliance_of_windows_of_contacts(seed: int) -> None:
+    """Several unknowns per contact, contacts on both blocks and on one, windows in any order of contacts."""
+    random = np.random.default_rng(seed)
+    n, m = 90, 30
+    blocks = (band_matrix(random, n, 5), band_matrix(random, n, int(random.integers(0, 9))))
+    parts = [contacts(random, n, m) @ sp.diags_array((random.random(m) < 0.7) * 1.0) for _ in range(2)]
+    A = sp.csc_array(sp.vstack(parts))
+    A.eliminate_zeros()
+    Q = A.T @ np.linalg.solve(sp.block_diag(blocks).toarray(), A.toarray())
+    scale = np.sqrt(np.diag(Q))
+    windows = [random.choice(m, int(random.integers(1, 8)), replace=False) for _ in range(10)]
+    prepared = SparsePrepared(Assembly(blocks, A))
+    near = near_compliance(prepared.assembly, prepared.sparse_factors, windows)  # type: ignore[arg-type]
+    for W in windows:
+        found = near.submatrix(W)
+        assert found.flags.f_contiguous
+        assert (abs(found - Q[np.ix_(W, W)]) <= 4 * SINGLE * np.outer(scale[W], scale[W])).all()
+        part = W[: len(W) // 2 + 1]
+        np.testing.assert_array_equal(near.submatrix(part), found[: len(part), : len(part)])
+
+
+def test_without_a_band_there_is_none() -> None:
+    K = graph_matrix(np.random.default_rng(3), 400)
+    prepared = SparsePrepared(Assembly((K,), sp.csc_array(sp.eye_array(400, 5))))
+    assert prepared.near_compliance([np.arange(5)]) is None

@@ -1,0 +1,179 @@
+"""`newton` on the sparse form: cold, warm, batched, by sets alone, with a band and without."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from small import make_load, make_prepared, make_strips, solve_by_nnls
+from sparse_matrices import band_matrix, graph_matrix
+from test_matrices import write_mtx
+
+from harness.measurement.solver_session import SolverSession
+from harness.verification.reference import reference, refined_active_set
+from problems.build import load_case, prepared
+from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from problems.forms.sparse_factor import BandFactor, GeneralFactor
+from problems.forms.sparse_prepared import SparsePrepared
+from problems.scene import read_scene, scene_names
+from solvers.active_set import sparse_newton
+from solvers.base import Answer
+from solvers.registry import make_solver
+
+LIMIT_MM = 1e-7 / 4
+GALLERY = [
+    name
+    for name in scene_names()
+    if name.startswith("gallery/") and (read_scene(name).expected_size or (0, 0))[1] > 0
+]
+
+
+def session_of(data: Prepared, tolerance: float = 1e-10) -> SolverSession:
+    made = SolverSession(make_solver("newton", {}), in_form(data, "sparse"), tolerance)
+    made.open(batched=True)
+    return made
+
+
+def check(answer: Answer, x: Vector, lam: Vector, limit: float = LIMIT_MM) -> None:
+    assert answer.status == "solved"
+    assert answer.x is not None
+    assert answer.lam is not None
+    np.testing.assert_allclose(answer.x, x, rtol=0, atol=limit)
+    np.testing.assert_allclose(answer.lam, lam, rtol=0, atol=1e-5 * max(1.0, abs(lam).max(initial=0.0)))
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_a_scene_of_the_gallery(name: str) -> None:
+    """Against the certified reference of the condensed matrices, whose code is another throughout."""
+    scene = read_scene(name)
+    known = reference(prepared(scene), load_case(scene))
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    answer = session_of(data).next(load, None)
+    assert answer.status == "solved"
+    assert answer.x is not None
+    assert answer.lam is not None
+    assert answer.x.shape == (data.assembly.n,)
+    assert abs(data.assembly.at_junction(answer.x) - known.x).max() <= LIMIT_MM
+    assert (answer.lam >= 0).all()
+    out_of_balance = data.assembly.multiply_K(answer.x) + data.assembly.A @ answer.lam - load.f
+    assert abs(out_of_balance).max() <= 1e-9 * data.assembly.norm_K() * abs(answer.x).max()
+    assert answer.details["closed"] == pytest.approx(known.active.sum(), abs=2)  # weakly active ones
+    assert answer.details.get("factorisations") is None  # settled by sweeps
+
+
+def cases(data: Prepared, seed: int, count: int) -> list[LoadCase]:
+    """Gaps that change little from case to case, forces that all share."""
+    random, (first, _) = np.random.default_rng(seed), make_load(seed, data)
+    return [
+        LoadCase(first.f, first.g + 0.01 * k * random.uniform(0, 1, data.assembly.m)) for k in range(count)
+    ]
+
+
+def banded(seed: int) -> Prepared:
+    """Two parts of a band each, a contact on one to two unknowns of both at every third."""
+    random, n = np.random.default_rng(seed), 90
+    blocks = tuple(band_matrix(random, n, 4) for _ in range(2))
+    normals = sp.csc_array(sp.eye_array(n) + 0.5 * sp.eye_array(n, k=1))[:, ::3]
+    return Prepared(
+        Assembly(tuple(K.toarray() for K in blocks), sp.csc_array(sp.vstack([normals, -normals])))
+    )
+
+
+SMALL = [make_prepared(1, 12), make_prepared(2, 20, 5), make_strips(150), banded(3), banded(4)]
+
+
+@pytest.mark.parametrize("dense", SMALL)
+def test_cold_warm_and_batched_are_the_answer_of_nnls(dense: Prepared) -> None:
+    session, loads = session_of(dense), cases(dense, 5, 6)
+    expected = [solve_by_nnls(dense, load) for load in loads]
+    assert 0 < (expected[0][1] > 0).sum() < dense.assembly.m
+    for k, (load, known) in enumerate(zip(loads, expected, strict=True)):
+        check(session.next(load, session.nearest(load) if k else None), *known)
+    assert session.batch is not None
+    for answers in (session.solve_batch(loads), session.solve_batch(loads[::-1])[::-1]):
+        for answer, known in zip(answers, expected, strict=True):
+            check(answer, *known)
+
+
+def test_a_warm_start_saves_sweeps() -> None:
+    dense = make_strips(150)
+    first, second = cases(dense, 8, 2)
+    cold = session_of(dense).next(second, None)
+    session = session_of(dense)
+    session.next(first, None)
+    warm = session.next(second, session.nearest(second))
+    check(warm, *solve_by_nnls(dense, second))
+    assert warm.iterations is not None
+    assert cold.iterations is not None
+    assert 1 <= warm.iterations < cold.iterations
+
+
+@pytest.mark.parametrize("forced", ["one sweep", "no band"])
+@pytest.mark.parametrize("dense", SMALL)
+def test_what_sweeps_do_not_settle_is_settled_by_sets(
+    dense: Prepared, forced: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if forced == "one sweep":
+        monkeypatch.setattr(sparse_newton, "MAX_SWEEPS", 1)
+    else:
+        monkeypatch.setattr(SparsePrepared, "near_compliance", lambda *_: None)
+    by_sets = 0
+    for load in cases(dense, 6, 3):
+        session = session_of(dense)
+        assert (session.batch is None) == (forced == "no band")
+        answers = [session.next(load, None), session.next(load, session.nearest(load))]
+        answers += session.solve_batch([load, load]) if session.batch else []
+        for answer in answers:
+            check(answer, *solve_by_nnls(dense, load))
+            by_sets += "factorisations" in answer.details
+    assert by_sets
+
+
+@pytest.mark.parametrize("name", ["gallery/heavy-sheet-on-tool", "gallery/sheet-over-former"])
+def test_sets_alone_solve_a_scene(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SparsePrepared, "near_compliance", lambda *_: None)
+    scene = read_scene(name)
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    answer = session_of(data).next(load, None)
+    known = refined_active_set(data, load)
+    assert answer.status == "solved"
+    assert answer.x is not None
+    assert answer.details["factorisations"] >= 1
+    assert abs(data.assembly.at_junction(answer.x - known.x)).max() <= LIMIT_MM
+
+
+@pytest.mark.parametrize("with_nodes", [False, True])
+@pytest.mark.parametrize("kind", [BandFactor, GeneralFactor])
+def test_a_users_own_sparse_matrices(kind: type, with_nodes: bool, tmp_path: Path) -> None:
+    """K in Matrix Market files, a contact on any unknowns; no grid, in one case no band."""
+    random, n, m = np.random.default_rng(7), 350, 40
+    K = graph_matrix(random, n) if kind is GeneralFactor else band_matrix(random, n, 3)
+    unit = sp.eye_array(n, format="csc")
+    ends = random.permutation(n)
+    A = sp.csc_array(unit[:, ends[:m]] - unit[:, ends[m : 2 * m]])
+    f, g = random.normal(0, 1, n), random.uniform(-0.1, 0.3, m)
+    if with_nodes:
+        path = tmp_path / "own.npz"
+        np.savez(path, K=K.toarray(), A=A.toarray(), f=f, g=g, nodes=random.uniform(0, 100, (n, 2)))
+    else:
+        path = write_mtx(tmp_path, K=K, A=A, f=f, g=g)
+    scene = read_scene(str(path))
+    data = prepared(scene, form="sparse")
+    assert isinstance(data, SparsePrepared)
+    load = load_case(scene, "sparse")
+    dense = Prepared(Assembly((K.toarray(order="F"),), A))
+    x, lam = solve_by_nnls(dense, load)
+    assert 0 < (lam > 0).sum() < m
+    session = session_of(data)
+    check(session.next(load, None), x, lam)
+    assert {type(factor) for factor in data.sparse_factors} == {kind}
+    found = refined_active_set(data, load)
+    assert abs(found.x - x).max() <= found.bound_mm + 1e-11
+    assert found.bound_mm <= 1e-12
+    again = replace(load, g=load.g + 0.01)
+    check(session.next(again, session.nearest(again)), *solve_by_nnls(dense, again))

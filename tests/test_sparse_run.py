@@ -1,0 +1,152 @@
+"""A run of both roads on one scene: measured, judged, recorded beside each other, and gated."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+from strip import write_strip
+
+from harness.measurement.run import run
+from harness.planning.suite import read_suite
+from harness.results import records
+from harness.verification.gate import gate
+from harness.verification.reference_problem import record, reference_problem
+from problems.forms.names import Form
+
+pytestmark = pytest.mark.slow
+
+SUITE = """
+scenes = ["strip.toml"]
+threads = [1]
+time_limit_s = 60
+tolerances = [1e-10]
+[[solver]]
+name = "newton"
+forms = ["dual", "sparse"]
+"""
+
+
+def quiet() -> Console:
+    return Console(file=StringIO(), width=200)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of a run; tests that change it take a copy."""
+    folder = tmp_path_factory.mktemp("both")
+    write_strip(folder)
+    (folder / "both.toml").write_text(SUITE)
+    assert run(read_suite(str(folder / "both.toml")), folder / "run", quiet()) == 0
+    return folder / "run"
+
+
+@pytest.fixture
+def copy(finished: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(finished, tmp_path / "copy"))
+
+
+def rows_of(directory: Path) -> dict[str, Any]:
+    return {row["form"]: row for row in records.read(directory / records.MEASUREMENTS)}
+
+
+def test_both_forms_are_within_and_say_so_in_the_same_terms(finished: Path) -> None:
+    rows = rows_of(finished)
+    assert set(rows) == {"dual", "sparse"}
+    for row in rows.values():
+        assert (row["status"], row["verdict"], row["n"], row["m"]) == ("solved", "within", 45, 45)
+        assert row["displacement_error_mm"] < 1e-9
+        assert row["reference_bound_mm"] < 1e-9
+        assert row["contact_mismatch"] == 0
+    assert rows["dual"]["active"] == rows["sparse"]["active"] > 0
+    assert rows["dual"]["scene_key"] == rows["sparse"]["scene_key"]
+    with (
+        np.load(finished / rows["sparse"]["answer"]) as sparse,
+        np.load(finished / rows["dual"]["answer"]) as dual,
+    ):
+        assert len(sparse["x"]) > len(dual["x"]) == 45
+        np.testing.assert_allclose(sparse["lam"], dual["lam"], atol=1e-6)
+
+
+def test_a_scene_has_one_row_with_the_facts_of_both_roads(finished: Path) -> None:
+    (problem,) = records.read(finished / "problems.jsonl")
+    assert (problem["n"], problem["m"]) == (45, 45)
+    assert problem["cond_K"] > 1
+    assert problem["reference_bound_mm"] < 1e-9
+    sparse = problem["sparse"]
+    assert sparse["unknowns"] == 4 * 9 * (5 + 2 - 1)
+    assert 0 <= sparse["from_condensed_mm"] <= 1e-9
+    assert sparse["reference_bound_mm"] < 1e-9
+    assert sparse["reference_route"].startswith("proven")
+    with np.load(finished / "scenes" / "strip.npz") as arrays:
+        assert arrays["x"].shape == arrays["lam"].shape == (45,)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        ("dual", "sparse"),
+        ("sparse", "dual"),
+        ("sparse", "sparse"),
+        ("dual", "sparse", "sparse"),
+        ("dual", "sparse", "dual", "dual"),
+    ],
+)
+def test_the_difference_of_the_roads_is_recorded_in_either_order(
+    order: tuple[Form, ...], tmp_path: Path
+) -> None:
+    path = str(write_strip(tmp_path))
+    (tmp_path / "scenes").mkdir()
+    for form in order:
+        record(reference_problem(path, form=form), tmp_path)
+    (problem,) = records.read(tmp_path / "problems.jsonl")
+    assert problem["sparse"]["unknowns"] == 216
+    assert ("from_condensed_mm" in problem["sparse"]) == ("dual" in order)
+    assert (problem["cond_K"] is not None) == ("dual" in order)
+    assert 0.0 < problem["sparse"].get("from_condensed_mm", 1e-12) <= 1e-9
+
+
+def test_the_gate_judges_both_again(finished: Path) -> None:
+    console = quiet()
+    assert gate(finished, console) == 0
+    said = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "all 2 gated rows" in said
+    assert said.count("within") >= 2
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+@pytest.mark.parametrize(("moved", "code"), [(0.0, 0), (5e-8, 0), (2e-7, 1), (np.nan, 1)])
+def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, moved: float, code: int) -> None:
+    """Moved at the last displacement of the junction; an inner unknown is not judged."""
+    path = copy / rows_of(copy)[form]["answer"]
+    problem = reference_problem(rows_of(copy)[form]["source"], form="sparse" if form == "sparse" else "dual")
+    junction = problem.prepared.assembly.junction
+    with np.load(path) as saved:
+        arrays = {name: saved[name] for name in saved.files}
+    arrays["x"][-1 if junction is None else junction[-1]] += moved
+    if junction is not None and np.isfinite(moved):
+        arrays["x"][np.setdiff1d(np.arange(len(arrays["x"])), junction)[0]] += 1e-3
+    np.savez(path, **arrays)
+    assert gate(copy, quiet()) == code
+
+
+def test_an_answer_of_the_other_form_is_none(copy: Path) -> None:
+    """x of the junction alone in the row of the sparse form."""
+    rows = rows_of(copy)
+    shutil.copy(copy / rows["dual"]["answer"], copy / rows["sparse"]["answer"])
+    assert gate(copy, quiet()) == 1
+
+
+def test_a_row_without_its_answer_fails_the_gate(copy: Path) -> None:
+    lines = (copy / records.MEASUREMENTS).read_text().splitlines()
+    kept = [line for line in lines if json.loads(line)["form"] == "dual"]
+    (copy / records.MEASUREMENTS).write_text("\n".join(kept) + "\n")
+    console = quiet()
+    assert gate(copy, console) == 1
+    assert "never measured" in console.file.getvalue()  # type: ignore[attr-defined]
