@@ -19,5 +19,9 @@ class Sparse(Primal):
     prepared: SparsePrepared
 
     @property
+    def model_s(self) -> float | None:
+        return self.prepared.seconds.get("model")
+
+    @property
     def yardstick(self) -> None:
         return None

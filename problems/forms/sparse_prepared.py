@@ -14,7 +14,7 @@ from .balance import balanced_units, least_eigenvalue
 from .compliance import Compliance
 from .near_compliance import NearCompliance, near_compliance
 from .near_inverse import Rows
-from .prepared import Prepared
+from .prepared import MIB, Prepared
 from .sparse_factor import BandFactor, Factor, NotPositiveDefinite, factored
 
 
@@ -44,6 +44,15 @@ class SparsePrepared(Prepared):
         assembly = self.assembly
         size = {"n": assembly.asked, "m": assembly.m, "parts": assembly.parts, "unknowns": assembly.n}
         return size | {"seconds": self.seconds}
+
+    @property
+    def stored_mib(self) -> dict[str, float]:
+        """MiB of K as a sparse matrix, and of its factors if they were made."""
+        arrays = [array for K in self.assembly.blocks for array in (K.data, K.indices, K.indptr)]
+        sizes = {"K": sum(array.nbytes for array in arrays) / MIB}
+        if "sparse_factors" in vars(self):
+            sizes["factors"] = 8 * sum(factor.numbers for factor in self.sparse_factors) / MIB
+        return sizes
 
     @cached_property
     def condition(self) -> float:

@@ -39,10 +39,11 @@ def prepared(scene: Scene) -> SparsePrepared:
             assembly = _sparse(scene.made.assembly, scene)
         case _:
             raise TypeError(type(scene).__name__)
+    seconds = {"model": time.perf_counter() - start}
     folders = ("problems/fem", "problems/model", "problems/effects", "problems/uncondensed")
     code = fingerprint([Path(__file__)], within=folders)
     key = digest("uncondensed", scene.assembly_key, code)
-    return SparsePrepared(assembly, key, {"model": time.perf_counter() - start}, coarser)
+    return SparsePrepared(assembly, key, seconds, coarser)
 
 
 def _graded(model: WholeModel) -> Callable[[], Assembly]:
