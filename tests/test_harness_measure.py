@@ -93,10 +93,10 @@ def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("solver", "form", "stages"),
     [
-        ("newton", "sparse", ""),
-        ("piqp", "primal", ""),
-        ("piqp", "dual", "factors Q"),
-        ("gi", "primal", "factors Q"),
+        ("newton", "sparse", "K"),
+        ("piqp", "primal", "K"),
+        ("piqp", "dual", "K factors Q"),
+        ("gi", "primal", "K factors Q"),
     ],
 )
 def test_what_an_answer_needed_from_the_scene_on(folder: Path, solver: str, form: str, stages: str) -> None:

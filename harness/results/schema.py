@@ -32,6 +32,8 @@ ANSWERED = VERDICTS[:-1]
 
 #: The forms of the quadratic program, in the order of every table.
 FORMS = ("sparse", "dual", "primal")
+#: Those of the matrices condensed onto the junction.
+DENSE_FORMS = ("dual", "primal")
 
 #: The scenes that are rungs of ladders: hard/<ladder>/<rung>.
 LADDERS = "hard/"
@@ -55,8 +57,8 @@ ASKED: dict[str, Kind] = {
 #: The problem.
 PROBLEM: dict[str, Kind] = {**_fields("number", "n m active"), **_fields("text", "scene_key")}
 #: What the measuring process reports. load_s: to open or make the matrices and loads, imports included;
-#: model_s: of that, to make them, null where they come from the cache. stages: which of `factors` and `Q` of
-#: the dense forms were opened, beside K.
+#: model_s: of that, to make them, null where they come from the cache. stages: K, and which of
+#: `factors` and `Q` of the dense forms were opened.
 MEASURED: dict[str, Kind] = {
     **_fields("text", "status message kernels stderr answer stages"),
     **_fields("number", "iterations inner_iterations"),

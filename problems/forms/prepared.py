@@ -51,8 +51,8 @@ class Prepared:
 
     @property
     def opened(self) -> tuple[str, ...]:
-        """The stages that were asked for: `factors`, `Q`."""
-        return tuple(stage for stage in ("factors", "Q") if stage in vars(self))
+        """K, and of the dense `factors` and `Q` those that were asked for."""
+        return ("K", *(stage for stage in ("factors", "Q") if stage in vars(self)))
 
     @cached_property
     def factors(self) -> tuple[Matrix, ...]:
