@@ -185,6 +185,20 @@ def test_what_cannot_fit_is_refused(tmp_path: Path) -> None:
     refuse_limits_too_low(expand(overridden(suite, Overrides(memory_limit_mib=400))))
 
 
+def test_a_memory_limit_holds_for_the_form_that_is_run(tmp_path: Path) -> None:
+    def plan(form: str) -> list[Measurement]:
+        entry = f'[[solver]]\nname = "newton"\nforms = ["{form}"]\n'
+        return expand(
+            read_suite(
+                str(tiny.write_suite(tmp_path, entry, scenes=["scaling/100352"], memory_limit_mib=2000))
+            )
+        )
+
+    refuse_limits_too_low(plan("sparse"))
+    with pytest.raises(InputError, match=r"take \d+ MiB in the dense forms, 16\d\d MiB in the sparse form"):
+        refuse_limits_too_low(plan("dual"))
+
+
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     tiny.write_problem(tmp_path / "other" / "tiny.npz")

@@ -95,9 +95,9 @@ def _fastest(best: pd.DataFrame) -> Table:
         word("fastest", "method"),
         number("total, s", "seconds"),
         word("next", "next"),
-        number("its time / the fastest's", "to_next"),
+        number("next / fastest", "to_next"),
         word("fastest library", "library"),
-        number("the library's time / the fastest's", "to_library"),
+        number("library / fastest", "to_library"),
     ]
     caption = "*The fastest from scene to answer*, in any form, of the answers within the limit."
     return Table("roads-fastest", caption, best, columns)
@@ -139,10 +139,10 @@ def _table(lines: pd.DataFrame) -> Table:
         number("peak, MiB", "peak_rss_mib", whole),
     ]
     caption = (
-        "*From scene to answer*, in seconds, medians of the repeats. An answer outside the limit has no "
-        "total. Dense matrices: K, and the factors and Q if used, which the process maps from the cache. "
-        "Peak: of the measuring process, which in the sparse form makes the model, and in the dense "
-        "forms condenses nothing."
+        "*From scene to answer*, in seconds, medians of the repeats. The totals of several load cases "
+        "are extrapolated from the one measured. An answer outside the limit has none. Dense matrices: K, "
+        "and the factors and Q if used, which the process maps from the cache. Peak: of the measuring "
+        "process, which in the sparse form makes the model, and in the dense forms condenses nothing."
     )
     return Table("roads", caption, table[kept], columns)
 
