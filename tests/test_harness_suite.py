@@ -116,7 +116,7 @@ def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
     assert "did you mean forms?" in faults["solver.0.form"].allowed
     assert "did you mean tolerances?" in faults["tolerence"].allowed
     assert "4386/" in faults["scenes"].allowed
-    assert "'primal' or 'dual'" in faults["solver.1.forms.0"].allowed
+    assert "'primal', 'dual' or 'sparse'" in faults["solver.1.forms.0"].allowed
 
 
 def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> None:

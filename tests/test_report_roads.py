@@ -12,6 +12,7 @@ from synthetic_results import no_answer, row, write_rows
 
 from report.analysis.roads import fastest, roads
 from report.results.reader import Results, read
+from report.sections import problems
 from report.sections import roads as section_of
 from report.writers.markdown import write
 
@@ -158,3 +159,23 @@ def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path:
     text, table = section.blocks
     assert text.markdown.startswith("No answer is within the limit.")
     assert "(outside)" in table.markdown
+
+
+def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
+    own = {
+        "unknowns": 46956,
+        "reference_bound_mm": 1.6e-11,
+        "from_condensed_mm": 3e-12,
+        "build_s": {"model": 1},
+    }
+    facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
+    section = problems.section(results(tmp_path, [sparse(), dense()], **facts, sparse=own))
+    assert section is not None
+    scenes = section.blocks[1]
+    assert scenes.data["sparse_unknowns"].tolist() == [46956]
+    assert "difference of the two references, mm" in scenes.markdown
+    assert all(text in scenes.markdown for text in ("46956", "1.60e-11", "3.00e-12", "2.00e-12"))
+    assert "The sparse form" in scenes.caption
+    without = problems.section(results(tmp_path / "dense", [dense()], **facts))
+    assert without is not None
+    assert "sparse" not in without.blocks[1].markdown + without.blocks[1].caption
