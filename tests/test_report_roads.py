@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 from synthetic_results import no_answer, row, write_rows
 
+from harness.results import schema
+from problems.forms import names
 from report.analysis.roads import fastest, roads
 from report.results.reader import Results, read
 from report.sections import problems
@@ -48,6 +50,11 @@ def line_of(lines: pd.DataFrame, method: str) -> pd.Series[Any]:
 
 def totals(line: pd.Series[Any]) -> list[float]:
     return [line[f"total_{k}_s"] for k in (1, 10, 1000)]
+
+
+def test_the_reports_forms_are_those_of_the_problems() -> None:
+    assert set(schema.FORMS) == set(names.FORMS)
+    assert set(schema.DENSE_FORMS) == set(names.DENSE_FORMS)
 
 
 def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
@@ -162,12 +169,7 @@ def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path:
 
 
 def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
-    own = {
-        "unknowns": 46956,
-        "reference_bound_mm": 1.6e-11,
-        "from_condensed_mm": 3e-12,
-        "build_s": {"model": 1},
-    }
+    own = {"unknowns": 46956, "reference_bound_mm": 1.6e-11, "from_condensed_mm": 3e-12}
     facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
     section = problems.section(results(tmp_path, [sparse(), dense()], **facts, sparse=own))
     assert section is not None

@@ -17,9 +17,9 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
 
     The scene of m itself, if the solver exceeded at least the same limit there at this tolerance or a looser
     one. Else all scenes of the next smaller size n' on which the same solver, form and settings were
-    measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T', in the sparse form
-    (n/n') T': on dense matrices the time of any solver grows at least like n², on sparse ones like n. (Not on rungs of ladders, where size is not
-    what makes them hard.)
+    measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T', or (n/n') T' in
+    the sparse form: with dense matrices, time grows at least like n², with sparse ones like n. (Not on rungs
+    of ladders, where size is not what makes them hard.)
     """
     same = ("solver", "form", "variant", "options", "threads_asked")
     mine = (m.solver, m.form, m.variant, m.options, m.threads)
