@@ -140,6 +140,12 @@ def test_the_section_names_the_winner_and_its_factors(tmp_path: Path) -> None:
     assert saved["total_1_s"].min() == pytest.approx(0.9)
 
 
+def test_a_tie_is_said_to_be_one(tmp_path: Path) -> None:
+    section = section_of.section(results(tmp_path, [sparse(), sparse(solver="other", solve_s=0.3), dense()]))
+    assert section is not None
+    assert "on 1 of 1 scene, about as fast as the next" in section.blocks[0].markdown
+
+
 def test_a_library_that_wins_is_not_compared_with_itself(tmp_path: Path) -> None:
     section = section_of.section(results(tmp_path, [sparse(solver="clarabel"), dense()]))
     assert section is not None

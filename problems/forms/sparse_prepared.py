@@ -48,8 +48,8 @@ class SparsePrepared(Prepared):
     @property
     def stored_mib(self) -> dict[str, float]:
         """MiB of K as a sparse matrix, and of its factors if they were made."""
-        arrays = [array for K in self.assembly.blocks for array in (K.data, K.indices, K.indptr)]
-        sizes = {"K": sum(array.nbytes for array in arrays) / MIB}
+        blocks = map(sp.csc_array, self.assembly.blocks)
+        sizes = {"K": sum(K.data.nbytes + K.indices.nbytes + K.indptr.nbytes for K in blocks) / MIB}
         if "sparse_factors" in vars(self):
             sizes["factors"] = 8 * sum(factor.numbers for factor in self.sparse_factors) / MIB
         return sizes

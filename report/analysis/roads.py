@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import BUILDING, DENSE_FORMS, MODEL
+from report.document.blocks import records
 from report.document.numbers import as_number
 from report.results.cells import cells_of
 from report.results.reader import Results
@@ -37,8 +38,8 @@ def roads(results: Results) -> pd.DataFrame:
     if dense.all() or not dense.any():
         return results.cells.iloc[:0]
     cells = cells_of(rows.reset_index(drop=True))
-    facts = {problem.get("scene"): problem for problem in results.problems.to_dict("records")}
-    built = [_built(cell, facts.get(cell["scene"], {})) for cell in cells.to_dict("records")]
+    facts = {problem.get("scene"): problem for problem in records(results.problems)}
+    built = [_built(cell, facts.get(cell["scene"], {})) for cell in records(cells)]
     lines = cells.assign(**{name: [stages[name] for stages in built] for name in built[0]})
     lines["solving_s"] = lines[["setup_s", "solve_s"]].sum(axis=1)
     lines["recovery_s"] = lines["form_s"].fillna(0.0)

@@ -80,7 +80,7 @@ def _scenes(table: pd.DataFrame) -> Table:
         caption += (
             " The sparse form, with the finite-element model's own unknowns, has a reference of its own; the "
             "difference is the largest between its displacements of the junction and those of the condensed "
-            "matrices."
+            "matrices. It includes the rounding errors of condensation, which neither bound covers."
         )
     return Table("scenes", caption, table[names], columns)
 

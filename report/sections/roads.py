@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 
 from report.analysis.roads import LOAD_CASES, STAGES, fastest, roads
 from report.analysis.seconds import seconds_text
+from report.analysis.standings import TIE
 from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, records, word
 from report.document.numbers import counted, listed, significant, span, whole
 from report.figures import style
@@ -84,6 +85,8 @@ def _winner(method: str, won: pd.DataFrame, scenes: int) -> str:
 def _times(ratios: pd.Series[float], what: str) -> str:
     if ratios.isna().any():
         return ""
+    if ratios.max() <= TIE:
+        return f"about as fast as {what}"
     return f"{span(significant(ratios.min(), 2), significant(ratios.max(), 2))} times as fast as {what}"
 
 
