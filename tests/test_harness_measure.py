@@ -91,6 +91,27 @@ def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("solver", "form", "stages"),
+    [
+        ("newton", "sparse", "K"),
+        ("piqp", "primal", "K"),
+        ("piqp", "dual", "K factors Q"),
+        ("gi", "primal", "K factors Q"),
+    ],
+)
+def test_what_an_answer_needed_from_the_scene_on(folder: Path, solver: str, form: str, stages: str) -> None:
+    """In the sparse form the process makes the model; in a dense one it opens the stages it needs."""
+    scene = {"scene": "gallery/three-part-stack", "source": "gallery/three-part-stack"}
+    row = outcome(folder, None, **scene, solver=solver, form=form, plugin=None)
+    assert row["status"] == "solved"
+    assert row["stages"] == stages
+    if form == "sparse":
+        assert 0 < row["model_s"] < row["load_s"]
+    else:
+        assert "model_s" not in row
+
+
+@pytest.mark.parametrize(
     ("fault", "status", "message"),
     [
         ("signal", "crashed", "killed by SIGSEGV"),

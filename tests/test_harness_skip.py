@@ -46,6 +46,14 @@ def test_too_slow_on_every_smaller_scene_is_not_run(large):
     assert predicted_timeout(large, 6112, rows) == "4386/0107, 4386/1471"
 
 
+@pytest.mark.parametrize(
+    ("form", "limit", "late"), [("primal", 28.0, True), ("sparse", 28.0, False), ("sparse", 29.0, True)]
+)
+def test_the_sparse_forms_time_may_grow_no_faster_than_the_size(form, limit, late):
+    m = next(m for m in plan() if m.scene == "6112/0600" and m.form == form)
+    assert bool(predicted_timeout(m, 6112, [row("4386/0107", 4386, limit=limit, form=form)])) == late
+
+
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
     (told,) = run_task(Task([large], Description(["primal"], "1.0", ""), "4386/0107"), tmp_path).reports
     assert told == {"status": "not_run", "message": "too slow already on 4386/0107"}

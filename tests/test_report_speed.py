@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from synthetic_results import no_answer, row, write_rows
 
+from report.figures import style
 from report.results.reader import read
 from report.sections import ingredients, same_method, scaling, speed
 
@@ -141,3 +142,24 @@ def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: P
     assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)
     assert data.loc["one product Qv", "load_case_s"] == pytest.approx(2.0)
     assert scaling.section(results(tmp_path / "few", rows[:2])) is None
+
+
+def test_a_size_of_the_sparse_form_alone_leaves_the_benchmarks_of_q_as_they_are(tmp_path: Path) -> None:
+    """Nothing of order m × m is timed in the sparse form."""
+    rows = []
+    for n in (1000, 2000, 4000, 100_000):
+        grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
+        known = {"data_mib": 100.0, "peak_rss_mib": 100.0 + 1e-2 * n}
+        rows.append(timed(LOW, "newton", 1e-4 * n, "sparse", cholesky_s=None, product_s=None, **known) | grid)
+        if n < 100_000:
+            figures = {"cholesky_s": 1e-10 * n**3, "product_s": 1e-9 * n**2}
+            rows.append(timed(LOW, "newton", 1e-6 * n**2, **figures, **known) | grid)
+    section = scaling.section(results(tmp_path, rows))
+    assert section is not None
+    data = section.blocks[0].data.set_index("method")
+    assert data.loc["newton (sparse)", "load_case_s"] == pytest.approx(1.0)
+    assert data.loc["newton (sparse)", "largest"] == 100_000
+    assert data.loc["one Cholesky of Q", ["sizes", "largest"]].tolist() == [3, 4000]
+    assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)
+    with style.applied():
+        section.blocks[2].drawing.savefig(tmp_path / "scaling.png")

@@ -15,7 +15,7 @@ SAVE_S = 60.0  # for saving the answer
 
 JOB = ("source", "solver", "options", "plugin", "form", "tolerance", "yardstick", "batched")
 #: What a worker reports once for all the load cases of a series.
-SHARED = ("load_s", "convert_s", "prepare_s", "data_mib")
+SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib")
 
 
 def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Row]:

@@ -79,7 +79,10 @@ class Run:
         with self.lap("load_s"):
             scene = read_scene(job["source"])
             problem = in_form(prepared(scene, form=job["form"]), job["form"])
+            start = time.perf_counter()
             cases = list(load_cases(scene, job))
+            if problem.model_s is not None:
+                self.report(model_s=problem.model_s + time.perf_counter() - start)
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
         session = SolverSession(solver, problem, job["tolerance"], self.lap)
@@ -146,7 +149,9 @@ class Run:
 
     def saved(self, answer: Answer, x: Vector | None, file: Path, problem: Problem, solved: Row) -> Row:
         """Report what the solver returned, and save its answer: the last event."""
-        self.report(phase="save", **solved, **threads_in_effect(), peak_rss_mib=resident_mib("VmHWM"))
+        stages = " ".join(problem.prepared.opened)
+        peak = resident_mib("VmHWM")
+        self.report(phase="save", **solved, **threads_in_effect(), peak_rss_mib=peak, stages=stages)
         if self.job["yardstick"] and problem.yardstick is not None:
             self.report(**yardstick(problem.yardstick))
         if x is None:

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import log2
 from typing import TYPE_CHECKING
 
 from harness.results.machine import physical_memory_mib
 from problems.errors import Fault, InputError
+from problems.forms.names import Form, road_of
 from problems.model.effect import TieEffect
 from problems.model.joint import Joint, Part
 from problems.model.scene import JointScene, MadeScene, Scene
@@ -27,7 +29,10 @@ MIB = 2**20
 MODEL_S = 1e-5  # to assemble K̂, per unknown: not arithmetic, but memory and Python
 MODEL_BYTES = 1500  # while it is assembled, per unknown
 BAND_SLOWER = 2.5  # a band Cholesky factorisation than a dense one, per operation
-PROOF_COPIES = 4  # of the factors, in the proof of λmin
+# Where the band is wide, a fill-reducing order: 31/4 n² log₂ n entries on an n × n grid (George 1973), with 4
+# unknowns per node, L and U, and their indices. Per unknown and log₂ of the nodes:
+GENERAL = 31 / 4 / 2 * 4 * 2 * 1.5
+FACTORS = 2  # at a time: to solve with, and to prove λmin
 PROOFS = 3  # factorisations in that proof, and of the coarser model
 SOLUTIONS = 400  # K̂⁻¹v, of an answer with its bound
 
@@ -52,9 +57,13 @@ class SparseEstimate(Estimate):
     half_bandwidth: int
 
 
-def stored_mib(scene: Scene) -> float:
-    """MiB of K, its factors and Q; 0 if that takes reading the matrices."""
+def stored_mib(scene: Scene, form: Form = "dual") -> float:
+    """MiB of K, its factors and Q, or of the factors of K̂; 0 if that takes reading the matrices."""
     match scene:
+        case JointScene() if form == "sparse":
+            return estimated_sparse(scene, 1.0).stored_mib
+        case _ if form == "sparse":
+            return 0.0
         case JointScene():
             return 8 * _entries(_blocks(scene), scene.joint.size[1]) / MIB
         case MadeScene():
@@ -65,25 +74,39 @@ def stored_mib(scene: Scene) -> float:
 def refuse_limits_too_low(plan: Iterable[Measurement]) -> None:
     """Raise InputError where a memory limit is above what this machine has, or below the matrices alone."""
     faults, physical = [], physical_memory_mib()
-    limits = {(m.source, m.memory_limit_mib) for m in plan}
-    for limit in sorted({limit for _, limit in limits if limit > physical}):
+    limits = {(m.source, road_of(m.form), m.memory_limit_mib) for m in plan}
+    for limit in sorted({limit for *_, limit in limits if limit > physical}):
         faults.append(Fault("--memory-limit", "memory_limit_mib", limit, f"this machine has {physical} MiB"))
-    for source, limit in sorted(limits):
-        if (need := stored_mib(read_scene(source))) > limit:
+    for source, road, limit in sorted(limits):
+        scene = read_scene(source)
+        need = stored_mib(scene, "sparse" if road == "sparse" else "dual")
+        if need > limit:
             allowed = f"the matrices of scene {source} alone take {need:.0f} MiB"
+            if road != "sparse" and (sparse := stored_mib(scene, "sparse")) and sparse <= limit:
+                allowed += f" in the dense forms, {sparse:.0f} MiB in the sparse form (--form sparse)"
             faults.append(Fault("--memory-limit", "memory_limit_mib", limit, allowed))
     if faults:
         raise InputError(faults)
 
 
-def refuse_what_cannot_fit(scene: Scene, source: str) -> None:
-    """Raise InputError where a scene's matrices need more memory than this machine has."""
+def refuse_what_cannot_fit(scene: Scene, source: str, form: Form = "dual") -> None:
+    """Raise InputError where a form's matrices of a scene need more memory than this machine has.
+
+    The message offers the sparse form where no dense one fits and that does.
+    """
     if not isinstance(scene, JointScene):
         return
-    need, physical = estimated(scene, 1.0).peak_mib, physical_memory_mib()
-    if need > physical:
+    need, sparse = estimated(scene, 1.0).peak_mib, estimated_sparse(scene, 1.0).peak_mib
+    physical = physical_memory_mib()
+    if (sparse if form == "sparse" else need) > physical:
         nodes = list(scene.joint.junction.nodes)
-        allowed = f"fewer nodes: {need:.0f} MiB are needed, this machine has {physical}"
+        if sparse > physical:
+            allowed = f"fewer nodes: {min(need, sparse):.0f} MiB are needed, this machine has {physical}"
+        else:
+            allowed = (
+                f"fewer nodes, or the sparse form (--form sparse), which takes about {sparse:.0f} MiB: "
+                f"a dense form needs {need:.0f}, this machine has {physical}"
+            )
         raise InputError.one(source, "junction.nodes", nodes, allowed)
 
 
@@ -106,11 +129,12 @@ def estimated(scene: JointScene, flops_per_s: float) -> Estimate:
 def estimated_sparse(scene: JointScene, flops_per_s: float) -> SparseEstimate:
     """From the numbering of the uncondensed model and counts of operations; good to a factor of three."""
     n, m = scene.joint.size
-    bands = _bands(scene)
+    widths = _bands(scene)
+    bands = [(size, min(width, GENERAL * log2(size / 4))) for size, width in widths]
     unknowns = sum(size for size, _ in bands)
     entries = sum(size * (width + 1) for size, width in bands)
-    factoring = BAND_SLOWER * sum(size * width**2 for size, width in bands) / flops_per_s
-    peak = 150 + (MODEL_BYTES * unknowns + 8 * PROOF_COPIES * entries) / MIB
+    factoring = BAND_SLOWER * sum(size * (width + 1) ** 2 for size, width in bands) / flops_per_s
+    peak = 150 + (MODEL_BYTES * unknowns + 8 * FACTORS * entries) / MIB
     return SparseEstimate(
         n,
         m,
@@ -119,7 +143,7 @@ def estimated_sparse(scene: JointScene, flops_per_s: float) -> SparseEstimate:
         MODEL_S * unknowns + factoring,
         SOLUTIONS * BAND_SLOWER * 4 * entries / flops_per_s + PROOFS * factoring,
         unknowns,
-        max(width for _, width in bands),
+        max(width for _, width in widths),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from harness.results.records import Row
+from problems.forms.names import DENSE_FORMS
 from problems.scene import read_scene
 
 from .plan import Measurement
@@ -16,9 +17,9 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
 
     The scene of m itself, if the solver exceeded at least the same limit there at this tolerance or a looser
     one. Else all scenes of the next smaller size n' on which the same solver, form and settings were
-    measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T': every solver here
-    works with dense matrices, so its time grows at least like n². (Not on rungs of ladders, where size is not
-    what makes them hard.)
+    measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T', or (n/n') T' in
+    the sparse form: with dense matrices, time grows at least like n², with sparse ones like n. (Not on rungs
+    of ladders, where size is not what makes them hard.)
     """
     same = ("solver", "form", "variant", "options", "threads_asked")
     mine = (m.solver, m.form, m.variant, m.options, m.threads)
@@ -32,7 +33,7 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
     largest = max((row["n"] for row in smaller), default=0)
     comparable = [row for row in smaller if row["n"] == largest]
-    growth = (n / largest) ** 2 if largest else 0.0
+    growth = (n / largest) ** (2 if m.form in DENSE_FORMS else 1) if largest else 0.0
     timed_out = [
         row
         for row in comparable

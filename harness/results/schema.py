@@ -32,6 +32,8 @@ ANSWERED = VERDICTS[:-1]
 
 #: The forms of the quadratic program, in the order of every table.
 FORMS = ("sparse", "dual", "primal")
+#: Those of the matrices condensed onto the junction.
+DENSE_FORMS = ("dual", "primal")
 
 #: The scenes that are rungs of ladders: hard/<ladder>/<rung> and hard-full/<ladder>/<rung>.
 LADDERS = ("hard/", "hard-full/")
@@ -54,12 +56,16 @@ ASKED: dict[str, Kind] = {
 }
 #: The problem.
 PROBLEM: dict[str, Kind] = {**_fields("number", "n m active"), **_fields("text", "scene_key")}
-#: What the measuring process reports.
+#: What the measuring process reports. load_s: to open or make the matrices and loads, imports included;
+#: model_s: of that, to make them, null where they come from the cache. stages: K, and which of
+#: `factors` and `Q` of the dense forms were opened.
 MEASURED: dict[str, Kind] = {
-    **_fields("text", "status message kernels stderr answer"),
+    **_fields("text", "status message kernels stderr answer stages"),
     **_fields("number", "iterations inner_iterations"),
     **_fields("number", " ".join(STEPS)),
-    **_fields("number", "load_s solver_reported_s data_mib peak_rss_mib threads cholesky_s product_s"),
+    **_fields(
+        "number", "load_s model_s solver_reported_s data_mib peak_rss_mib threads cholesky_s product_s"
+    ),
     **_fields("object", "details"),
 }
 #: The same for a case of a series: how many were solved at once, and whether others were solved before.
@@ -87,8 +93,13 @@ FIELDS: dict[str, Kind] = {**ASKED, **PROBLEM, **MEASURED, **MEASURED_OF_CASES, 
 PROBLEM_FIELDS: dict[str, Kind] = {
     **_fields("text", "scene title scene_key reference_route refused"),
     **_fields("number", "n m active cond_K lambda_min lambda_max reference_s reference_bound_mm"),
-    **_fields("object", "build_s"),
+    **_fields("object", "build_s stored_mib sparse"),
 }
+
+#: The steps of `build_s` by the stage that they make in the dense forms, and the one of the sparse form.
+#: (`condition`, the spectrum of K, is for the report alone.)
+BUILDING = {"K": ("condensation", "ties"), "factors": ("cholesky",), "Q": ("Q",)}
+MODEL = "model"
 
 
 def of_kind(kind: Kind) -> list[str]:

@@ -10,7 +10,13 @@ import scipy.linalg as sla
 from rich.console import Console
 from rich.table import Table
 
-from harness.planning.estimate import estimated, refuse_what_cannot_fit
+from harness.planning.estimate import (
+    Estimate,
+    SparseEstimate,
+    estimated,
+    estimated_sparse,
+    refuse_what_cannot_fit,
+)
 from harness.results.machine import physical_memory_mib
 from problems.build import prepared
 from problems.condensation.build import built
@@ -30,27 +36,47 @@ def validate(source: str, console: Console) -> None:
     if not isinstance(scene, JointScene):
         _matrices(scene, console)
         return
-    refuse_what_cannot_fit(scene, source)
+    flops_per_s, physical = speed(), physical_memory_mib()
+    dense, sparse = estimated(scene, flops_per_s), estimated_sparse(scene, flops_per_s)
+    dense_fits, sparse_fits = dense.peak_mib <= physical, sparse.peak_mib <= physical
+    refuse_what_cannot_fit(scene, source, "dual" if dense_fits else "sparse")
     console.print(f"{scene.name}: {scene.title}. Fine.")
     console.print(_contents(scene))
-    estimate = estimated(scene, speed())
-    cached = built(scene)
-    console.print(
-        f"n = {estimate.n} unknowns, m = {estimate.m} contacts; K, its factors and Q take "
-        f"{estimate.stored_mib:.0f} MiB in the cache, the process up to {estimate.peak_mib:.0f} MiB of "
-        f"{physical_memory_mib()}."
-    )
-    build = "is in the cache" if cached else f"has to be built, about {_time(estimate.build_s)}"
-    console.print(
-        f"The assembly {build}; an answer with its bound takes about {_time(estimate.answer_s)} more."
-    )
-    if estimate.m == 0:
+    console.print(f"n = {dense.n} unknowns, m = {dense.m} contacts; this machine has {physical} MiB.")
+    if dense_fits:
+        console.print(_dense(dense, built(scene)))
+    else:
+        console.print(
+            f"No dense form can hold it: the process would take up to {dense.peak_mib:.0f} MiB. The sparse "
+            f"form can (--form sparse)."
+        )
+    if sparse_fits:
+        console.print(_sparse(sparse))
+    if dense.m == 0:
         console.print("No contact: a linear solve, without a quadratic program.")
     if any(scene.effects_of(TieEffect)):
         console.print("Springs join parts into larger blocks of K.")
     beyond = [effect.kind for effect in scene.effects_of(PartLoadEffect)]
     if beyond:
         console.print(f"Loads beyond the junction are condensed once: {', '.join(beyond)}.")
+
+
+def _dense(estimate: Estimate, cached: bool) -> str:
+    build = "is in the cache" if cached else f"has to be built, about {_time(estimate.build_s)}"
+    return (
+        f"Dense forms: the assembly {build}; K, its factors and Q take {estimate.stored_mib:.0f} MiB in the "
+        f"cache, the process up to {estimate.peak_mib:.0f} MiB; an answer with its bound takes about "
+        f"{_time(estimate.answer_s)} more."
+    )
+
+
+def _sparse(estimate: SparseEstimate) -> str:
+    return (
+        f"Sparse form: {estimate.unknowns} unknowns, half-bandwidth {estimate.half_bandwidth}; the model and "
+        f"its factors take about {_time(estimate.build_s)}, the factors {estimate.stored_mib:.0f} MiB, the "
+        f"process up to {estimate.peak_mib:.0f} MiB; an answer with its bound takes about "
+        f"{_time(estimate.answer_s)} more."
+    )
 
 
 def _matrices(scene: Scene, console: Console) -> None:

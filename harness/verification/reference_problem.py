@@ -106,6 +106,7 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     contacts = directory / "scenes" / (scene.name.replace("/", "_") + ".npz")
     of_road: dict[str, Any] = {
         "build_s": facts.get("seconds"),
+        "stored_mib": problem.prepared.stored_mib,
         "reference_s": problem.reference_s,
         "reference_bound_mm": known.bound_mm,
         "reference_route": known.route,

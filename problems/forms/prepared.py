@@ -11,6 +11,8 @@ from .assembly import Assembly, LoadCase, Matrix, Vector
 from .compliance import AnyQ
 from .factorisation import factor, schur
 
+MIB = 2**20
+
 
 class Prepared:
     """An assembly with what is derived from it, each stage computed when first needed.
@@ -40,6 +42,17 @@ class Prepared:
     def facts(self) -> dict[str, object]:
         """Facts recorded with the stages: cond_K, λmin, λmax, seconds of each step, …"""
         return {}
+
+    @property
+    def stored_mib(self) -> dict[str, float]:
+        """MiB of K, its factors and Q, made or not."""
+        K = sum(block.nbytes for block in self.assembly.blocks) / MIB
+        return {"K": K, "factors": K, "Q": 8 * self.assembly.m**2 / MIB}
+
+    @property
+    def opened(self) -> tuple[str, ...]:
+        """K, and of the dense `factors` and `Q` those that were asked for."""
+        return ("K", *(stage for stage in ("factors", "Q") if stage in vars(self)))
 
     @cached_property
     def factors(self) -> tuple[Matrix, ...]:

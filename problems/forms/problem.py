@@ -89,6 +89,11 @@ class Problem(ABC):
         """The matrices that a solver of this form reads."""
 
     @property
+    def model_s(self) -> float | None:
+        """Seconds in which this process made the matrices; None if it opened them."""
+        return None
+
+    @property
     def yardstick(self) -> Matrix | None:
         """The matrix whose Cholesky factorisation times are compared with; None in a form without one."""
         return self.Q

@@ -29,5 +29,9 @@ class Sparse(Primal):
         super().__init__(prepared)
 
     @property
+    def model_s(self) -> float | None:
+        return self.prepared.seconds.get("model")
+
+    @property
     def yardstick(self) -> None:
         return None

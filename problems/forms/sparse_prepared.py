@@ -16,7 +16,7 @@ from .banded_inverse import BandedInverse, Windows, of_windows
 from .compliance import Compliance
 from .near_compliance import NearCompliance, near_compliance
 from .near_inverse import Rows
-from .prepared import Prepared
+from .prepared import MIB, Prepared
 from .sparse_factor import BandFactor, Factor, NotPositiveDefinite, factored
 
 
@@ -54,6 +54,15 @@ class SparsePrepared(Prepared):
         assembly = self.assembly
         size = {"n": assembly.asked, "m": assembly.m, "parts": assembly.parts, "unknowns": assembly.n}
         return size | {"seconds": self.seconds}
+
+    @property
+    def stored_mib(self) -> dict[str, float]:
+        """MiB of K as a sparse matrix, and of its factors if they were made."""
+        blocks = map(sp.csc_array, self.assembly.blocks)
+        sizes = {"K": sum(K.data.nbytes + K.indices.nbytes + K.indptr.nbytes for K in blocks) / MIB}
+        if "sparse_factors" in vars(self):
+            sizes["factors"] = 8 * sum(factor.numbers for factor in self.sparse_factors) / MIB
+        return sizes
 
     @cached_property
     def condition(self) -> float:

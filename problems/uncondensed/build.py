@@ -46,9 +46,10 @@ def prepared(scene: Scene) -> SparsePrepared:
             assembly = _sparse(scene.made.assembly, scene)
         case _:
             raise TypeError(type(scene).__name__)
+    seconds = {"model": time.perf_counter() - start}
     code = fingerprint([Path(__file__)], within=folders)
     key = digest("uncondensed", scene.assembly_key, code)
-    return _OfScene(scene, assembly, key, {"model": time.perf_counter() - start}, coarser)
+    return _OfScene(scene, assembly, key, seconds, coarser)
 
 
 class _OfScene(SparsePrepared):

@@ -33,7 +33,7 @@ def section(results: Results) -> Section | None:
         f"*One load case, and one of {LOAD_CASES[-1]} on the same assembly*, on the middle scene of each "
         "size: seconds per load case against the achieved error. Left: one load case pays for the solver's "
         f"own conversion and preparation; right: {LOAD_CASES[-1]} load cases share them. Neither includes "
-        "the Cholesky factor of K and Q, which all solvers share."
+        "the Cholesky factor of K and Q, which the dense forms share."
     )
     figure = Figure("amortised", caption, _drawing(results, answered))
     return Section("Many load cases on one assembly", [figure, _table(cells)])

@@ -46,7 +46,7 @@ def section(results: Results) -> Section | None:
         "*Where the time goes*, on the middle scene of each size, the fastest first; on the right, the "
         "total in seconds, and iterations × milliseconds of solve per iteration (for an active-set method, "
         "per change of the active set). Runs without an answer are omitted. The Cholesky factor of K and Q, "
-        "which all solvers share, is built beforehand and not included."
+        "which the dense forms share, is built beforehand and not included."
         + tolerance_note(results)
         + omission_note(results)
     )

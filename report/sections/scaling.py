@@ -52,7 +52,7 @@ def _exponents(cells: pd.DataFrame) -> Table:
             fit = exponent(mine["n"].tolist(), _fitted(mine, name).tolist())
             line |= {name: fit and fit.slope, f"{name}_shown": str(fit) if fit else MISSING}
         lines.append(line)
-    once = within.drop_duplicates("scene")
+    once = within.dropna(subset=["cholesky_s"]).drop_duplicates("scene")  # not timed in the sparse form
     for name, what in (("cholesky_s", "one Cholesky of Q"), ("product_s", "one product Qv")):
         fit = exponent(once["n"].tolist(), once[name].tolist())
         lines.append({"method": what, "sizes": len(once), "largest": once["n"].max()})
@@ -109,7 +109,7 @@ def _figure(results: Results, cells: pd.DataFrame) -> Figure:
             line = within[within["method"] == method].sort_values("n")
             axes.plot(line["n"], _fitted(line, name).where(lambda v: v > 0), **look)
         axes.set(xscale="log", yscale="log", ylabel=GROWING[name])
-    data = within.groupby("n")[["cholesky_s", "m"]].median()
+    data = within.groupby("n")[["cholesky_s", "m"]].median().dropna()
     limits = (
         (panels[0], data["cholesky_s"], "one Cholesky of Q"),
         (panels[1], 8 * data["m"] ** 2 / 2**20, "Q itself"),

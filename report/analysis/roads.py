@@ -1,0 +1,108 @@
+"""From the scene to the answer: the seconds of each stage on the way, in each form.
+
+    sparse    model K̂, B, f̂                               then preparation (factors of K̂, …) and solve
+    dual      condensation of the model to K, factors, Q   then preparation, solve, p and x
+    primal    condensation (and factors and Q, for the solvers of ours that use them)
+
+The total of k load cases is that of the first, from the scene on, and k − 1 times set-up, solve and recovery.
+Matrices that came from the cache count with the seconds that it took to make them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from harness.results.schema import BUILDING, DENSE_FORMS, MODEL
+from report.document.blocks import records
+from report.document.numbers import as_number
+from report.results.cells import cells_of
+from report.results.reader import Results
+
+LOAD_CASES = (1, 10, 1000)
+#: The stages in their order, the last two per load case.
+STAGES = ("model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery_s")
+PER_LOAD_CASE = 2
+
+
+def roads(results: Results) -> pd.DataFrame:
+    """The cells of single load cases with the seconds of each stage, 0 where there is none, `total_<k>_s` for
+    each k of LOAD_CASES (missing unless the answer is within the limit and all stages are known), and
+    `stored_mib`, the size of the dense matrices it needs. Empty if all have condensed matrices, or none has.
+    """
+    rows = results.rows[results.rows["case"].isna() & (results.rows["status"] != "unsupported")]
+    dense = rows["form"].isin(DENSE_FORMS)
+    if dense.all() or not dense.any():
+        return results.cells.iloc[:0]
+    cells = cells_of(rows.reset_index(drop=True))
+    facts = {problem.get("scene"): problem for problem in records(results.problems)}
+    built = [_built(cell, facts.get(cell["scene"], {})) for cell in records(cells)]
+    lines = cells.assign(**{name: [stages[name] for stages in built] for name in built[0]})
+    lines["solving_s"] = lines[["setup_s", "solve_s"]].sum(axis=1)
+    lines["recovery_s"] = lines["form_s"].fillna(0.0)
+    stages = lines[list(STAGES)]
+    first = stages.sum(axis=1, skipna=False).where(lines["verdict"] == "within")
+    for k in LOAD_CASES:
+        lines[f"total_{k}_s"] = first + (k - 1) * stages.iloc[:, -PER_LOAD_CASE:].sum(axis=1)
+    return lines
+
+
+def _built(cell: Mapping[str, Any], problem: Mapping[str, Any]) -> dict[str, float]:
+    """Seconds of what stands before the solver's own preparation, and MiB of the dense matrices."""
+    none = {"model_s": 0.0, "K_s": 0.0, "factors_s": 0.0, "Q_s": 0.0, "stored_mib": 0.0}
+    if cell["form"] not in DENSE_FORMS:
+        own = _first(cell["model_s"], _seconds(_part(problem, "sparse"), MODEL), cell["load_s"])
+        return none | {"model_s": own}
+    found, sizes = dict(none), _part(problem, "stored_mib")
+    for stage in _stages(cell):
+        first, *others = (_seconds(problem, step) for step in BUILDING[stage])
+        found[f"{stage}_s"] = first + float(np.nansum(others))  # springs between parts, if there are any
+        found["stored_mib"] += _first(as_number(sizes.get(stage)))
+    return found
+
+
+def _stages(cell: Mapping[str, Any]) -> list[str]:
+    """Of K, factors and Q what a row of a dense form needed; older rows do not say."""
+    known = [stage for stage in str(cell["stages"]).split() if stage in BUILDING]
+    return known or (["K", "factors", "Q"] if cell["form"] == "dual" or cell["in_house"] else ["K"])
+
+
+def _part(problem: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    part = problem.get(name)
+    return part if isinstance(part, dict) else {}
+
+
+def _seconds(problem: Mapping[str, Any], step: str) -> float:
+    return _first(as_number(_part(problem, "build_s").get(step)))
+
+
+def _first(*values: float | None) -> float:
+    """The first that is known, else NaN."""
+    return next((value for value in values if value is not None and np.isfinite(value)), np.nan)
+
+
+def fastest(lines: pd.DataFrame) -> pd.DataFrame:
+    """Per scene and number of load cases, what is the fastest in any form; lines as of `roads`.
+
+    `method` and `seconds`; `next` and `to_next`, how many times as fast as the next; `library` and
+    `to_library`, the same for the fastest library. Missing where there is none.
+    """
+    found: list[dict[str, Any]] = []
+    for scene in lines.sort_values(["n", "active", "scene"])["scene"].unique():
+        for k in LOAD_CASES:
+            total = f"total_{k}_s"
+            ranked = lines[(lines["scene"] == scene) & lines[total].notna()].sort_values(total)
+            ranked = ranked.drop_duplicates("method")
+            if ranked.empty:
+                continue
+            best, others = ranked.iloc[0], ranked.iloc[1:]
+            line = {"scene": scene, "n": best["n"], "active": best["active"], "load_cases": k}
+            line |= {"method": best["method"], "seconds": best[total], "in_house": best["in_house"]}
+            for name, among in (("next", others), ("library", ranked[~ranked["in_house"]])):
+                known = among.iloc[0] if len(among) else {"method": "", total: np.nan}
+                line |= {name: known["method"], f"to_{name}": known[total] / best[total]}
+            found.append(line)
+    return pd.DataFrame(found)

@@ -1,0 +1,189 @@
+"""The section "from scene to answer": stages, totals, and who is the fastest in any form."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from synthetic_results import no_answer, row, write_rows
+
+from harness.results import schema
+from problems.forms import names
+from report.analysis.roads import fastest, roads
+from report.results.reader import Results, read
+from report.sections import problems
+from report.sections import roads as section_of
+from report.writers.markdown import write
+
+LOW, HIGH = "4386/0107", "4386/1471"
+BUILD = {"condensation": 8.0, "ties": 0.5, "cholesky": 1.0, "condition": 100.0, "Q": 2.0}
+STORED = {"K": 80.0, "factors": 80.0, "Q": 40.0}
+
+
+def sparse(scene: str = LOW, solver: str = "newton", **figures: Any) -> dict[str, Any]:
+    """0.9 s to the first answer, 0.3 s for each further one, the model included only once."""
+    known = {"model_s": 0.4, "load_s": 0.6, "convert_s": 0.05, "prepare_s": 0.15, "setup_s": 0.1}
+    return row(scene, solver, "sparse", **(known | {"solve_s": 0.2, "form_s": None, "stages": "K"} | figures))
+
+
+def dense(scene: str = LOW, solver: str = "newton", form: str = "dual", **figures: Any) -> dict[str, Any]:
+    """11.5 s to K, factors and Q, then 0.3 s once and 0.1 s per load case."""
+    known = {"convert_s": 0.1, "prepare_s": 0.2, "setup_s": 0.02, "solve_s": 0.05, "form_s": 0.03}
+    return row(scene, solver, form, **(known | {"stages": "K factors Q"} | figures))
+
+
+def results(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> Results:
+    write_rows(directory, rows)
+    known = {"n": 4386, "m": 2193, "build_s": BUILD, "stored_mib": STORED} | facts
+    scenes = {r["scene"]: {"scene": r["scene"], "active": r["active"]} | known for r in rows}
+    (directory / "problems.jsonl").write_text("".join(json.dumps(p) + "\n" for p in scenes.values()), "utf-8")
+    return read(directory)
+
+
+def line_of(lines: pd.DataFrame, method: str) -> pd.Series[Any]:
+    (line,) = (line for _, line in lines.iterrows() if line["method"] == method)
+    return line
+
+
+def totals(line: pd.Series[Any]) -> list[float]:
+    return [line[f"total_{k}_s"] for k in (1, 10, 1000)]
+
+
+def test_the_reports_forms_are_those_of_the_problems() -> None:
+    assert set(schema.FORMS) == set(names.FORMS)
+    assert set(schema.DENSE_FORMS) == set(names.DENSE_FORMS)
+
+
+def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
+    rows = [sparse(), dense(), dense(solver="clarabel", form="primal", stages="K", form_s=None)]
+    lines = roads(results(tmp_path, rows))
+    assert totals(line_of(lines, "newton (sparse)")) == pytest.approx([0.9, 0.9 + 9 * 0.3, 0.9 + 999 * 0.3])
+    assert totals(line_of(lines, "newton (dual)")) == pytest.approx([11.9, 11.9 + 0.9, 11.9 + 99.9])
+    primal = line_of(lines, "clarabel (primal)")
+    assert totals(primal) == pytest.approx([8.5 + 0.37, 8.87 + 9 * 0.07, 8.87 + 999 * 0.07])
+    assert (primal["factors_s"], primal["Q_s"], primal["stored_mib"]) == (0, 0, 80)
+    assert line_of(lines, "newton (dual)")["stored_mib"] == 200
+    assert line_of(lines, "newton (sparse)")["stored_mib"] == 0
+
+
+@pytest.mark.parametrize(
+    ("solver", "form", "first"),
+    [
+        ("newton", "dual", 11.9),
+        ("gi", "primal", 11.9),
+        ("clarabel", "primal", 8.9),
+        ("newton", "sparse", 1.1),
+    ],
+)
+def test_older_rows_are_read(tmp_path: Path, solver: str, form: str, first: float) -> None:
+    """They do not say which stages were used, nor the seconds of the model alone."""
+    rows = [sparse(solver="other"), dense(solver="another")]
+    old = {"stages": None, "model_s": None, "in_house": solver != "clarabel"}
+    rows.append(sparse(**old) if form == "sparse" else dense(solver=solver, form=form, **old))
+    assert totals(line_of(roads(results(tmp_path, rows)), f"{solver} ({form})"))[0] == pytest.approx(first)
+
+
+def test_the_seconds_of_an_older_sparse_model_are_those_of_the_driver(tmp_path: Path) -> None:
+    own = {"sparse": {"build_s": {"model": 0.7}}}
+    lines = roads(results(tmp_path, [sparse(model_s=None), dense()], **own))
+    assert line_of(lines, "newton (sparse)")["model_s"] == 0.7
+
+
+def test_only_answers_within_the_limit_have_a_total(tmp_path: Path) -> None:
+    rows = [sparse(), dense(), dense(solver="piqp", verdict="outside"), dense(solver="osqp")]
+    rows[-1] |= no_answer("time_limit")
+    lines = roads(results(tmp_path, rows))
+    for method in ("piqp (dual)", "osqp (dual)"):
+        assert not line_of(lines, method)[["total_1_s", "total_1000_s"]].notna().any()
+    assert set(fastest(lines)["library"]) == {""}
+
+
+def test_matrices_of_unknown_cost_give_no_total(tmp_path: Path) -> None:
+    """A dense form whose condensation nobody timed wins nothing."""
+    lines = roads(results(tmp_path, [sparse(), dense()], build_s={"model": 0.4}))
+    assert pd.isna(line_of(lines, "newton (dual)")["total_1_s"])
+    assert set(fastest(lines)["method"]) == {"newton (sparse)"}
+
+
+def test_the_fastest_by_the_number_of_load_cases(tmp_path: Path) -> None:
+    rows = [sparse(), dense(), sparse(solver="clarabel", solve_s=10.0), dense(solver="piqp", solve_s=4.0)]
+    best = fastest(roads(results(tmp_path, rows))).set_index("load_cases")
+    assert best["method"].to_dict() == {1: "newton (sparse)", 10: "newton (sparse)", 1000: "newton (dual)"}
+    assert best["library"].to_dict() == {1: "clarabel (sparse)", 10: "piqp (dual)", 1000: "piqp (dual)"}
+    assert best.loc[1, "to_library"] == pytest.approx((0.9 + 9.8) / 0.9)
+    assert best.loc[1, "next"] == "clarabel (sparse)"
+    assert best.loc[1000, "next"] == "newton (sparse)"
+    assert best.loc[1000, "to_next"] == pytest.approx((0.9 + 999 * 0.3) / (11.9 + 99.9))
+
+
+def test_the_section_names_the_winner_and_its_factors(tmp_path: Path) -> None:
+    rows = [
+        r for scene in (LOW, HIGH) for r in (sparse(scene), dense(scene), dense(scene, "piqp", solve_s=6.1))
+    ]
+    section = section_of.section(results(tmp_path, rows))
+    assert section is not None
+    text, figure, best, table = section.blocks
+    won = "13 times as fast as the next and 20 times as fast as the fastest library"
+    assert f"- 1 load case: **newton (sparse)** on 2 of 2 scenes, {won}." in text.markdown
+    assert "- 1000 load cases: **newton (dual)** on 2 of 2 scenes" in text.markdown
+    assert "as if they were not" in text.markdown
+    assert (figure.name, best.name, table.name) == ("roads", "roads-fastest", "roads")
+    assert "| 4386/0107" in table.markdown
+    page = write(tmp_path).read_text("utf-8")
+    assert "## From scene to answer" in page
+    assert (tmp_path / "report" / "roads.png").stat().st_size > 10_000
+    saved = pd.read_csv(tmp_path / "report" / "roads.csv")
+    assert {"model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery_s"} <= set(saved)
+    assert saved["total_1_s"].min() == pytest.approx(0.9)
+
+
+def test_a_tie_is_said_to_be_one(tmp_path: Path) -> None:
+    section = section_of.section(results(tmp_path, [sparse(), sparse(solver="other", solve_s=0.3), dense()]))
+    assert section is not None
+    assert "on 1 of 1 scene, about as fast as the next" in section.blocks[0].markdown
+
+
+def test_a_library_that_wins_is_not_compared_with_itself(tmp_path: Path) -> None:
+    section = section_of.section(results(tmp_path, [sparse(solver="clarabel"), dense()]))
+    assert section is not None
+    assert (
+        "**clarabel (sparse)** on 1 of 1 scene, 13 times as fast as the next." in section.blocks[0].markdown
+    )
+
+
+@pytest.mark.parametrize("forms", [("dual", "primal"), ("sparse",)])
+def test_it_takes_both_roads(tmp_path: Path, forms: tuple[str, ...]) -> None:
+    rows = [sparse() if form == "sparse" else dense(form=form) for form in forms]
+    assert section_of.section(results(tmp_path, rows)) is None
+
+
+def test_series_and_forms_that_are_not_taken_do_not_count(tmp_path: Path) -> None:
+    """A later case of a series is neither cold, nor has it paid for the matrices."""
+    rows = [dense(), sparse(case=3), sparse(status="unsupported")]
+    assert section_of.section(results(tmp_path, rows)) is None
+
+
+def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
+    section = section_of.section(results(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
+    assert section is not None
+    text, table = section.blocks
+    assert text.markdown.startswith("No answer is within the limit.")
+    assert "(outside)" in table.markdown
+
+
+def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
+    own = {"unknowns": 46956, "reference_bound_mm": 1.6e-11, "from_condensed_mm": 3e-12}
+    facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
+    section = problems.section(results(tmp_path, [sparse(), dense()], **facts, sparse=own))
+    assert section is not None
+    scenes = section.blocks[1]
+    assert scenes.data["sparse_unknowns"].tolist() == [46956]
+    assert "difference of the two references, mm" in scenes.markdown
+    assert all(text in scenes.markdown for text in ("46956", "1.60e-11", "3.00e-12", "2.00e-12"))
+    assert "The sparse form" in scenes.caption
+    without = problems.section(results(tmp_path / "dense", [dense()], **facts))
+    assert without is not None
+    assert "sparse" not in without.blocks[1].markdown + without.blocks[1].caption
