@@ -10,7 +10,9 @@ import scipy.sparse as sp
 
 from .assembly import Assembly, Matrix
 from .near_inverse import NearInverse, Rows, near_inverse
-from .sparse_factor import BandFactor
+from .sparse_factor import BandFactor, Renumbered
+
+FURTHEST = 20  # half-bandwidths between the contacts of a window
 
 
 @dataclass(frozen=True)
@@ -51,17 +53,21 @@ class NearCompliance:
 
 
 def near_compliance(
-    assembly: Assembly, factors: Sequence[BandFactor], windows: Sequence[Rows]
-) -> NearCompliance:
-    """Of the contacts in each window."""
+    assembly: Assembly, factors: Sequence[BandFactor | Renumbered], windows: Sequence[Rows]
+) -> NearCompliance | None:
+    """Of the contacts in each window; None if those of one are too far apart in the numbering of a band."""
     made = []
-    for factor, unknowns in zip(factors, assembly.slices, strict=True):
-        A = sp.csc_array(assembly.A[unknowns])
+    for found, unknowns in zip(factors, assembly.slices, strict=True):
+        A, factor = sp.csc_array(assembly.A[unknowns]), found
+        if isinstance(factor, Renumbered):
+            A, factor = sp.csc_array(A[factor.order]), factor.band
         places, values = _padded(A)
         reach = 0
         for contacts in windows:
             used = places[:, contacts][values[:, contacts] != 0]
             reach = max(reach, int(np.ptp(used)) if used.size else 0)
+        if reach > FURTHEST * len(factor.L):
+            return None
         rows = np.unique(A.indices).astype(np.intp)
         inverse = near_inverse(factor, rows, reach)
         made.append(_OfBlock(inverse, np.searchsorted(rows, places), values))

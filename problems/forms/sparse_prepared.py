@@ -17,7 +17,7 @@ from .compliance import Compliance
 from .near_compliance import NearCompliance, near_compliance
 from .near_inverse import Rows
 from .prepared import MIB, Prepared
-from .sparse_factor import BandFactor, Factor, NotPositiveDefinite, factored
+from .sparse_factor import BandFactor, Factor, GeneralFactor, NotPositiveDefinite, Renumbered, factored
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class SparsePrepared(Prepared):
     def near_compliance(self, windows: Sequence[Rows]) -> NearCompliance | None:
         """Q_WW of windows of contacts to four digits, for a preconditioner; None without band factors."""
         like = SparsePrepared(self.coarser()) if self.coarser else self
-        bands = [factor for factor in like.sparse_factors if isinstance(factor, BandFactor)]
+        bands = [factor for factor in like.sparse_factors if isinstance(factor, BandFactor | Renumbered)]
         if len(bands) < len(like.sparse_factors):
             return None
         return near_compliance(like.assembly, bands, windows)
@@ -121,7 +121,7 @@ class SparsePrepared(Prepared):
         Q_WW is not positive definite in single precision.
         """
         assembly = self.assembly
-        windows = Windows.of(assembly.contact_nodes, assembly.m)
+        windows = self._windows()
         near = self.near_compliance(windows.contacts())
         if near is None:
             return None
@@ -133,6 +133,20 @@ class SparsePrepared(Prepared):
             return ApproximateInverse(of_windows(windows, near.submatrix), diagonal)
         except np.linalg.LinAlgError:
             return None
+
+    def _windows(self) -> Windows:
+        """Along the joint; without coordinates along the bands, a line of contacts per half-bandwidth."""
+        assembly = self.assembly
+        if assembly.contact_nodes is not None:
+            return Windows.of(assembly.contact_nodes, assembly.m)
+        places, widest = np.arange(assembly.n), 1
+        for factor, rows in zip(self.sparse_factors, assembly.slices, strict=True):
+            if isinstance(factor, Renumbered):
+                places[rows.start + factor.order] = np.arange(rows.start, rows.stop)
+            if not isinstance(factor, GeneralFactor):
+                widest = max(widest, factor.numbers // (rows.stop - rows.start))
+        first = places[assembly.A.indices[assembly.A.indptr[:-1]]]
+        return Windows(np.argsort(first, kind="stable"), max(1, assembly.m * widest // assembly.n))
 
     @cached_property
     def Q(self) -> Matrix:
