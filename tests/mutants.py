@@ -134,12 +134,10 @@ MUTANTS = [
     Mutant(SPARSE_DEFINITE, "least = min(least, _of_band", "least = max(0, _of_band"),
     Mutant(SPARSE_DEFINITE, "sp.diags_array(d) @ K @ sp.diags_array(d)", "K"),
     Mutant(SPARSE_DEFINITE, "sp.diags_array(d) @ K @ sp.diags_array(d)", "sp.diags_array(d) @ K"),
-    Mutant(SPARSE_DEFINITE, "scaled[order][:, order]", "scaled"),
     # The equations of a contact set: no proof rests on them, but a bound that is tight does
     Mutant(AUGMENTED, "self.rho * g - lam_C", "self.rho * g"),
     Mutant(AUGMENTED, "self.rho * (self.A_C.T @ x - g)", "self.rho * (self.A_C.T @ x)"),
     Mutant(AUGMENTED, "x, lam = x + dx, lam + dlam", "pass"),
-    Mutant(AUGMENTED, "missed = float(abs(y[active]).max(initial=0.0))", "missed = 0.0"),
     Mutant(
         BALANCE,
         "np.log2(np.where(positive, diagonal, 1.0)) / 2",
