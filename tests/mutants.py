@@ -17,6 +17,7 @@ AUGMENTED = "harness/verification/augmented.py"
 BALANCE = "problems/forms/balance.py"
 REFERENCE = "harness/verification/reference.py"
 BLOCK = "harness/verification/batched/bound.py"
+INDEPENDENCE = "harness/verification/independence.py"
 COMPLIANCE = "harness/verification/batched/compliance.py"
 RESIDUAL = "harness/verification/batched/residual.py"
 ASSESS = "harness/verification/batched/assess.py"
@@ -128,18 +129,16 @@ MUTANTS = [
     Mutant(SPARSE_DEFINITE, "s - 1.01 * rounding", "s"),
     Mutant(SPARSE_DEFINITE, "float(abs(shifted[0]).max())", "float(abs(shifted[0]).min())"),
     Mutant(SPARSE_DEFINITE, "if info == 0:", "if True:"),
-    Mutant(SPARSE_DEFINITE, "(w / v).max()", "(w / v).min()"),
+    Mutant(SPARSE_DEFINITE, "trans=1), lower=1).max()", "trans=1), lower=1).min()"),
     Mutant(SPARSE_DEFINITE, "np.abs(L, out=L)", "pass"),
     Mutant(SPARSE_DEFINITE, "if bound >= SMALLEST:", "if bound > 0:"),
     Mutant(SPARSE_DEFINITE, "least = min(least, _of_band", "least = max(0, _of_band"),
     Mutant(SPARSE_DEFINITE, "sp.diags_array(d) @ K @ sp.diags_array(d)", "K"),
     Mutant(SPARSE_DEFINITE, "sp.diags_array(d) @ K @ sp.diags_array(d)", "sp.diags_array(d) @ K"),
-    Mutant(SPARSE_DEFINITE, "scaled[order][:, order]", "scaled"),
     # The equations of a contact set: no proof rests on them, but a bound that is tight does
     Mutant(AUGMENTED, "self.rho * g - lam_C", "self.rho * g"),
     Mutant(AUGMENTED, "self.rho * (self.A_C.T @ x - g)", "self.rho * (self.A_C.T @ x)"),
     Mutant(AUGMENTED, "x, lam = x + dx, lam + dlam", "pass"),
-    Mutant(AUGMENTED, "missed = float(abs(y[active]).max(initial=0.0))", "missed = 0.0"),
     Mutant(
         BALANCE,
         "np.log2(np.where(positive, diagonal, 1.0)) / 2",
@@ -199,10 +198,14 @@ MUTANTS = [
     Mutant(BLOCK, "gamma(depth) * (abs(g) + abs(A).T @ x_size)", "gamma(depth) * abs(g)"),
     Mutant(BLOCK, "(abs(g) + abs(A).T @ x_size) + depth * ETA", "(abs(g) + abs(A).T @ x_size)"),
     Mutant(BLOCK, "        error = error + assembly.altered.of_gaps(x_size)\n", "        pass\n"),
-    Mutant(BLOCK, "sigma2 = least - uncertainty", "sigma2 = least"),
-    Mutant(BLOCK, "least = min(least, smallest_eigenvalue(", "least = max(least, smallest_eigenvalue("),
+    Mutant(INDEPENDENCE, "sigma2 = least - uncertainty", "sigma2 = least"),
     Mutant(
-        BLOCK, "        sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A\n", "        pass\n"
+        INDEPENDENCE, "least = min(least, smallest_eigenvalue(", "least = max(least, smallest_eigenvalue("
+    ),
+    Mutant(
+        INDEPENDENCE,
+        "        sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A\n",
+        "        pass\n",
     ),
     # max (K⁻¹)_ii ≤ (1 + c/κ) (row + ε ‖X‖_F)²
     Mutant(COMPLIANCE, "SAFE * (1 + relative) * row**2", "SAFE * row**2"),
@@ -279,6 +282,7 @@ TESTS = {
     BALANCE: ("sparse_terms", "sparse_certificate"),
     REFERENCE: ("terms_verdict", "altered"),
     BLOCK: ("terms_batched", "altered"),
+    INDEPENDENCE: ("terms_batched", "altered"),
     COMPLIANCE: ("terms_batched",),
     RESIDUAL: ("terms_batched", "altered", "series_bound"),
     ASSESS: ("terms_batched",),
