@@ -18,7 +18,8 @@ import clarabel
 import numpy as np
 
 from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
-from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.balanced import balanced
+from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",
@@ -32,12 +33,15 @@ class Clarabel(Solver):
     "auto" would choose qdldl for them.
     """
 
+    forms = FORMS
+
     def __init__(self, *, direct_solve_method: str = "faer") -> None:
         choice("clarabel", "direct_solve_method", direct_solve_method, ("faer", "qdldl", "auto"))
         self.direct_solve_method = direct_solve_method
 
     def convert(self, problem: Problem) -> Converted:
-        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0))
+        problem, units = balanced(problem)
+        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0), units)
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         settings = clarabel.DefaultSettings()
@@ -50,15 +54,15 @@ class Clarabel(Solver):
         if state.problem.bounded:
             settings.equilibrate_enable = False
             settings.static_regularization_constant = 1e-12
-        h = state.problem.h(load)
+        q, h = state.vectors(load)
         h = np.zeros(state.G.shape[0]) if h is None else h
         cones = [clarabel.NonnegativeConeT(len(h))]
-        return state, clarabel.DefaultSolver(state.P, state.problem.q(load), state.G, h, cones, settings)
+        return state, clarabel.DefaultSolver(state.P, q, state.G, h, cones, settings)
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """Clarabel's update of the vectors, with the equilibration kept; it has no warm start."""
-        h = state.problem.h(load)
-        ready[1].update(q=state.problem.q(load), **({} if h is None else {"b": h}))
+        q, h = state.vectors(load)
+        ready[1].update(q=q, **({} if h is None else {"b": h}))
         return ready
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
@@ -66,6 +70,7 @@ class Clarabel(Solver):
         result = library.solve()
         return state.answer(
             STATUS.get(str(result.status), "failed"),
+            load,
             tolerance,
             np.array(result.x),
             np.array(result.z),
