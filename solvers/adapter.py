@@ -41,6 +41,10 @@ class Converted:
         own = load if self.units is None else self.units.load(load)
         return self.problem.q(own), self.problem.h(own)
 
+    def gap_tolerance(self, tolerance: float, load: LoadCase) -> float:
+        """For the duality gap, in the library's units."""
+        return tolerance if self.units is None else self.units.gap_tolerance(tolerance, load)
+
     def start(self, start: WarmStart, load: LoadCase) -> tuple[Vector | None, Vector]:
         """(z, multipliers) from which to solve this load case."""
         own = start if self.units is None else self.units.start(start, load)

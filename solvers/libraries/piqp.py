@@ -44,11 +44,14 @@ class Piqp(Solver):
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         library = piqp.SparseSolver() if sp.issparse(state.P) else piqp.DenseSolver()
         settings = library.settings
-        settings.eps_abs = settings.eps_duality_gap_abs = tolerance
+        settings.eps_abs = tolerance
+        settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
         settings.check_duality_gap = True
         settings.max_iter = 500
         settings.compute_timings = True
+        if state.units is not None:
+            settings.kkt_solver = piqp.sparse_ldlt_ineq_cond
         q, h = state.vectors(load)
         limits = {"x_l": np.zeros_like(q)} if h is None else {"G": state.G, "h_u": h}
         library.setup(state.P, q, **limits)
@@ -57,6 +60,7 @@ class Piqp(Solver):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """PIQP's update of the vectors, with the preconditioner kept; it has no warm start."""
         q, h = state.vectors(load)
+        ready[1].settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
         ready[1].update(c=q, **({} if h is None else {"h_u": h}))
         return ready
 

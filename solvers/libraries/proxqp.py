@@ -55,7 +55,8 @@ class ProxQp(Solver):
             backend = BACKENDS[self.backend]
             library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
         settings = library.settings
-        settings.eps_abs = settings.eps_duality_gap_abs = tolerance
+        settings.eps_abs = tolerance
+        settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
         settings.check_duality_gap = True
         settings.max_iter = 100_000
@@ -75,6 +76,7 @@ class ProxQp(Solver):
         """
         _, library, _ = ready
         q, h = state.vectors(load)
+        library.settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
         if h is None:
             library.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
             library.update(g=q)
