@@ -5,7 +5,7 @@ With û = uDv, λ = uRμ, the problem min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ 
     min ½vᵀ(DK̂D)v − (Df̂/u)ᵀv   subject to   (RBᵀD)v ≤ Rg/u
 
     D   the diagonal of DK̂D between 1/2 and 2: the unknowns of the model are in mm, 1 and 1/mm
-    R   the rows of RBᵀD of a length between 1/√2 and √2
+    R   the rows of RBᵀD of a length between 1/2 and 1
     u   the loads Df̂/u and the gaps Rg/u at most one in size, (N·mm)^½, for each load case
 
 All are powers of two, so nothing is rounded. D and R belong to the assembly, so do DK̂D and RBᵀD; u belongs to
@@ -46,7 +46,7 @@ class Units:
     def of(cls, assembly: Assembly) -> Units:
         D = balanced_units(assembly)
         lengths = np.sqrt((sp.diags_array(D) @ assembly.A).power(2).sum(axis=0))
-        return cls(D, np.exp2(-np.round(np.log2(lengths))))
+        return cls(D, np.ldexp(1.0, -np.frexp(lengths)[1]))
 
     def problem(self, given: Problem) -> Problem:
         """With DK̂D for K̂ and DBR for B."""
@@ -59,7 +59,7 @@ class Units:
     def unit(self, load: LoadCase) -> float:
         """u; 1 if there are neither loads nor gaps."""
         largest = max(float(abs(v).max(initial=0.0)) for v in (self.D * load.f, self.R * load.g))
-        return float(np.exp2(np.ceil(np.log2(largest)))) if largest else 1.0
+        return float(np.ldexp(1.0, np.frexp(largest)[1])) if largest else 1.0
 
     def load(self, load: LoadCase) -> LoadCase:
         """Df̂/u and Rg/u."""

@@ -117,8 +117,8 @@ def library_of(solver: Any, form: Form, tolerance: float) -> Any:
     return solver.setup(solver.prepare(solver.convert(stated(prepared, form))), load, tolerance)[1]
 
 
-#: What is asked for the duality gap: τ N·mm, in balanced units τ/u², and u is 64 (N·mm)^½ in library_of.
-GAP: dict[Form, float] = {"primal": 3e-7, "dual": 3e-7, "sparse": 3e-7 / 64**2}
+#: What is asked for the duality gap: τ N·mm, in balanced units τ/u², and u is 32 (N·mm)^½ in library_of.
+GAP: dict[Form, float] = {"primal": 3e-7, "dual": 3e-7, "sparse": 3e-7 / 32**2}
 
 
 @pytest.mark.parametrize("form", FORMS)

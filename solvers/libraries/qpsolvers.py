@@ -29,6 +29,7 @@ TOLERANCE: dict[str, Callable[[float], dict[str, Any]]] = {
         "dual_feasibility_tolerance": max(tol, 1e-10),
         "qp_regularization_value": 0.0,
     },
+    "qpalm": lambda tol: {"eps_abs": tol, "eps_rel": 0.0, "eps_rel_in": 0.0, "max_iter": 1_000_000},
     "scs": lambda tol: {"eps_abs": tol, "eps_rel": 0.0, "max_iters": 10_000_000},
 }
 
@@ -74,7 +75,8 @@ class QpSolvers(Solver):
             return state.failed(load, details={**details, "message": str(error)})
         if solution.x is None or (not state.problem.bounded and (solution.z is None or not solution.z.size)):
             return state.failed(load, details=details)
-        iterations = solution.extras.get("iterations", solution.extras.get("iter"))
+        facts = solution.extras
+        iterations = facts.get("iterations", facts.get("iter", getattr(facts.get("info"), "iter", None)))
         if isinstance(iterations, np.ndarray):  # quadprog: constraints added, constraints dropped
             iterations = int(iterations.sum())
         return state.answer(
