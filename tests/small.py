@@ -5,8 +5,6 @@ min ½λᵀQλ − pᵀλ, λ ≥ 0 is min ‖Uλ − U⁻ᵀp‖, λ ≥ 0 with
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import scipy.linalg as sla
 import scipy.optimize
@@ -14,10 +12,7 @@ import scipy.sparse as sp
 
 from harness.conformance.known_problems import contact_rows, stiffness
 from problems.forms.assembly import Assembly, LoadCase, Vector
-from problems.forms.names import Form
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Problem, in_form
-from problems.forms.sparse_prepared import SparsePrepared
 
 
 def make_prepared(seed: int, pairs: int, tools: int = 0) -> Prepared:
@@ -32,14 +27,6 @@ def make_strips(elements: int) -> Prepared:
     main, side = np.full(elements, 2e3 + 2.0), np.full(elements - 1, -1e3)
     K = np.diag(main) + np.diag(side, 1) + np.diag(side, -1)
     return Prepared(Assembly((K, 0.5 * K), contact_rows(elements, 0)))
-
-
-def stated(prepared: Prepared, form: Form) -> Problem:
-    """The problem in a form; in the sparse one with sparse blocks, which is what that form has."""
-    if form == "sparse":
-        given = prepared.assembly
-        prepared = SparsePrepared(replace(given, blocks=tuple(sp.csc_array(K) for K in given.blocks)))
-    return in_form(prepared, form)
 
 
 def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, LoadCase]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from small import stated
 
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from solvers.base import Answer, Form
 from solvers.registry import make_solver, solver_names
 
@@ -26,7 +26,7 @@ def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[An
     """The solver's answer, and its displacements where it has any."""
     solver, tolerance = make_solver(name, {}), TOLERANCES.get(name, 1e-9)
     load = LoadCase(case.f, case.g, prepared.dual_load(case))
-    state = solver.prepare(solver.convert(stated(prepared, form)))
+    state = solver.prepare(solver.convert(in_form(prepared, form)))
     answer = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
     if answer.lam is None or form != "dual":
         return answer, answer.x

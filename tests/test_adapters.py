@@ -12,7 +12,7 @@ import qpsolvers
 import scipy.linalg as sla
 import scipy.sparse as sp
 from proxsuite import proxqp
-from small import make_load, make_prepared, make_strips, solve_by_nnls, stated
+from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.conformance.check import run
 from problems.forms.problem import in_form
@@ -60,7 +60,7 @@ def test_agrees_with_nnls(name: str, options: dict[str, Any], form: Form, kind: 
         "strips": lambda: make_strips(40),
     }[kind]()
     solver, tolerance = make_solver(name, options), TOLERANCES[form]
-    state = solver.prepare(solver.convert(stated(prepared, form)))
+    state = solver.prepare(solver.convert(in_form(prepared, form)))
     for seed in (3, 4):
         case, load = make_load(seed, prepared)
         expected_x, expected_lam = solve_by_nnls(prepared, case)
@@ -114,7 +114,7 @@ def test_nnls_agrees_with_trying_every_active_set() -> None:
 def library_of(solver: Any, form: Form, tolerance: float) -> Any:
     prepared = make_prepared(9, 4)
     _, load = make_load(10, prepared)
-    return solver.setup(solver.prepare(solver.convert(stated(prepared, form))), load, tolerance)[1]
+    return solver.setup(solver.prepare(solver.convert(in_form(prepared, form))), load, tolerance)[1]
 
 
 #: What is asked for the duality gap: τ N·mm, in balanced units τ/u², and u is 32 (N·mm)^½ in library_of.
@@ -178,7 +178,7 @@ def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy(name: str, form:
     errors, iterations = [], []
     for tolerance in (1e-1, 1e-9):
         solver = make_solver(name, {})
-        state = solver.prepare(solver.convert(stated(prepared, form)))
+        state = solver.prepare(solver.convert(in_form(prepared, form)))
         got = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
         assert got.lam is not None
         x = got.x if form != "dual" else prepared.recover(got.lam, case)

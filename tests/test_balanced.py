@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small import make_load, make_prepared, stated
+from small import make_load, make_prepared
 
 from harness.measurement.solver_session import SolverSession
 from harness.verification.reference import reference
@@ -131,7 +131,7 @@ def test_the_answer_does_not_depend_on_the_units_of_the_model(name: str) -> None
     random = np.random.default_rng(1)
     base = make_prepared(2, 20, 5)
     case, _ = make_load(3, base)
-    problem = stated(base, "sparse")
+    problem = in_form(base, "sparse")
     n, m = base.assembly.n, base.assembly.m
     S, C = np.exp2(random.integers(-20, 21, n)), np.exp2(random.integers(-20, 21, m))
     blocks = tuple(
@@ -142,9 +142,9 @@ def test_the_answer_does_not_depend_on_the_units_of_the_model(name: str) -> None
     other = in_form(SparsePrepared(Assembly(blocks, A)), "sparse")
     changed = LoadCase(S * case.f, C * case.g)
     answers = []
-    for stated_problem, given in ((problem, case), (other, changed)):
-        (load,) = stated_problem.loads([given])
-        session = SolverSession(make_solver(name, {}), stated_problem, 1e-9)
+    for each, given in ((problem, case), (other, changed)):
+        (load,) = each.loads([given])
+        session = SolverSession(make_solver(name, {}), each, 1e-9)
         session.open()
         answers.append(session.cold(load))
     one, two = answers

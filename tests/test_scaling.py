@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small import make_load, make_prepared, solve_by_nnls, stated
+from small import make_load, make_prepared, solve_by_nnls
 from solving import IN_HOUSE, TOLERANCES
 
 from harness.measurement.solver_session import SolverSession
@@ -33,7 +33,7 @@ def rescaled(seed: int, bits: int) -> tuple[Prepared, LoadCase, np.ndarray, np.n
 def test_answers_do_not_depend_on_the_units_of_contacts(name: str, form: Form, bits: int, seed: int) -> None:
     """Without the scaling, ipm-fast and ipm called answers solved that were 100 mm off."""
     prepared, case, x, lam, c = rescaled(seed, bits)
-    problem = stated(prepared, form)
+    problem = in_form(prepared, form)
     session = SolverSession(make_solver(name, {}), problem, TOLERANCES[name])
     session.open(batched=True)
     (load,) = problem.loads([case])

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small import make_load, make_prepared, solve_by_nnls, stated
+from small import make_load, make_prepared, solve_by_nnls
 
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from solvers.base import FORMS, Form, Solver, WarmStart
 from solvers.registry import make_solver, modules
 
@@ -30,7 +31,7 @@ def near_of(prepared: Prepared, case: LoadCase, form: Form) -> WarmStart:
 
 def started(name: str, options: dict[str, Any], prepared: Prepared, form: Form) -> tuple[Solver, Any]:
     solver = make_solver(name, options)
-    return solver, solver.prepare(solver.convert(stated(prepared, form)))
+    return solver, solver.prepare(solver.convert(in_form(prepared, form)))
 
 
 @pytest.mark.parametrize(("name", "options", "form"), CASES, ids=str)
