@@ -1,8 +1,8 @@
 """OSQP: the alternating direction method of multipliers, https://osqp.org.
 
-Stops when ‖Aᵀx − s‖∞ and ‖Kx − f + Aλ‖∞ (primal form), or ‖λ − s‖∞ and ‖Qλ − p − w‖∞ (dual form), and
-the duality gap are below the tolerance. ρ is adapted every 50 iterations and never by the clock, so the
-iteration count does not depend on the machine.
+Stops when ‖Aᵀx − s‖∞ and ‖Kx − f + Aλ‖∞ (primal form; sparse form, in balanced units), or ‖λ − s‖∞ and
+‖Qλ − p − w‖∞ (dual form), and the duality gap are below the tolerance. ρ is adapted every 50 iterations and
+never by the clock, so the iteration count does not depend on the machine.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """PIQP: a proximal interior-point method, https://predict-epfl.github.io/piqp.
 
 Stops when the unscaled ∞-norms of both residuals and the duality gap are below the tolerance; its
-relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as bounds, not as rows.
+relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as bounds, not as rows. In the
+sparse form, the rows are eliminated from the KKT system, so what is factored has the pattern of K̂ + BBᵀ.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """ProxQP of ProxSuite: a proximal augmented Lagrangian method, https://github.com/Simple-Robotics/proxsuite.
 
-Dense backend. Stops when the unscaled ∞-norms of both residuals and the duality gap are below the
-tolerance. The dual form uses its box constraints, so no rows are formed.
+The sparse backend in the sparse form, else the dense one. Stops when the unscaled ∞-norms of both residuals
+and the duality gap are below the tolerance. The dual form uses its box constraints, so no rows are formed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ INFINITY = 1e20  # ProxQP's value for no bound
 
 
 class ProxQp(Solver):
-    """backend : which matrix it factors; "automatic" decides by the sizes."""
+    """backend : which matrix the dense backend factors; "automatic" decides by the sizes. Only "automatic"
+    takes the sparse form.
+    """
 
     distribution = "proxsuite"
 

@@ -2,6 +2,9 @@
 
 The matrices go through qpsolvers.Problem, λ comes back through Solution.z (primal form) or Solution.x
 (dual form).
+
+Those with a sparse interface take the sparse form. HiGHS does so for small models only: its active-set method
+keeps a dense matrix of the order of the free unknowns.
 """
 
 from __future__ import annotations
