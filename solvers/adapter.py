@@ -1,9 +1,10 @@
 """Shared by the adapters of libraries: a quadratic program in a library's format, options, the answer.
 
 Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms), so an adapter does
-not depend on it. Relative tolerances are 0 if a library has them separately, and the absolute ones are the
-requested tolerance, in the library's own units: N for Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the
-duality gap.
+not depend on it; it only tells sparse blocks of P from dense ones. Relative tolerances are 0 if a library has
+them separately, and the absolute ones are the requested tolerance, in the library's own units: N for
+Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the duality gap. The sparse form is handed over in balanced
+units (balanced.py), in which the tolerance is meant as well; the details of the answer say so.
 """
 
 from __future__ import annotations
@@ -17,25 +18,58 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import LoadCase, Matrix, Vector
 
-from .base import Answer, Problem, Status
+from .balanced import Units
+from .base import Answer, Problem, Status, WarmStart
 
 
 @dataclass(frozen=True)
 class Converted:
-    """P and G in a library's format; G is None if z ≥ 0 are passed as the library's bounds."""
+    """P and G in a library's format; G is None if z ≥ 0 are passed as the library's bounds.
+
+    problem : as the library is given it. units : its balanced units; None if it is in those of the scene.
+    """
 
     problem: Problem
     P: Any
     G: Any = None
+    units: Units | None = None
+
+    def vectors(self, load: LoadCase) -> tuple[Vector, Vector | None]:
+        """q and h; h is None if bounds replace it."""
+        own = load if self.units is None else self.units.load(load)
+        return self.problem.q(own), self.problem.h(own)
+
+    def gap_tolerance(self, tolerance: float, load: LoadCase) -> float:
+        """For the duality gap, in the library's units."""
+        return tolerance if self.units is None else self.units.gap_tolerance(tolerance, load)
+
+    def start(self, start: WarmStart, load: LoadCase) -> tuple[Vector | None, Vector]:
+        """(z, multipliers) from which to solve this load case."""
+        own = start if self.units is None else self.units.start(start, load)
+        return self.problem.start(own.lam, own.gap, own.x)
 
     def answer(
-        self, status: Status, tolerance: float, z: Vector, multipliers: Vector | None, **facts: Any
+        self,
+        status: Status,
+        load: LoadCase,
+        tolerance: float,
+        z: Vector,
+        multipliers: Vector | None,
+        **facts: Any,
     ) -> Answer:
         """The answer of a solution z and the multipliers of its rows, if there are rows."""
         lam, x = self.problem.answer(z, multipliers)
-        return Answer("failed", None, **facts) if lam is None else answer(status, tolerance, lam, x, **facts)
+        if lam is None:
+            return self.failed(load, **facts)
+        found = answer(status, tolerance, lam, x, **facts)
+        return found if self.units is None else self.units.answer(found, load)
+
+    def failed(self, load: LoadCase, **facts: Any) -> Answer:
+        """An answer without forces."""
+        found = Answer("failed", None, **facts)
+        return found if self.units is None else self.units.answer(found, load)
 
 
 def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = None, **facts: Any) -> Answer:
@@ -52,7 +86,7 @@ def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = Non
 
 def unknowns(problem: Problem) -> int:
     """The length of z."""
-    return sum(len(block) for block in problem.blocks)
+    return sum(block.shape[0] for block in problem.blocks)
 
 
 def rows_for_bounds(problem: Problem, sign: float) -> sp.csc_matrix:
@@ -63,9 +97,11 @@ def rows_for_bounds(problem: Problem, sign: float) -> sp.csc_matrix:
 def upper_triangle(blocks: Sequence[Matrix]) -> sp.csc_matrix:
     """Upper triangle of blockdiag(blocks), CSC with 32-bit indices, sorted.
 
-    The blocks are symmetric, so the columns of the upper triangle are the rows of the lower one,
-    which lie contiguous in memory.
+    The blocks are symmetric, so the columns of the upper triangle of a dense one are the rows of the lower
+    one, which lie contiguous in memory.
     """
+    if is_sparse(blocks):
+        return sorted_csc(sp.block_diag([sp.triu(block) for block in blocks]))
     data, indices, counts, offset = [], [], [], 0
     for block in blocks:
         size = len(block)
@@ -79,8 +115,21 @@ def upper_triangle(blocks: Sequence[Matrix]) -> sp.csc_matrix:
     return sp.csc_matrix((np.concatenate(data), np.concatenate(indices), indptr), shape=(offset, offset))
 
 
+def is_sparse(blocks: Sequence[Matrix]) -> bool:
+    """Whether these are SciPy's sparse arrays, as in the sparse form."""
+    return sp.issparse(blocks[0])
+
+
+def sorted_csc(M: Any) -> sp.csc_matrix:
+    """CSC with 32-bit indices, each column's rows in order."""
+    found = sp.csc_matrix(M)
+    found.sort_indices()
+    indices, indptr = found.indices.astype(np.int32), found.indptr.astype(np.int32)
+    return sp.csc_matrix((found.data, indices, indptr), shape=found.shape)
+
+
 def dense(blocks: Sequence[Matrix]) -> Matrix:
-    """blockdiag(blocks) as a dense array in Fortran order. No copy of a single C-ordered block."""
+    """blockdiag(blocks) of dense blocks in Fortran order. No copy of a single C-ordered block."""
     whole = blocks[0] if len(blocks) == 1 else sla.block_diag(*blocks)
     return whole.T  # symmetric
 

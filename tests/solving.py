@@ -28,7 +28,7 @@ def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[An
     load = LoadCase(case.f, case.g, prepared.dual_load(case))
     state = solver.prepare(solver.convert(in_form(prepared, form)))
     answer = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
-    if answer.lam is None or form == "primal":
+    if answer.lam is None or form != "dual":
         return answer, answer.x
     return answer, prepared.recover(answer.lam, case)
 

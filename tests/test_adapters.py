@@ -6,16 +6,18 @@ from typing import Any
 import clarabel
 import cvxpy as cp
 import numpy as np
+import piqp
 import pytest
 import qpsolvers
 import scipy.linalg as sla
 import scipy.sparse as sp
+from proxsuite import proxqp
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.conformance.check import run
 from problems.forms.problem import in_form
 from solvers.adapter import answer, dense, upper_triangle
-from solvers.base import FORMS, Form
+from solvers.base import DENSE_FORMS, FORMS, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
 from solvers.libraries.clarabel import Clarabel
 from solvers.libraries.osqp import Osqp
@@ -33,6 +35,8 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("proxqp", {"backend": "primal_dual_ldlt"}),
     ("piqp", {"backend": "sparse"}),
 ]
+#: The tolerance handed over; in balanced units the loads and gaps here are a hundredth in size.
+TOLERANCES: dict[Form, float] = {"primal": 1e-9, "dual": 1e-9, "sparse": 1e-10}
 CASES = [(name, options, form) for name, options in VARIANTS for form in FORMS]
 
 
@@ -55,15 +59,15 @@ def test_agrees_with_nnls(name: str, options: dict[str, Any], form: Form, kind: 
         "parts and tool": lambda: make_prepared(2, 20, 5),
         "strips": lambda: make_strips(40),
     }[kind]()
-    solver = make_solver(name, options)
+    solver, tolerance = make_solver(name, options), TOLERANCES[form]
     state = solver.prepare(solver.convert(in_form(prepared, form)))
     for seed in (3, 4):
         case, load = make_load(seed, prepared)
         expected_x, expected_lam = solve_by_nnls(prepared, case)
         assert 0 < np.count_nonzero(expected_lam) < prepared.assembly.m  # a case with a real choice
-        got = solver.solve(solver.setup(state, load, 1e-9), load, 1e-9)
+        got = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
         assert got.lam is not None
-        x = got.x if form == "primal" else prepared.recover(got.lam, case)
+        x = got.x if form != "dual" else prepared.recover(got.lam, case)
         assert x is not None
         np.testing.assert_allclose(x, expected_x, rtol=0, atol=1e-8)
         np.testing.assert_allclose(got.lam, expected_lam, rtol=0, atol=1e-3)
@@ -113,6 +117,10 @@ def library_of(solver: Any, form: Form, tolerance: float) -> Any:
     return solver.setup(solver.prepare(solver.convert(in_form(prepared, form))), load, tolerance)[1]
 
 
+#: What is asked for the duality gap: τ N·mm, in balanced units τ/u², and u is 32 (N·mm)^½ in library_of.
+GAP: dict[Form, float] = {"primal": 3e-7, "dual": 3e-7, "sparse": 3e-7 / 32**2}
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_settings_that_osqp_holds(form: Form) -> None:
     settings = library_of(Osqp(polishing=True), form, 3e-7).settings
@@ -125,13 +133,13 @@ def test_settings_that_osqp_holds(form: Form) -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_settings_that_clarabel_holds(form: Form) -> None:
     settings = library_of(Clarabel(direct_solve_method="qdldl"), form, 3e-7).get_settings()
-    assert (settings.tol_feas, settings.tol_gap_abs, settings.tol_gap_rel) == (3e-7, 3e-7, 0.0)
+    assert (settings.tol_feas, settings.tol_gap_abs, settings.tol_gap_rel) == (3e-7, GAP[form], 0.0)
     assert settings.direct_solve_method == "qdldl"
     assert settings.equilibrate_enable is (form == "primal")
     assert settings.max_threads == 0  # the environment decides
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", DENSE_FORMS)
 def test_settings_that_proxqp_holds(form: Form) -> None:
     library = library_of(ProxQp(backend="primal_ldlt"), form, 3e-7)
     settings = library.settings
@@ -142,12 +150,23 @@ def test_settings_that_proxqp_holds(form: Form) -> None:
     assert library.which_dense_backend().name == "PrimalLDLT"
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_settings_that_piqp_holds(form: Form) -> None:
-    settings = library_of(Piqp(), form, 3e-7).settings
+def test_settings_that_proxqp_holds_in_the_sparse_form() -> None:
+    library = library_of(ProxQp(), "sparse", 3e-7)
+    settings = library.settings
+    assert isinstance(library, proxqp.sparse.QP)
     assert (settings.eps_abs, settings.eps_rel) == (3e-7, 0.0)
     assert settings.check_duality_gap
-    assert (settings.eps_duality_gap_abs, settings.eps_duality_gap_rel) == (3e-7, 0.0)
+    assert (settings.eps_duality_gap_abs, settings.eps_duality_gap_rel) == (GAP["sparse"], 0.0)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_settings_that_piqp_holds(form: Form) -> None:
+    library = library_of(Piqp(), form, 3e-7)
+    settings = library.settings
+    assert isinstance(library, piqp.SparseSolver if form == "sparse" else piqp.DenseSolver)
+    assert (settings.eps_abs, settings.eps_rel) == (3e-7, 0.0)
+    assert settings.check_duality_gap
+    assert (settings.eps_duality_gap_abs, settings.eps_duality_gap_rel) == (GAP[form], 0.0)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -162,7 +181,7 @@ def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy(name: str, form:
         state = solver.prepare(solver.convert(in_form(prepared, form)))
         got = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
         assert got.lam is not None
-        x = got.x if form == "primal" else prepared.recover(got.lam, case)
+        x = got.x if form != "dual" else prepared.recover(got.lam, case)
         errors.append(np.abs(x - expected_x).max())
         iterations.append(got.iterations)
     assert iterations[0] < iterations[1]

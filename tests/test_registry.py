@@ -21,7 +21,7 @@ def test_solvers_are_found_by_their_files() -> None:
     """In-house ones first, then the libraries, then what qpsolvers finds."""
     assert list(modules()) == ["gi", "ipm", "ipm-fast", "newton", *sorted(LIBRARIES)]
     assert NAMES[: len(modules())] == list(modules())
-    assert {"quadprog", "daqp"} <= set(NAMES)
+    assert {"quadprog", "daqp", "qpalm"} <= set(NAMES)
     assert len(NAMES) == len(set(NAMES))
     assert [name for name in NAMES if in_house(name)] == ["gi", "ipm", "ipm-fast", "newton"]
 

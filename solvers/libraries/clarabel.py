@@ -7,7 +7,8 @@ In the dual form, Q has eigenvalues down to 1e-5 mm/N, and the objective is abou
 error of 1e-8. Clarabel's equilibration and its regularisation of 1e-8 then cost accuracy (at n = 4386 it
 fails, or ends as `AlmostSolved` with an error of about 1e-5 mm). Without the former, and with 1e-12 for the
 latter, it ends as `Solved` within 1e-10 mm on three such problems; on seven smaller ones the largest error
-was 8e-8 mm. The settings were chosen on these problems. The primal form keeps the defaults.
+was 8e-8 mm. The settings were chosen on these problems. The primal form keeps the defaults, and
+so does the sparse one but for the equilibration, which balanced units replace (solvers/balanced.py).
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ import clarabel
 import numpy as np
 
 from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
-from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.balanced import balanced
+from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",
@@ -32,33 +34,41 @@ class Clarabel(Solver):
     "auto" would choose qdldl for them.
     """
 
+    forms = FORMS
+
     def __init__(self, *, direct_solve_method: str = "faer") -> None:
         choice("clarabel", "direct_solve_method", direct_solve_method, ("faer", "qdldl", "auto"))
         self.direct_solve_method = direct_solve_method
 
     def convert(self, problem: Problem) -> Converted:
-        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0))
+        problem, units = balanced(problem)
+        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0), units)
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
+        q, h = state.vectors(load)
+        h = np.zeros(state.G.shape[0]) if h is None else h
+        cones = [clarabel.NonnegativeConeT(len(h))]
+        settings = self._settings(state, load, tolerance)
+        return state, clarabel.DefaultSolver(state.P, q, state.G, h, cones, settings)
+
+    def _settings(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_iter = 500
         settings.direct_solve_method = self.direct_solve_method
         settings.tol_feas = tolerance
-        settings.tol_gap_abs = tolerance
+        settings.tol_gap_abs = state.gap_tolerance(tolerance, load)
         settings.tol_gap_rel = 0.0
+        settings.equilibrate_enable = state.units is None and not state.problem.bounded
         if state.problem.bounded:
-            settings.equilibrate_enable = False
             settings.static_regularization_constant = 1e-12
-        h = state.problem.h(load)
-        h = np.zeros(state.G.shape[0]) if h is None else h
-        cones = [clarabel.NonnegativeConeT(len(h))]
-        return state, clarabel.DefaultSolver(state.P, state.problem.q(load), state.G, h, cones, settings)
+        return settings
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """Clarabel's update of the vectors, with the equilibration kept; it has no warm start."""
-        h = state.problem.h(load)
-        ready[1].update(q=state.problem.q(load), **({} if h is None else {"b": h}))
+        q, h = state.vectors(load)
+        settings = self._settings(state, load, tolerance)
+        ready[1].update(q=q, settings=settings, **({} if h is None else {"b": h}))
         return ready
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
@@ -66,6 +76,7 @@ class Clarabel(Solver):
         result = library.solve()
         return state.answer(
             STATUS.get(str(result.status), "failed"),
+            load,
             tolerance,
             np.array(result.x),
             np.array(result.z),

@@ -1,8 +1,8 @@
 """OSQP: the alternating direction method of multipliers, https://osqp.org.
 
-Stops when ‖Aᵀx − s‖∞ and ‖Kx − f + Aλ‖∞ (primal form), or ‖λ − s‖∞ and ‖Qλ − p − w‖∞ (dual form), and
-the duality gap are below the tolerance. ρ is adapted every 50 iterations and never by the clock, so the
-iteration count does not depend on the machine.
+Stops when ‖Aᵀx − s‖∞ and ‖Kx − f + Aλ‖∞ (primal form; sparse form, in balanced units), or ‖λ − s‖∞ and
+‖Qλ − p − w‖∞ (dual form), and the duality gap are below the tolerance. ρ is adapted every 50 iterations and
+never by the clock, so the iteration count does not depend on the machine.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 import osqp
 
 from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
-from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.balanced import balanced
+from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 STATUS: dict[int, Status] = {
     int(osqp.SolverStatus.OSQP_SOLVED): "solved",
@@ -29,21 +30,24 @@ class Osqp(Solver):
     still report solved (its issue 790); if its own residuals exceed the tolerance, the status is inaccurate.
     """
 
+    forms = FORMS
+
     def __init__(self, *, polishing: bool = False) -> None:
         choice("osqp", "polishing", polishing, (False, True))
         self.polishing = polishing
 
     def convert(self, problem: Problem) -> Converted:
-        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, 1.0))
+        problem, units = balanced(problem)
+        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, 1.0), units)
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        h = state.problem.h(load)
+        q, h = state.vectors(load)
         free = np.full(state.G.shape[0], np.inf)
         bounds = (np.zeros_like(free), free) if h is None else (-free, h)
         library = osqp.OSQP()
         library.setup(
             state.P,
-            state.problem.q(load),
+            q,
             state.G,
             *bounds,
             eps_abs=tolerance,
@@ -60,8 +64,8 @@ class Osqp(Solver):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """OSQP.update and warm_start; the factors and the last ρ are kept."""
         _, library = ready
-        h, (z, multipliers) = state.problem.h(load), state.problem.start(start.lam, start.gap, start.x)
-        library.update(q=state.problem.q(load), **({} if h is None else {"u": h}))
+        (q, h), (z, multipliers) = state.vectors(load), state.start(start, load)
+        library.update(q=q, **({} if h is None else {"u": h}))
         # OSQP's multipliers of lower bounds are negative.
         library.warm_start(x=z, y=-np.maximum(multipliers, 0.0) if state.problem.bounded else multipliers)
         return ready
@@ -76,6 +80,7 @@ class Osqp(Solver):
             status = "inaccurate"
         return state.answer(
             status,
+            load,
             tolerance,
             result.x,
             result.y,

@@ -1,7 +1,7 @@
 """ProxQP of ProxSuite: a proximal augmented Lagrangian method, https://github.com/Simple-Robotics/proxsuite.
 
-Dense backend. Stops when the unscaled ∞-norms of both residuals and the duality gap are below the
-tolerance. The dual form uses its box constraints, so no rows are formed.
+The sparse backend in the sparse form, else the dense one. Stops when the unscaled ∞-norms of both residuals
+and the duality gap are below the tolerance. The dual form uses its box constraints, so no rows are formed.
 """
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from proxsuite import proxqp
 
-from solvers.adapter import Converted, choice, dense
-from solvers.base import Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.adapter import Converted, choice, dense, is_sparse, upper_triangle
+from solvers.balanced import balanced
+from solvers.base import DENSE_FORMS, FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 
 BACKENDS = {
     "automatic": proxqp.dense.DenseBackend.Automatic,
@@ -28,25 +30,35 @@ INFINITY = 1e20  # ProxQP's value for no bound
 
 
 class ProxQp(Solver):
-    """backend : which matrix it factors; "automatic" decides by the sizes."""
+    """backend : which matrix the dense backend factors; "automatic" decides by the sizes. Only "automatic"
+    takes the sparse form.
+    """
 
     distribution = "proxsuite"
 
     def __init__(self, *, backend: str = "automatic") -> None:
         choice("proxqp", "backend", backend, tuple(BACKENDS))
         self.backend = backend
+        self.forms = FORMS if backend == "automatic" else DENSE_FORMS  # type: ignore[misc]  # of this solver alone
 
     def convert(self, problem: Problem) -> Converted:
+        problem, units = balanced(problem)
         G = problem.G
+        if is_sparse(problem.blocks):
+            return Converted(problem, upper_triangle(problem.blocks), sp.csc_matrix(G), units)
         return Converted(problem, dense(problem.blocks), None if G is None else G.toarray())
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        q, h = state.problem.q(load), state.problem.h(load)
+        q, h = state.vectors(load)
         rows = 0 if h is None else len(h)
-        backend = BACKENDS[self.backend]
-        library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
+        if sp.issparse(state.P):
+            library = proxqp.sparse.QP(len(q), 0, rows)
+        else:
+            backend = BACKENDS[self.backend]
+            library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
         settings = library.settings
-        settings.eps_abs = settings.eps_duality_gap_abs = tolerance
+        settings.eps_abs = tolerance
+        settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
         settings.check_duality_gap = True
         settings.max_iter = 100_000
@@ -65,14 +77,15 @@ class ProxQp(Solver):
         before, even if another is nearer.
         """
         _, library, _ = ready
-        h = state.problem.h(load)
+        q, h = state.vectors(load)
+        library.settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
         if h is None:
             library.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
-            library.update(g=state.problem.q(load))
+            library.update(g=q)
             return state, library, ()
         library.settings.initial_guess = proxqp.InitialGuess.WARM_START
-        library.update(g=state.problem.q(load), u=h)
-        z, multipliers = state.problem.start(start.lam, start.gap, start.x)
+        library.update(g=q, u=h)
+        z, multipliers = state.start(start, load)
         return state, library, (z, np.zeros(0), multipliers)
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
@@ -81,6 +94,7 @@ class ProxQp(Solver):
         result, info = library.results, library.results.info
         return state.answer(
             STATUS.get(info.status, "failed"),
+            load,
             tolerance,
             result.x,
             result.z,

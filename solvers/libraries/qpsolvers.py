@@ -2,6 +2,9 @@
 
 The matrices go through qpsolvers.Problem, λ comes back through Solution.z (primal form) or Solution.x
 (dual form).
+
+Those with a sparse interface take the sparse form. HiGHS does so for small models only: its active-set method
+keeps a dense matrix of the order of the free unknowns.
 """
 
 from __future__ import annotations
@@ -15,8 +18,9 @@ import scipy.sparse as sp
 from qpsolvers.exceptions import QPError
 
 from problems.errors import InputError
-from solvers.adapter import Converted, dense
-from solvers.base import Answer, LoadCase, Problem, Solver
+from solvers.adapter import Converted, dense, sorted_csc
+from solvers.balanced import balanced
+from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
 
 #: Options that set the absolute tolerance. Relative tolerances are 0, iteration limits too large to matter.
 #: DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes no tolerance below 1e-10; by default it
@@ -28,6 +32,7 @@ TOLERANCE: dict[str, Callable[[float], dict[str, Any]]] = {
         "dual_feasibility_tolerance": max(tol, 1e-10),
         "qp_regularization_value": 0.0,
     },
+    "qpalm": lambda tol: {"eps_abs": tol, "eps_rel": 0.0, "eps_rel_in": 0.0, "max_iter": 1_000_000},
     "scs": lambda tol: {"eps_abs": tol, "eps_rel": 0.0, "max_iters": 10_000_000},
 }
 
@@ -44,18 +49,21 @@ class QpSolvers(Solver):
             found = ", ".join(qpsolvers.available_solvers)
             raise InputError.one("qpsolvers", "solver", name, f"one of those it finds: {found}")
         self.name = name
+        if name in qpsolvers.sparse_solvers:
+            self.forms = FORMS  # type: ignore[misc]  # of this solver alone
 
     def convert(self, problem: Problem) -> Converted:
+        problem, units = balanced(problem)
         G = problem.G
         # Copies, because some of these solvers refuse read-only arrays.
         if self.name in qpsolvers.dense_solvers:
             P = np.array(dense(problem.blocks), order="C")
             return Converted(problem, P, None if G is None else G.toarray(order="C"))
         P = sp.block_diag([sp.csc_matrix(block) for block in problem.blocks], format="csc")
-        return Converted(problem, sp.csc_matrix(P), None if G is None else sp.csc_matrix(G))
+        return Converted(problem, sorted_csc(P), None if G is None else sorted_csc(G), units)
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        q, h = state.problem.q(load), state.problem.h(load)
+        q, h = state.vectors(load)
         limits = {"lb": np.zeros_like(q)} if h is None else {"G": state.G, "h": np.array(h)}
         return state, qpsolvers.Problem(state.P, q, **limits)
 
@@ -67,14 +75,16 @@ class QpSolvers(Solver):
         try:
             solution = qpsolvers.solve_problem(problem, self.name, **settings)
         except QPError as error:
-            return Answer("failed", None, details={**details, "message": str(error)})
+            return state.failed(load, details={**details, "message": str(error)})
         if solution.x is None or (not state.problem.bounded and (solution.z is None or not solution.z.size)):
-            return Answer("failed", None, details=details)
-        iterations = solution.extras.get("iterations", solution.extras.get("iter"))
+            return state.failed(load, details=details)
+        facts = solution.extras
+        iterations = facts.get("iterations", facts.get("iter", getattr(facts.get("info"), "iter", None)))
         if isinstance(iterations, np.ndarray):  # quadprog: constraints added, constraints dropped
             iterations = int(iterations.sum())
         return state.answer(
             "solved" if solution.found else "failed",
+            load,
             tolerance,
             solution.x,
             solution.z,
