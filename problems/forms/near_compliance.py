@@ -13,6 +13,7 @@ from .near_inverse import NearInverse, Rows, near_inverse
 from .sparse_factor import BandFactor, Renumbered
 
 FURTHEST = 20  # half-bandwidths between the contacts of a window
+SMALL = 2000  # unknowns between them that are never too many
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def near_compliance(
         for contacts in windows:
             used = places[:, contacts][values[:, contacts] != 0]
             reach = max(reach, int(np.ptp(used)) if used.size else 0)
-        if reach > FURTHEST * len(factor.L):
+        if reach > max(FURTHEST * len(factor.L), SMALL):
             return None
         rows = np.unique(A.indices).astype(np.intp)
         inverse = near_inverse(factor, rows, reach)
