@@ -41,7 +41,7 @@ class _OfBlock:
 
 @dataclass(frozen=True)
 class NearCompliance:
-    """Q_WW for the windows W that it was made for, to about six digits."""
+    """Q_WW for the windows W that it was made for."""
 
     blocks: tuple[_OfBlock, ...]
 
@@ -54,9 +54,15 @@ class NearCompliance:
 
 
 def near_compliance(
-    assembly: Assembly, factors: Sequence[BandFactor | Renumbered], windows: Sequence[Rows]
+    assembly: Assembly,
+    factors: Sequence[BandFactor | Renumbered],
+    windows: Sequence[Rows],
+    single: bool = True,
 ) -> NearCompliance | None:
-    """Of the contacts in each window; None if those of one are too far apart in the numbering of a band."""
+    """Of the contacts in each window, in single or double precision.
+
+    None if those of a window are too far apart in the numbering of a band.
+    """
     made = []
     for found, unknowns in zip(factors, assembly.slices, strict=True):
         A, factor = sp.csc_array(assembly.A[unknowns]), found
@@ -70,7 +76,7 @@ def near_compliance(
         if reach > max(FURTHEST * len(factor.L), SMALL):
             return None
         rows = np.unique(A.indices).astype(np.intp)
-        inverse = near_inverse(factor, rows, reach)
+        inverse = near_inverse(factor, rows, reach, single)
         made.append(_OfBlock(inverse, np.searchsorted(rows, places), values))
     return NearCompliance(tuple(made))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -107,32 +108,32 @@ class SparsePrepared(Prepared):
 
         return WithContacts(replace(self.assembly, A=A))
 
-    def near_compliance(self, windows: Sequence[Rows]) -> NearCompliance | None:
+    def near_compliance(self, windows: Sequence[Rows], single: bool = True) -> NearCompliance | None:
         """Q_WW of windows of contacts to four digits, for a preconditioner; None without band factors."""
         like = SparsePrepared(self.coarser()) if self.coarser else self
-        bands = [factor for factor in like.sparse_factors if isinstance(factor, BandFactor | Renumbered)]
+        bands = [each for each in like.sparse_factors if isinstance(each, BandFactor | Renumbered)]
         if len(bands) < len(like.sparse_factors):
             return None
-        return near_compliance(like.assembly, bands, windows)
+        return near_compliance(like.assembly, bands, windows, single)
 
     @cached_property
     def approximate_inverse(self) -> ApproximateInverse | None:
-        """M ≈ Q⁻¹ with a narrow band, and about the diagonal of Q; None where K has no band, or where some
-        Q_WW is not positive definite in single precision.
+        """M ≈ Q⁻¹ with a narrow band, and about the diagonal of Q; None where K has no band.
+
+        In single precision; in double where some Q_WW is not positive definite in that.
         """
-        assembly = self.assembly
         windows = self._windows()
-        near = self.near_compliance(windows.contacts())
-        if near is None:
-            return None
-        diagonal = np.empty(assembly.m)
-        for _, start, stop in windows.ranges():
-            line = windows.order[start:stop]
-            diagonal[line] = np.diag(near.submatrix(line))
-        try:
-            return ApproximateInverse(of_windows(windows, near.submatrix), diagonal)
-        except np.linalg.LinAlgError:
-            return None
+        for single in (True, False):
+            near = self.near_compliance(windows.contacts(), single)
+            if near is None:
+                return None
+            diagonal = np.empty(self.assembly.m)
+            for _, start, stop in windows.ranges():
+                line = windows.order[start:stop]
+                diagonal[line] = np.diag(near.submatrix(line))
+            with suppress(np.linalg.LinAlgError):
+                return ApproximateInverse(of_windows(windows, near.submatrix), diagonal)
+        return None
 
     def _windows(self) -> Windows:
         """Along the joint; without coordinates along the bands, a line of contacts per half-bandwidth."""
