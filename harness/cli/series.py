@@ -121,7 +121,7 @@ def series(
         before = read_series(out)["identity"]["form"] if (out / SERIES).is_file() else None
         asked: Any = form.value if form else before if before in made.forms else None
         count = swept(read, sweep).count if sweep else cases or 100
-        road = chosen_form(read, made.forms, asked, count)
+        road = chosen_form(read, made.forms, asked, count, made.in_house)
         if road.why:
             console.print(f"In the sparse form, without condensation: {road.why}.", style="dim")
         taken: Any = road.form

@@ -26,10 +26,15 @@ class Choice:
     why: str = ""
 
 
-def chosen_form(scene: Scene, taken: Sequence[Form], asked: Form | None, cases: int = 1) -> Choice:
-    """The form asked for, else the cheaper one of those that a solver takes. Raises InputError."""
+def chosen_form(
+    scene: Scene, taken: Sequence[Form], asked: Form | None, cases: int = 1, in_house: bool = True
+) -> Choice:
+    """The form asked for, else the cheaper one of those that a solver takes. Raises InputError.
+
+    in_house : whether the estimates hold for the solver; a library takes the sparse form if no other fits.
+    """
     if asked is None:
-        return cheaper(scene, taken, cases)
+        return cheaper(scene, taken, cases, in_house)
     if asked not in taken:
         raise InputError.one("--form", "form", asked, f"the solver takes {' and '.join(taken)}")
     if asked in DENSE_FORMS:
@@ -37,7 +42,7 @@ def chosen_form(scene: Scene, taken: Sequence[Form], asked: Form | None, cases: 
     return Choice(asked)
 
 
-def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1) -> Choice:
+def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1, in_house: bool = True) -> Choice:
     """The form for some load cases, of those that a solver takes; estimated, from the scene alone.
 
     Raises InputError if the only form that this machine's memory could hold is not among them.
@@ -55,7 +60,7 @@ def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1) -> Choice:
         instead = "" if sparse.peak_mib > physical else "; `newton` takes the sparse form, which would fit"
         allowed = f"fewer nodes: {why}, this machine has {physical} MiB{instead}"
         raise InputError.one(scene.name, "junction.nodes", nodes, allowed)
-    if "sparse" not in taken or usual == "sparse" or sparse.peak_mib > physical:
+    if not in_house or "sparse" not in taken or usual == "sparse" or sparse.peak_mib > physical:
         return Choice(usual)
     build_s = 0.0 if built(scene) else condensed.build_s
     per_case = (2 * SWEEPS * condensed.m**2 + 2 * PRODUCTS * condensed.n**2) / FLOPS_PER_S

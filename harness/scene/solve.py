@@ -93,7 +93,8 @@ def solve(
         scene = read_scene(source)
     chosen = _solver(solver) if solver else None
     with steps.step("choosing the form"):
-        road = chosen_form(scene, chosen.forms if chosen else FORMS, form)
+        taken = chosen.forms if chosen else FORMS
+        road = chosen_form(scene, taken, form, in_house=solver is None or _in_house(solver))
     if road.why:
         console.print(f"In the sparse form, without condensation: {road.why}.", style="dim")
     with steps.step("matrices"):
@@ -164,6 +165,12 @@ def _solver(name: str) -> Solver:
     from solvers.registry import make_solver  # slow to import: not without a solver
 
     return make_solver(name, {})
+
+
+def _in_house(name: str) -> bool:
+    from solvers.registry import in_house
+
+    return in_house(name)
 
 
 def _answer(
