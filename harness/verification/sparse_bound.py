@@ -31,7 +31,8 @@ from .independence import independence
 from .length import length
 
 SAFE = 1.01  # for the rounding of the bounds themselves
-MAX_STEPS = 20
+MAX_STEPS = 30
+MAX_WORSE = 3  # steps in a row that improve nothing
 ENOUGH_MM = 1e-10  # a bound that needs no further step
 
 
@@ -75,15 +76,15 @@ class SparseBound:
         """From forces λ (m,) N."""
         lam = np.maximum(lam, 0.0)
         state = _State(self.prepared, load, lam)
-        C, best = lam > 0, None
+        C, best, worse = lam > 0, None, 0
         for _ in range(MAX_STEPS):
             y = state.s.value
             C = (C & (state.lam.hi > 0)) | (y < -state.s.error)
             bound = self._bound(state, C)
-            if best is not None and not bound < best.bound_mm / 2:
-                break
-            best = Proven(state.x, state.lam, state.lam.hi > 0, bound)
-            if bound <= ENOUGH_MM:
+            worse = 0 if best is None or bound < best.bound_mm else worse + 1
+            if not worse:
+                best = Proven(state.x, state.lam, state.lam.hi > 0, bound)
+            if bound <= ENOUGH_MM or worse == MAX_WORSE:
                 break
             state.move(_correction(self.M, C, y, state.lam.hi))
         assert best is not None

@@ -20,6 +20,9 @@ from .near_inverse import Rows
 from .prepared import MIB, Prepared
 from .sparse_factor import BandFactor, Factor, GeneralFactor, NotPositiveDefinite, Renumbered, factored
 
+SAMPLE = 3  # contacts, for the size of Q
+SINGLE_BITS = 18  # of cond(Q_WW): more are lost in float32
+
 
 @dataclass(frozen=True)
 class ApproximateInverse:
@@ -123,7 +126,7 @@ class SparsePrepared(Prepared):
         In single precision; in double where some Q_WW is not positive definite in that.
         """
         windows = self._windows()
-        for single in (True, False):
+        for single in (True, False) if self._single_might_do() else (False,):
             near = self.near_compliance(windows.contacts(), single)
             if near is None:
                 return None
@@ -134,6 +137,14 @@ class SparsePrepared(Prepared):
             with suppress(np.linalg.LinAlgError):
                 return ApproximateInverse(of_windows(windows, near.submatrix), diagonal)
         return None
+
+    def _single_might_do(self) -> bool:
+        """Whether float32 can tell λmin(Q_WW), no less than about 1/K_ii, from zero beside q_ii."""
+        A, some = self.assembly.A, np.linspace(0, max(self.assembly.m - 1, 0), SAMPLE).astype(int)
+        columns = A[:, some]
+        q = (columns * self.solve_K(columns.toarray())).sum(axis=0)
+        stiffest = self.assembly.diagonal_K()[columns.indices].max(initial=0.0)
+        return bool(q.max(initial=0.0) * stiffest < 2.0**SINGLE_BITS)
 
     def _windows(self) -> Windows:
         """Along the joint; without coordinates along the bands, a line of contacts per half-bandwidth."""

@@ -49,7 +49,7 @@ class Case:
 
     load : the case as it was given. p : (m,) mm. C : its contact set. trial : λ (m,) N and y = Qλ − p (m,)
     mm. factor : of M on the open set. settled : no sign is wrong, and |y_C| is far below the tolerance or
-    within rounding.
+    within rounding. stalled : the last sweeps that did not halve |y_C|.
     """
 
     load: LoadCase
@@ -58,6 +58,7 @@ class Case:
     trial: TrialSolution
     factor: BandFactor | None = None
     settled: bool = False
+    stalled: int = 0
     sweeps: int = 0
     sets: int = 0
 
@@ -106,12 +107,13 @@ class BatchedSweeps:
         """y = Qλ − p, (m, k) mm, of forces λ (m, k) for that many loads."""
         return products(self.Q, lam) - np.column_stack([load.p for load in loads])
 
-    def settled(self, case: Case, tolerance: float, stagnating: bool) -> bool:
-        """Whether |y_C| is far below the tolerance or within rounding."""
-        rounding = case.trial.rounding
-        return rounding <= max(RESIDUAL_TARGET * tolerance, _rounding_bound(case.p, case.trial.y)) or (
-            stagnating and rounding <= tolerance
-        )
+    def enough(self, case: Case, tolerance: float, stagnating: bool) -> float:
+        """The KKT residual, mm, that ends the sweeps of a case: −1 as long as |y_C| is neither far below the
+        tolerance nor within rounding.
+        """
+        rounding, bound = case.trial.rounding, _rounding_bound(case.p, case.trial.y)
+        small = rounding <= max(RESIDUAL_TARGET * tolerance, bound) or (stagnating and rounding <= tolerance)
+        return max(tolerance, bound) if small else -1.0
 
     def pay(self, cases: Sequence[Case]) -> bool:
         """Whether sweeps settle such cases, and faster than case by case."""
@@ -141,12 +143,12 @@ class BatchedSweeps:
         """Take λ and y, and decide whether the case is settled."""
         rounding = float(abs(y[case.C]).max(initial=0.0))
         stagnating = rounding > case.trial.rounding / 2
+        case.stalled = case.stalled + 1 if stagnating else 0
         case.trial, case.sweeps = TrialSolution(lam, y, rounding), case.sweeps + 1
-        if self.settled(case, tolerance, stagnating):
-            right = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
-            residual = max(rounding, float(-y.min(initial=0.0))) + _cut_off(lam, compliance)
-            # Else the answer would be inaccurate.
-            case.settled = right and residual <= max(tolerance, _rounding_bound(case.p, y))
+        right = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
+        residual = max(rounding, float(-y.min(initial=0.0))) + _cut_off(lam, compliance)
+        # Of a case with a larger residual the answer would be inaccurate.
+        case.settled = right and residual <= self.enough(case, tolerance, stagnating)
 
     def answer(self, case: Case, load: LoadCase, tolerance: float) -> Answer:
         """The answer of a case; one that is unsettled is solved from its set."""

@@ -28,6 +28,7 @@ from .contact_sets import TrialSolution
 from .solve import solve_from
 
 MAX_SWEEPS = 100
+STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve |y_C|, at an |y_C| that can be rounding
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,16 @@ class SparseState:
         """The answer with x."""
         given = self._with_p([load])[0]
         if self.sweeps is None:
-            answer = self.by_sets(None, given, tolerance)
-        elif self.start is None:
-            answer = self.sweeps.answer(self.sweeps.cold(given, tolerance), given, tolerance)
+            return self._with_x([self.by_sets(None, given, tolerance)], [load], tolerance)[0]
+        if self.start is None:
+            case = self.sweeps.cold(given, tolerance)
         else:
-            solved = self._solved(self.start, self.sweeps.M.order)
-            answer = self.sweeps.answer(self.sweeps.warm(solved, given, tolerance), given, tolerance)
-        return self._with_x([answer], [load], tolerance)[0]
+            case = self.sweeps.warm(self._solved(self.start, self.sweeps.M.order), given, tolerance)
+        (answer,) = self._with_x([self.sweeps.answer(case, given, tolerance)], [load], tolerance)
+        if answer.status == "solved" or answer.lam is None or not case.settled:
+            return answer
+        (other,) = self._with_x([self.by_sets(answer.lam > 0, given, tolerance)], [load], tolerance)
+        return min(answer, other, key=lambda each: each.details["kkt_residual_mm"])
 
     def batched(self) -> Batch | None:
         if self.sweeps is None:
@@ -141,11 +145,14 @@ class SparseSweeps(BatchedSweeps):
         assert self.prepared is not None
         return gaps(self.prepared, lam, loads)
 
-    def settled(self, case: Case, tolerance: float, stagnating: bool) -> bool:
-        """Far below the tolerance; or no longer smaller, and below it or the rounding of Qλ − p."""
-        rounding, size = case.trial.rounding, abs(case.p) + abs(case.trial.y + case.p)
-        within = max(tolerance, 4 * EPS * float(size.max(initial=0.0)))
-        return rounding <= RESIDUAL_TARGET * tolerance or (stagnating and rounding <= within)
+    def enough(self, case: Case, tolerance: float, stagnating: bool) -> float:
+        """Also what some sweeps have not made smaller, as the rounding of K⁻¹: whether that is enough is said
+        by the refined x.
+        """
+        rounding = case.trial.rounding
+        if rounding <= RESIDUAL_TARGET * tolerance or (stagnating and rounding <= tolerance):
+            return tolerance
+        return STALLED_MM if case.stalled >= STALLED else -1.0
 
     def pay(self, cases: Sequence[Case]) -> bool:
         """Always: the alternative is a factorisation per contact set."""
