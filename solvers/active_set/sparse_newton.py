@@ -107,7 +107,7 @@ class SparseState:
 
     def _with_x(self, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """With x = K⁻¹(f − Aλ) refined by δ, and judged by it: "solved" if the KKT residual of y = g − Aᵀx is
-        at most max(tolerance, 4ε max(|g| + |A|ᵀ|x|) + max|A|ᵀ|δ|).
+        at most max(tolerance, 4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|)).
         """
         known = [k for k, answer in enumerate(answers) if answer.lam is not None]
         found = list(answers)
@@ -120,7 +120,7 @@ class SparseState:
         delta = self.prepared.solve_K(b - assembly.multiply_K(x))
         x = x + delta
         y, size = cases.g - assembly.A.T @ x, abs(assembly.A).T
-        rounding = 4 * EPS * (abs(cases.g) + size @ abs(x)).max(axis=0) + (size @ abs(delta)).max(axis=0)
+        rounding = 4 * (EPS * (abs(cases.g) + size @ abs(x)) + size @ abs(delta)).max(axis=0)
         missed = np.where(lam > 0, abs(y), -y).max(axis=0, initial=0.0)
         for column, k in enumerate(known):
             status, residual = found[k].status, float(missed[column])
