@@ -23,6 +23,7 @@ from problems.storage.fingerprint import fingerprint
 
 from .whole_model import WholeModel
 
+WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
 DENSEST = 0.25  # of a block's entries: a denser K gains nothing from this form
 SMALL = 200  # unknowns up to which any K is taken
 
@@ -38,7 +39,9 @@ def prepared(scene: Scene) -> SparsePrepared:
         case JointScene():
             model = WholeModel.of(scene)
             assembly = model.assembly()
-            coarser = _graded(model)
+            graded = model.graded()
+            if graded.work < WORTH * model.work:
+                coarser = graded.assembly
         case MatricesScene():
             assembly = _own(scene)[0]
             folders += ("problems/input", "problems/formats")
@@ -70,10 +73,6 @@ class _OfScene(SparsePrepared):
             where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[unknown])
             key, moves = f"x[{unknown}]{where}", "moves without a force"
             raise indefinite(self.scene.source_of("K"), key, moves) from error
-
-
-def _graded(model: WholeModel) -> Callable[[], Assembly]:
-    return lambda: model.graded().assembly()
 
 
 def load_case(scene: Scene) -> LoadCase:

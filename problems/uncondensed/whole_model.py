@@ -44,6 +44,11 @@ class WholeModel:
         models = tuple(map(graded, self.models))
         return WholeModel(self.scene, models, Numbering.of(models, self.numbering.blocks))
 
+    @property
+    def work(self) -> float:
+        """What the inverse near the diagonal costs, as far as it depends on the grid lines: Σ (lines)³."""
+        return float(sum(len(model.free_lines) ** 3 for model in self.models))
+
     @cached_property
     def junction(self) -> Unknowns:
         """(n,) the numbers of the junction's deflections, in the order of x."""
