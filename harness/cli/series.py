@@ -58,7 +58,9 @@ def series(
     check: Annotated[
         int, option("N", "Compare every N-th case with the certified reference; 0: none.", min=0)
     ] = 100,
-    threads: Annotated[int, option("N", "Threads for linear algebra.", min=1)] = 2,
+    threads: Annotated[
+        int | None, option("N", "Threads for linear algebra.  [default: 2; 1 in the sparse form]", min=1)
+    ] = None,
     plugin: Plugin = None,
     time_limit: Annotated[
         float, option("SECONDS", "Time limit per load case; for a plug-in.", min=0.001)
@@ -135,7 +137,7 @@ def series(
             from problems.load_cases.random_gaps import random_gaps
 
             chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length, taken)
-        limits = time_limit, memory_limit
+        limits, threads = (time_limit, memory_limit), threads or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
         facts = {"solver_version": made.version, "solver_code": made.code}
         code = run(job, facts, out, console, scheduler)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import threadpoolctl
 from rich.console import Console
 from rich.text import Text
 
@@ -97,6 +98,8 @@ def solve(
         road = chosen_form(scene, taken, form, in_house=solver is None or _in_house(solver))
     if road.why:
         console.print(f"In the sparse form, without condensation: {road.why}.", style="dim")
+    if road.form == "sparse":
+        threadpoolctl.threadpool_limits(1)  # a second thread gains nothing on narrow bands, and spins
     with steps.step("matrices"):
         data = prepared(scene, steps.building, road.form)
         _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.factors
