@@ -88,6 +88,8 @@ class GoldfarbIdnani(Solver):
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
         if ready.factor is None:
             lam = _certain(ready, slacks, result, tolerance, details)
+            if result.status != "solved":
+                details.setdefault("cause", "rounding: some slack is below zero by more than the tolerance")
             return Answer(
                 result.status, lam, data.prepared.recover(lam, load), result.pivots, details=details
             )
