@@ -32,6 +32,7 @@ from .length import length
 
 SAFE = 1.01  # for the rounding of the bounds themselves
 MAX_STEPS = 30
+MAX_SETS = 10  # tried with M in a step
 MAX_WORSE = 3  # steps in a row that improve nothing
 ENOUGH_MM = 1e-10  # a bound that needs no further step
 
@@ -76,11 +77,14 @@ class SparseBound:
         """From forces λ (m,) N."""
         lam = np.maximum(lam, 0.0)
         state = _State(self.prepared, load, lam)
-        C, best, worse = lam > 0, None, 0
+        C, best, worse, renewed = lam > 0, None, 0, False
         for _ in range(MAX_STEPS):
             y = state.s.value
             C = (C & (state.lam.hi > 0)) | (y < -state.s.error)
             bound = self._bound(state, C)
+            if best is not None and not bound < best.bound_mm / 2 and not renewed:
+                state.renew()  # what the steps have rounded may be what is left
+                bound, renewed = self._bound(state, C), True
             worse = 0 if best is None or bound < best.bound_mm else worse + 1
             if not worse:
                 best = Proven(state.x, state.lam, state.lam.hi > 0, bound)
@@ -122,6 +126,10 @@ class _State:
         # What is stored is λ + dλ but for the rounding of its second part, which counts below.
         self._move(self.prepared.solve_K(self.r.value - self.prepared.assembly.A @ dlam), dlam)
 
+    def renew(self) -> None:
+        """r from the original data, without the rounding of the steps."""
+        self.r = forces(self.prepared.assembly, self.load.f, self.x, self.lam)
+
     def _move(self, dx: Vector, dlam: Vector) -> None:
         """r − K dx − A dλ in float64: dx and dλ are small, and so is the rounding."""
         assembly = self.prepared.assembly
@@ -140,15 +148,20 @@ class _State:
 
 
 def _correction(M: BandedInverse, C: NDArray[np.bool_], y: Vector, lam: Vector) -> Vector:
-    """dλ with λ + dλ ≥ 0, zero outside C, and Q_CC dλ ≈ −y_C: with N the others and t_N = M_NN⁻¹ (M y)_N,
-    dλ_C = −(My)_C + (Mt)_C.
+    """dλ with λ + dλ ≥ 0, zero outside C, and Q_CC dλ ≈ −y_C − Q_CN dλ_N; λ_N, of the others, becomes zero.
+
+    With t_N = M_NN⁻¹ ((M y_C)_N − λ_N) it is dλ_C = (M t − M y_C)_C. What it would make negative leaves C.
     """
     order = M.order
-    C_here, y_here = C[order], np.where(C, y, 0.0)[order]
-    v = M.product(y_here)
-    t = M.factor(~C_here).solve(np.where(C_here, 0.0, v))
-    dlam = np.zeros_like(y)
-    dlam[order] = np.where(C_here, M.product(t) - v, 0.0)
-    leaving = (lam > 0) & ~C
-    dlam[leaving] = -lam[leaving]
-    return np.maximum(dlam, -lam)
+    C, lam = C[order], lam[order]
+    for _ in range(MAX_SETS):
+        v = M.product(np.where(C, y[order], 0.0))
+        t = M.factor(~C).solve(np.where(C, 0.0, v - lam))
+        change = M.product(t) - v
+        negative = C & (lam + change < 0)
+        if not negative.any():
+            break
+        C = C & ~negative
+    dlam = np.empty_like(lam)
+    dlam[order] = np.maximum(np.where(C, change, -lam), -lam)
+    return dlam
