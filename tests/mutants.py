@@ -120,8 +120,8 @@ MUTANTS = [
     Mutant(REFERENCE, "return min(smallest_eigenvalue(", "return max(smallest_eigenvalue("),
     Mutant(REFERENCE, "if not np.isfinite(proof.bound_mm):", "if False:"),
     # λmin(DKD) of a band
-    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(band) + 1)) * _norm(L) + ", ""),
-    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(band) + 1))", "gamma(len(band) + 1)"),
+    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(L) + 1)) * _norm(L) + ", ""),
+    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(L) + 1))", "gamma(len(band) + 1)"),
     Mutant(SPARSE_DEFINITE, "_norm(L) + U * (largest + abs(s))", "_norm(L)"),
     Mutant(SPARSE_DEFINITE, "U * (largest + abs(s))", "U * abs(s)"),
     Mutant(SPARSE_DEFINITE, "U * (largest + abs(s))", "U * largest"),

@@ -100,7 +100,7 @@ def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) ->
     for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
         part = DoubleDouble(x.hi[rows], x.lo[rows])
         if sp.issparse(K):
-            _subtract_sparse(total, rows, sp.csr_array(K), part)
+            _subtract_sparse(total, rows, sp.csr_array(K.T), part)  # symmetric, and stored by columns
         else:
             _subtract_dense(total, rows, K, part)
     if assembly.altered:

@@ -115,6 +115,11 @@ class _State:
 
     def __init__(self, prepared: SparsePrepared, load: LoadCase, lam: Vector) -> None:
         self.prepared, self.load = prepared, load
+        blocks, A = prepared.assembly.blocks, prepared.assembly.A
+        self.sizes, self.A_size = [abs(K) for K in blocks], abs(A)
+        # The most terms in a row of Kx + Aλ; K is symmetric.
+        self.depth = 4 + int(np.bincount(A.indices, minlength=1).max())
+        self.depth += max(int(np.diff(sp.csc_array(K).indptr).max(initial=0)) for K in blocks)
         self.lam = DoubleDouble(lam, np.zeros_like(lam))
         x = prepared.solve_K(load.f - prepared.assembly.A @ lam)
         self.x = DoubleDouble(x, np.zeros_like(x))
@@ -132,16 +137,13 @@ class _State:
 
     def _move(self, dx: Vector, dlam: Vector) -> None:
         """r − K dx − A dλ in float64: dx and dλ are small, and so is the rounding."""
-        assembly = self.prepared.assembly
-        A, size = assembly.A, abs(assembly.A)
+        assembly, depth = self.prepared.assembly, self.depth
         self.x, self.lam = self.x.plus(dx), self.lam.plus(dlam)
-        depth = int(max(np.diff(sp.csr_array(K).indptr).max(initial=0) for K in assembly.blocks))
-        depth += int(np.diff(sp.csr_array(A).indptr).max(initial=0)) + 4
         x_size = gamma(depth) * abs(dx) + 2 * U * abs(self.x.lo)
         lam_size = gamma(depth) * abs(dlam) + 2 * U * abs(self.lam.lo)
-        slices = zip(assembly.blocks, assembly.slices, strict=True)
-        rounding = np.concatenate([abs(K) @ x_size[rows] for K, rows in slices]) + size @ lam_size
-        value = self.r.value - assembly.multiply_K(dx) - A @ dlam
+        slices = zip(self.sizes, assembly.slices, strict=True)
+        rounding = np.concatenate([K @ x_size[rows] for K, rows in slices]) + self.A_size @ lam_size
+        value = self.r.value - assembly.multiply_K(dx) - assembly.A @ dlam
         error = self.r.error + rounding + gamma(depth) * abs(self.r.value) + depth * ETA
         self.r = Enclosure(value, SAFE * error)
         self.s: Enclosure = gaps(assembly, self.load.g, self.x)

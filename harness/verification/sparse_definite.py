@@ -32,20 +32,19 @@ def smallest_eigenvalue(prepared: SparsePrepared, D: Vector) -> float:
         if order is not None:
             scaled = sp.csc_array(scaled[order][:, order])
         solve = prepared.sparse_factors[k].solve
-        least = min(least, _of_band(lower_band(scaled), least_eigenvalue(solve, d)))
+        least = min(least, _of_band(scaled, least_eigenvalue(solve, d)))
     return float(least)
 
 
-def _of_band(band: Matrix, estimate: float) -> float:
-    diagonal = band[0].copy()
+def _of_band(K: sp.csc_array, estimate: float) -> float:
     for share in SHARES:
         s = share * estimate
-        shifted = np.array(band, order="F")
-        shifted[0] = diagonal - s
+        shifted = lower_band(K)
+        shifted[0] -= s
         largest = float(abs(shifted[0]).max())
         L, info = lapack.dpbtrf(shifted, lower=1, overwrite_ab=1)
         if info == 0:
-            rounding = gamma(2 * (len(band) + 1)) * _norm(L) + U * (largest + abs(s))
+            rounding = gamma(2 * (len(L) + 1)) * _norm(L) + U * (largest + abs(s))
             bound = s - 1.01 * rounding
             if bound >= SMALLEST:
                 return float(bound)

@@ -8,7 +8,7 @@ import numpy as np
 
 from .assembly import Assembly, Vector
 
-POWER_STEPS = 8
+POWER_STEPS = 5
 
 
 def balanced_units(assembly: Assembly) -> Vector:
