@@ -22,12 +22,13 @@ from solvers.base import Answer, Batch, WarmStart, failed
 from solvers.kkt import EPS
 
 from .augmented_sets import AugmentedSets
-from .batched import RESIDUAL_TARGET, BatchedSweeps, Case
+from .batched import BatchedSweeps, Case
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
 from .solve import solve_from
 
 MAX_SWEEPS = 100
+TARGET = 0.01  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
 STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve |y_C|, at an |y_C| that can be rounding
 
 
@@ -150,7 +151,7 @@ class SparseSweeps(BatchedSweeps):
         by the refined x.
         """
         rounding = case.trial.rounding
-        if rounding <= RESIDUAL_TARGET * tolerance or (stagnating and rounding <= tolerance):
+        if rounding <= TARGET * tolerance or (stagnating and rounding <= tolerance):
             return tolerance
         return STALLED_MM if case.stalled >= STALLED else -1.0
 
