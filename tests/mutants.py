@@ -13,6 +13,7 @@ LENGTH = "harness/verification/length.py"
 DEFINITE = "harness/verification/definite.py"
 JUDGE = "harness/verification/judge.py"
 SPARSE_DEFINITE = "harness/verification/sparse_definite.py"
+SPARSE_BOUND = "harness/verification/sparse_bound.py"
 AUGMENTED = "harness/verification/augmented.py"
 BALANCE = "problems/forms/balance.py"
 REFERENCE = "harness/verification/reference.py"
@@ -269,6 +270,48 @@ MUTANTS = [
     Mutant(READ, "lost[~same] = U * abs(rounded[~same])", "lost[~same] = U / 4 * abs(rounded[~same])"),
     Mutant(READ, "off + 2 * U * count.multiply(size)", "off"),
     Mutant(READ, "(abs(rounded) < 2.0**63) & ", ""),
+    # D/√κ (‖Dr‖/√κ + ‖δ‖ √(‖DKD‖/σ²)), refined
+    Mutant(SPARSE_BOUND, "(force / np.sqrt(self.kappa) + distance)", "distance"),
+    Mutant(
+        SPARSE_BOUND,
+        "(force / np.sqrt(self.kappa) + distance)",
+        "(force / np.sqrt(self.kappa) / 2 + distance)",
+    ),
+    Mutant(SPARSE_BOUND, "(force / np.sqrt(self.kappa) + distance)", "force / np.sqrt(self.kappa)"),
+    Mutant(
+        SPARSE_BOUND,
+        "(force / np.sqrt(self.kappa) + distance)",
+        "(force / np.sqrt(self.kappa) + distance / 2)",
+    ),
+    Mutant(SPARSE_BOUND, "self.D * (abs(r.value) + r.error)", "self.D * abs(r.value)"),
+    Mutant(SPARSE_BOUND, "self.D * (abs(r.value) + r.error)", "self.D * r.error"),
+    Mutant(
+        SPARSE_BOUND,
+        "length(self.D * (abs(r.value) + r.error))",
+        "length(self.D**2 * (abs(r.value) + r.error))",
+    ),
+    Mutant(SPARSE_BOUND, "np.sqrt(self.stiffest / self.sigma2)", "np.sqrt(self.stiffest)"),
+    Mutant(
+        SPARSE_BOUND,
+        "np.where(pressing, abs(s.value), np.maximum(-s.value, 0.0))",
+        "np.where(pressing, abs(s.value), 0.0)",
+    ),
+    Mutant(
+        SPARSE_BOUND,
+        "np.where(pressing, abs(s.value), np.maximum(-s.value, 0.0))",
+        "np.maximum(-s.value, 0.0)",
+    ),
+    Mutant(SPARSE_BOUND, "+ s.error * (", "+ 0 * s.error * ("),
+    Mutant(SPARSE_BOUND, "at_junction(self.D * error + abs(state.x.lo))", "at_junction(self.D * error)"),
+    Mutant(
+        SPARSE_BOUND, "at_junction(self.D * error + abs(state.x.lo))", "at_junction(error + abs(state.x.lo))"
+    ),
+    Mutant(SPARSE_BOUND, "if (state.lam.hi < 0).any():", "if False:"),
+    Mutant(
+        SPARSE_BOUND,
+        "error = self.r.error + rounding + gamma(depth) * abs(self.r.value)",
+        "error = self.r.error",
+    ),
 ]
 
 #: Which tests must fail.
@@ -278,6 +321,7 @@ TESTS = {
     LENGTH: ("terms_residual",),
     DEFINITE: ("terms_definite",),
     SPARSE_DEFINITE: ("sparse_terms", "sparse_certificate"),
+    SPARSE_BOUND: ("terms_sparse",),
     AUGMENTED: ("sparse_terms", "sparse_certificate"),
     BALANCE: ("sparse_terms", "sparse_certificate"),
     REFERENCE: ("terms_verdict", "altered"),

@@ -47,7 +47,7 @@ class AugmentedSets:
     def _rho(self) -> float:
         A = self.prepared.assembly.A
         stiffest = float(self.prepared.assembly.diagonal_K()[A.indices].max(initial=0.0))
-        return STIFFER * stiffest / float((A.data**2).max(initial=1.0))
+        return STIFFER * stiffest / (float((A.data**2).max(initial=0.0)) or 1.0)
 
     def at(self, C: Set) -> TrialSolution:
         """λ and y of the set C, with |y_C| no larger than after the last correction that halved it."""
