@@ -12,7 +12,8 @@ from sparse_matrices import band_matrix, chain, graph_matrix
 from harness.verification import augmented
 from harness.verification.certificate import certify
 from harness.verification.exact_residual import DoubleDouble
-from harness.verification.reference import refined_active_set, units_of
+from harness.verification.reference import refined_active_set
+from harness.verification.refinement import units_of
 from harness.verification.sparse_definite import smallest_eigenvalue
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector

@@ -14,20 +14,17 @@ refinement repeated until λ_C ≥ 0 and g − Aᵀx ≥ 0 hold for the refined 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from problems.forms import balance
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.balance import balanced_units
-from problems.forms.compliance import dense_submatrix
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.scene import MadeScene, Scene
@@ -37,19 +34,15 @@ from problems.storage.fingerprint import fingerprint
 from . import augmented, sparse_definite
 from .certificate import certify
 from .definite import smallest_eigenvalue
-from .exact_residual import DoubleDouble, forces, gaps
+from .exact_residual import gaps
 from .principal_pivoting import Stop, contact_set
+from .refinement import ENOUGH, refined_solution, units_of
 from .sparse_bound import SparseBound
 
-#: (force, gap) → x and λ of the optimality conditions for a contact set with these right-hand sides.
-ContactSolve = Callable[[Vector, Vector], tuple[Vector, Vector]]
-
-MAX_REFINEMENTS = 12
 MAX_SET_CORRECTIONS = 20
 STOPPED = "the search for the contact set was stopped"
 UNPROVEN = "could not be proven"
 PROVEN_ENOUGH_MM = 1e-9  # a wider bound is tried to be improved by a factorisation for the contact set
-ENOUGH = 1e-20  # relative to x: a smaller correction is the last
 
 
 @dataclass(frozen=True)
@@ -117,11 +110,6 @@ def reference(
     return Reference(x, lam, active, facts["bound_mm"], facts["route"])
 
 
-def units_of(prepared: Prepared) -> Vector | float:
-    """D (n,), the units in which the error is bounded: balanced for a sparse K, mm for a condensed one."""
-    return balanced_units(prepared.assembly) if isinstance(prepared, SparsePrepared) else 1.0
-
-
 def proven_lambda_min(prepared: Prepared) -> float:
     """κ ≤ λmin(DKD), from the cache if it was proven before for this assembly."""
     if prepared.key is None:
@@ -187,7 +175,7 @@ def refined_active_set(
         active = _contact_set(prepared, load, p, stop=lambda: time.monotonic() > end)
     stopped = time.monotonic() > end
     for _ in range(MAX_SET_CORRECTIONS):
-        x, lam = _refine(prepared, load, active)
+        x, lam = refined_solution(prepared, load, active)
         s = gaps(prepared.assembly, load.g, x)
         tiny = ENOUGH * abs(prepared.assembly.at_junction(x.hi)).max(initial=0) + s.error
         wrong = np.where(active, lam.hi < 0, s.value < -tiny)
@@ -212,46 +200,3 @@ def _contact_set(prepared: Prepared, load: LoadCase, p: Vector, stop: Stop) -> N
     if isinstance(prepared, SparsePrepared):
         return augmented.contact_set(prepared, load, p > 0, stop)
     return contact_set(prepared.compliance, p, stop=stop)
-
-
-def _refine(
-    prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]
-) -> tuple[DoubleDouble, DoubleDouble]:
-    assembly, units = prepared.assembly, units_of(prepared)
-    solve: ContactSolve = (
-        augmented.ContactSystem(prepared, active).solve
-        if isinstance(prepared, SparsePrepared)
-        else _dense_system(prepared, np.flatnonzero(active))
-    )
-    x = DoubleDouble(np.zeros(assembly.n), np.zeros(assembly.n))
-    lam = DoubleDouble(np.zeros(assembly.m), np.zeros(assembly.m))
-    force, gap = load.f, load.g  # the residuals at zero
-    before = np.inf
-    for _ in range(MAX_REFINEMENTS):
-        dx, dlam = solve(force, gap)
-        x, lam = x.plus(dx), lam.plus(dlam)
-        step = float(abs(dx / units).max(initial=0))
-        if step >= before / 2 or step <= ENOUGH * float(abs(x.hi / units).max(initial=0)):
-            break
-        before = step
-        force = forces(assembly, load.f, x, lam).value
-        gap = gaps(assembly, load.g, x).value
-    return x, lam
-
-
-def _dense_system(prepared: Prepared, rows: NDArray[np.intp]) -> ContactSolve:
-    """For the closed contacts `rows`, through the factors of K and Q_CC."""
-    assembly = prepared.assembly
-    A_C, factor = assembly.A[:, rows], None
-    if rows.size:
-        block = dense_submatrix(prepared.compliance, rows)
-        factor = sla.cho_factor(block, lower=True, overwrite_a=True)
-
-    def solve(force: Vector, gap: Vector) -> tuple[Vector, Vector]:
-        x, lam = prepared.solve_K(force), np.zeros(assembly.m)
-        if factor is not None:
-            lam[rows] = sla.cho_solve(factor, A_C.T @ x - gap[rows], check_finite=False)
-            x = x - prepared.solve_K(assembly.A @ lam)
-        return x, lam
-
-    return solve
