@@ -71,3 +71,10 @@ def test_definite_in_any_unit(exponent: int) -> None:
     assert scaled == np.ldexp(usual, exponent)
     assert smallest_eigenvalue(np.ldexp(K, -1040), 2.0**-1040) == 0.0
     assert smallest_eigenvalue(np.diag([2.0**-995, 2.0**-1010]), 2.0**-1010) == 0.0
+
+
+def test_definite_a_factorisation_that_stops_proves_nothing() -> None:
+    """λmin = 3: shares of the estimate above it are passed over."""
+    K = np.array([[4.0, 1.0], [1.0, 4.0]])
+    assert smallest_eigenvalue(K, 2.0**9) == 0.0
+    assert 1.9 < smallest_eigenvalue(K, 4.0) < 2.0
