@@ -269,7 +269,6 @@ MUTANTS = [
     Mutant(READ, "off_K + abs(K - given)", "off_K"),
     Mutant(READ, "lost[~same] = U * abs(rounded[~same])", "lost[~same] = U / 4 * abs(rounded[~same])"),
     Mutant(READ, "off + 2 * U * count.multiply(size)", "off"),
-    Mutant(READ, "(abs(rounded) < 2.0**63) & ", ""),
     # D/√κ (‖Dr‖/√κ + ‖δ‖ √(‖DKD‖/σ²)), refined
     Mutant(SPARSE_BOUND, "(force / np.sqrt(self.kappa) + distance)", "distance"),
     Mutant(

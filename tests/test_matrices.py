@@ -15,6 +15,7 @@ from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
+from problems.input.user_matrices import read_mtx
 from problems.scene import read_scene
 
 RNG = np.random.default_rng(11)
@@ -237,3 +238,11 @@ def test_a_symmetric_matrix_market_file_must_be_square(tmp_path: Path) -> None:
     (tmp_path / "A.mtx").write_text(f"%%MatrixMarket matrix array real symmetric\n2 3\n{numbers}\n")
     with pytest.raises(InputError, match="not square"):
         opened(path)
+
+
+def test_a_matrix_market_header_out_of_range(tmp_path: Path) -> None:
+    """SciPy's reader raises OverflowError for such sizes."""
+    path = tmp_path / "K.mtx"
+    path.write_text(f"%%MatrixMarket matrix coordinate real general\n2 {10**30} 1\n1 1 1.0\n")
+    with pytest.raises(ValueError, match="out of range"):
+        read_mtx(path)

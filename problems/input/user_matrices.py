@@ -170,11 +170,14 @@ Kind = Callable[[bytes], float]  # int or float
 def read_mtx(path: Path) -> Any:
     """A Matrix Market file, array or sparse.
 
-    Raises ValueError if entries are missing, a line holds anything else than one entry, or a symmetric matrix
-    is not square. mmread would take missing entries for zeros, read 3,5 and 3D5 as 3, and crash on a NUL, on
+    Raises ValueError if entries are missing, a line holds anything else than one entry, a number is out of
+    range, or a symmetric matrix is not square. mmread would take missing entries for zeros, read 3,5 and 3D5 as 3, and crash on a NUL, on
     an array without entries, and on a symmetric one that is not square.
     """
-    rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
+    try:
+        rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
+    except OverflowError as error:
+        raise ValueError(str(error)) from error
     if symmetry != "general" and rows != columns:
         raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
     if layout == "array":
