@@ -240,9 +240,10 @@ def test_a_symmetric_matrix_market_file_must_be_square(tmp_path: Path) -> None:
         opened(path)
 
 
-def test_a_matrix_market_header_out_of_range(tmp_path: Path) -> None:
-    """SciPy's reader raises OverflowError for such sizes."""
+@pytest.mark.parametrize("lines", [f"2 {10**30} 1\n1 1 1.0", f"2 2 1\n{10**30} 1 1.0"])
+def test_a_number_of_a_matrix_market_file_out_of_range(tmp_path: Path, lines: str) -> None:
+    """SciPy's reader raises OverflowError for some."""
     path = tmp_path / "K.mtx"
-    path.write_text(f"%%MatrixMarket matrix coordinate real general\n2 {10**30} 1\n1 1 1.0\n")
+    path.write_text(f"%%MatrixMarket matrix coordinate real general\n{lines}\n")
     with pytest.raises(ValueError, match="out of range"):
         read_mtx(path)

@@ -171,19 +171,19 @@ def read_mtx(path: Path) -> Any:
     """A Matrix Market file, array or sparse.
 
     Raises ValueError if entries are missing, a line holds anything else than one entry, a number is out of
-    range, or a symmetric matrix is not square. mmread would take missing entries for zeros, read 3,5 and 3D5 as 3, and crash on a NUL, on
-    an array without entries, and on a symmetric one that is not square.
+    range, or a symmetric matrix is not square. mmread would take missing entries for zeros, read 3,5 and 3D5
+    as 3, and crash on a NUL, on an array without entries, and on a symmetric one that is not square.
     """
     try:
         rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
+        if symmetry != "general" and rows != columns:
+            raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
+        if layout == "array":
+            entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
+        _refuse_wrong_lines(path, entries, layout, field)
+        return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))
     except OverflowError as error:
         raise ValueError(str(error)) from error
-    if symmetry != "general" and rows != columns:
-        raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
-    if layout == "array":
-        entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
-    _refuse_wrong_lines(path, entries, layout, field)
-    return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))
 
 
 def _refuse_wrong_lines(path: Path, entries: int, layout: str, field: str) -> None:
