@@ -12,13 +12,23 @@ from .base import Status
 EPS = float(np.finfo(float).eps)
 
 
+def kkt_residual(lam: Vector, y: Vector) -> float:
+    """max(max(−y), max_{λ>0} |y|), mm, of λ ≥ 0."""
+    return max(float((-y).max(initial=0.0)), float(abs(y[lam > 0]).max(initial=0.0)))
+
+
+def rounding_of(p: Vector, y: Vector) -> float:
+    """About the rounding error of y = Qλ − p, mm, as 4ε max(|p| + |Qλ|)."""
+    return 4 * EPS * float((abs(p) + abs(y + p)).max(initial=0.0))
+
+
 def kkt_status(Q: AnyQ, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
-    """Status and KKT residual max(max(−y), max_{λ>0} |y|), mm, of λ ≥ 0 with y = Qλ − p.
+    """Status and `kkt_residual` of λ ≥ 0 with y = Qλ − p.
 
     "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate". |Qλ| replaces
     |Q|λ if Q is given by its products.
     """
-    residual = max(float((-y).max(initial=0.0)), float(abs(y[lam > 0]).max(initial=0.0)))
+    residual = kkt_residual(lam, y)
     if residual <= tolerance:
         return "solved", residual
     size = abs(y + p) if isinstance(Q, Compliance) else abs(Q) @ lam

@@ -3,9 +3,11 @@
 Q_CC dλ = −y_C corrects forces λ whose gaps y = g − AᵀK⁻¹(f − Aλ) are not yet closed. With springs of a
 stiffness ρ at the contacts of C (augmented Lagrangian; Hestenes, J. Optim. Theory Appl. 4:303–320, 1969),
 
-    (K + ρ A_C A_Cᵀ) v = A_C (dλ − ρ y_C),        dλ ← dλ − ρ (y_C + A_Cᵀv),
+    (Q_CC + I/ρ)⁻¹ r = ρ (r − A_Cᵀv),        (K + ρ A_C A_Cᵀ) v = ρ A_C r,
 
-and each pass reduces the error by a factor of at least 1 + ρ λmin(Q_CC). One sparse factorisation per set.
+which is almost Q_CC⁻¹, but for motions that nearly dependent contacts hardly resist, with λ(Q_CC) < 1/ρ: as
+a preconditioner of conjugate gradients it takes one step more for each of these. One sparse factorisation
+per set.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator, cg
 
 from problems.forms.assembly import Vector
 from problems.forms.sparse_factor import Factor, factored
@@ -24,7 +27,7 @@ from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
-PASSES = 3  # per correction
+REDUCTION, STEPS = 1e-3, 20  # of |y_C| by a correction, and the steps it may take
 MAX_CORRECTIONS = 30
 
 #: λ (m,) → y = g − AᵀK⁻¹(f − Aλ), (m,) mm.
@@ -62,19 +65,23 @@ class AugmentedSets:
         )
         return self.refined(C, open_everywhere, 0.0)
 
+    def _almost_inverse(self, factor: Factor, r: Vector) -> Vector:
+        """(Q_CC + I/ρ)⁻¹ r."""
+        return self._rho * (r - self.A_C.T @ factor.solve(self.A_C @ (self._rho * r)))
+
+    @np.errstate(over="ignore", invalid="ignore")
     def refined(self, C: Set, trial: TrialSolution, target: float) -> TrialSolution:
         """From the trial solution of the last `at`: |y_C| ≤ target mm, or no longer halving."""
         if self.factor is None:
             return trial
-        rows, best = np.flatnonzero(C), trial
+        rows, best, factor = np.flatnonzero(C), trial, self.factor
+        shape = (rows.size, rows.size)
+        Q_CC = LinearOperator(shape, self.Q.submatrix(rows).__matmul__, dtype=float)
+        almost_inverse = LinearOperator(shape, lambda r: self._almost_inverse(factor, r), dtype=float)
         for _ in range(MAX_CORRECTIONS):
             if best.rounding <= target:
                 break
-            y_C, correction = best.y[rows], np.zeros(rows.size)
-            for _ in range(PASSES):
-                # (K + ρ A_C A_Cᵀ) v = A_C (dλ − ρ y_C)
-                v = self.factor.solve(self.A_C @ (correction - self._rho * y_C))
-                correction = correction - self._rho * (y_C + self.A_C.T @ v)
+            correction, _ = cg(Q_CC, -best.y[rows], M=almost_inverse, rtol=REDUCTION, maxiter=STEPS)
             lam = best.lam.copy()
             lam[rows] += correction
             y = self.gap(lam)

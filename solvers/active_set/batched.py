@@ -25,7 +25,7 @@ from problems.forms.assembly import Matrix, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.compliance import AnyQ
 from solvers.base import Answer, LoadCase
-from solvers.kkt import EPS, kkt_status
+from solvers.kkt import kkt_status, rounding_of
 from solvers.linear_algebra.product import products
 
 from .block_pivoting import block_pivoting, wrong_signs
@@ -111,9 +111,8 @@ class BatchedSweeps:
         """The KKT residual, mm, that ends the sweeps of a case: −1 as long as |y_C| is neither far below the
         tolerance nor within rounding.
         """
-        rounding, bound = case.trial.rounding, _rounding_bound(case.p, case.trial.y)
-        small = rounding <= max(RESIDUAL_TARGET * tolerance, bound) or (stagnating and rounding <= tolerance)
-        return max(tolerance, bound) if small else -1.0
+        target = max(RESIDUAL_TARGET * tolerance, rounding_of(case.p, case.trial.y))
+        return target if case.trial.rounding <= target else -1.0
 
     def pay(self, cases: Sequence[Case]) -> bool:
         """Whether sweeps settle such cases, and faster than case by case."""
@@ -162,7 +161,7 @@ class BatchedSweeps:
         if (case.trial.lam < 0).any():
             y = self.gaps(lam[:, None], [load])[:, 0]
         # `kkt_status` bounds the same rounding by |Q|λ, which is slow to compute.
-        status, residual = kkt_status(self.Q, load.p, lam, y, max(tolerance, _rounding_bound(load.p, y)))
+        status, residual = kkt_status(self.Q, load.p, lam, y, max(tolerance, rounding_of(load.p, y)))
         details: dict[str, Any] = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
         if status != "solved":
             details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
@@ -198,7 +197,7 @@ def _warm_started(solved: Case, load: LoadCase, p: Vector) -> Case:
 def _banded_step(case: Case, M: BandedInverse, compliance: Vector, tolerance: float) -> Vector:
     """λ (m,) of the case with Q replaced by M⁻¹."""
     banded = _BandedSets(M, case.trial, case.factor)
-    found = block_pivoting(banded.at, case.C, compliance, tolerance, SETS_PER_SWEEP)
+    found = block_pivoting(banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, SETS_PER_SWEEP)
     case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
     return found.trial.lam
 
@@ -207,8 +206,3 @@ def _cut_off(lam: Vector, compliance: Vector) -> float:
     """Bound on the change of y = Qλ − p, mm, if forces below zero are set to 0: |q_ij| ≤ √(q_ii q_jj)."""
     root = np.sqrt(compliance)
     return float(root.max(initial=0.0) * (root @ np.maximum(-lam, 0.0)))
-
-
-def _rounding_bound(p: Vector, y: Vector) -> float:
-    """Bound on the rounding error of y = Qλ − p, mm."""
-    return 4 * EPS * float((abs(p) + abs(y + p)).max(initial=0.0))

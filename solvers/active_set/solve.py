@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from problems.forms.assembly import Vector
 from problems.forms.compliance import AnyQ
 from solvers.base import Answer
-from solvers.kkt import kkt_status
+from solvers.kkt import kkt_residual, kkt_status, rounding_of
 from solvers.linear_algebra.product import product
 
 from .block_pivoting import block_pivoting, wrong_signs
@@ -51,18 +51,20 @@ def solve_from(C: Set, sets: Sets, tolerance: float, max_sets: int) -> Answer:
     """Block principal pivoting from C, with λ_C refined against Q and the signs checked again.
 
     Once no sign is wrong by more than the tolerance, up to 30 further sets correct those beyond rounding:
-    with nearly dependent constraints, a sign within the tolerance can hide a wrong set. Iterations are the
-    contact sets tried. See `kkt.kkt_status` for "solved" and "inaccurate".
+    with nearly dependent constraints, a sign within the tolerance can hide a wrong set. Where rounding lets
+    these sets alternate, the one with the smaller KKT residual is taken. Iterations are the contact sets
+    tried. See `kkt.kkt_status` for "solved" and "inaccurate".
     """
     best = _settled(C, sets, tolerance, tolerance, max_sets)
     passes, single_exchanges = best.passes, best.single_exchanges
-    wrong = wrong_signs(best.C, best.trial, sets.compliance, 0.0)
+    floor = rounding_of(sets.p, best.trial.y)
+    wrong = wrong_signs(best.C, best.trial, sets.compliance, floor)
     if best.converged and wrong.any():
-        finer = _settled(best.C ^ wrong, sets, 0.0, tolerance, MAX_FINER_SETS)
+        finer = _settled(best.C ^ wrong, sets, floor, tolerance, MAX_FINER_SETS)
         passes, single_exchanges = passes + finer.passes, single_exchanges + finer.single_exchanges
-        best = finer if finer.converged else best
-    lam = np.maximum(best.trial.lam, 0.0)
-    y = best.trial.y if (best.trial.lam >= 0).all() else product(sets.Q, lam) - sets.p
+        if finer.converged or kkt_residual(*_point(sets, finer)) < kkt_residual(*_point(sets, best)):
+            best = replace(finer, converged=True)
+    lam, y = _point(sets, best)
     status, residual = kkt_status(sets.Q, sets.p, lam, y, tolerance)
     details: dict[str, Any] = {"closed": int(best.C.sum()), "kkt_residual_mm": residual}
     details |= {"factorisations": sets.factorisations, "single_exchanges": single_exchanges}
@@ -71,6 +73,12 @@ def solve_from(C: Set, sets: Sets, tolerance: float, max_sets: int) -> Answer:
         tried = "rounding" if best.converged else f"{passes} contact sets"
         details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
     return Answer(status, lam, iterations=passes, details=details)
+
+
+def _point(sets: Sets, found: _Settled) -> tuple[Vector, Vector]:
+    """λ without its negative entries, and y = Qλ − p of that."""
+    lam = np.maximum(found.trial.lam, 0.0)
+    return lam, found.trial.y if (found.trial.lam >= 0).all() else product(sets.Q, lam) - sets.p
 
 
 def _settled(C: Set, sets: Sets, threshold: float, tolerance: float, max_sets: int) -> _Settled:
