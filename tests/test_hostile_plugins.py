@@ -192,6 +192,30 @@ def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
     assert "forms" in done.stderr
 
 
+def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> None:
+    """Once the command has made the file `begun`, the signal ends it and all that it started, with words."""
+    going = subprocess.Popen(
+        arguments,
+        cwd=ROOT,
+        env=environment(folder),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while not begun.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    start = time.monotonic()
+    going.send_signal(sent)
+    _, said = going.communicate(timeout=30)
+    assert time.monotonic() - start < 1
+    assert going.returncode == 130
+    assert "Interrupted" in said
+    assert "Traceback" not in said
+    assert all_end(folder)
+
+
 @pytest.mark.parametrize("what", ["check", "run"])
 def test_an_interrupt_ends_within_a_second(tmp_path: Path, what: str) -> None:
     """While a solver sleeps in `check`, and while `run` waits for an import."""
@@ -200,26 +224,7 @@ def test_an_interrupt_ends_within_a_second(tmp_path: Path, what: str) -> None:
     suite = tiny.write_suite(tmp_path)
     plugin = write(tmp_path, *(("", begin) if what == "check" else (begin,)))
     arguments = [] if what == "check" else [suite, "--solver", "mine", "--out", tmp_path / "out"]
-    going = subprocess.Popen(
-        command(what, *arguments, "--plugin", plugin),
-        cwd=ROOT,
-        env=environment(tmp_path),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    deadline = time.monotonic() + 60
-    while not go.exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    start = time.monotonic()
-    going.send_signal(signal.SIGINT)
-    _, said = going.communicate(timeout=30)
-    assert time.monotonic() - start < 1
-    assert going.returncode == 130
-    assert "Interrupted" in said
-    assert "Traceback" not in said
-    assert all_end(tmp_path)
+    interrupt(command(what, *arguments, "--plugin", plugin), tmp_path, go, signal.SIGINT)
 
 
 def test_a_check_that_lasts_says_what_it_is_doing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

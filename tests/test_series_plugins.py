@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from strip import write_strip
-from test_hostile_plugins import ROOT, all_end, command, environment, harness, write
+from test_hostile_plugins import command, harness, interrupt, write
 
 from harness.series import store
 
@@ -122,23 +120,6 @@ def test_on_workers_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_ends_within_a_second(tmp_path: Path, sent: int) -> None:
     go = tmp_path / "begun"
-    going = subprocess.Popen(
-        command(*series(tmp_path, in_solve=f"open({str(go)!r}, 'w'); time.sleep(60)")),
-        cwd=ROOT,
-        env=environment(tmp_path),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
+    interrupt(
+        command(*series(tmp_path, in_solve=f"open({str(go)!r}, 'w'); time.sleep(60)")), tmp_path, go, sent
     )
-    deadline = time.monotonic() + 60
-    while not go.exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    start = time.monotonic()
-    going.send_signal(sent)
-    _, said = going.communicate(timeout=30)
-    assert time.monotonic() - start < 1
-    assert going.returncode == 130
-    assert "Interrupted" in said
-    assert "Traceback" not in said
-    assert all_end(tmp_path)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from problems.build import load_case
 from problems.forms.assembly import Vector
-from problems.forms.names import Form
 from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect, effect_kinds
 from problems.model.joint import Joint
 from problems.model.part_load import PartLoadEffect
@@ -53,11 +52,14 @@ def measured() -> Iterator[Cost]:
         tracemalloc.stop()
 
 
-def ledger(scene: Scene, built: bool, form: Form = "dual") -> list[Entry]:
-    """An entry for each thing that an effect adds. built : the stiffness was computed now, not loaded."""
+def ledger(scene: Scene, built: bool, junction: NDArray[np.intp] | None = None) -> list[Entry]:
+    """An entry for each thing that an effect adds. built : the stiffness was computed now, not loaded.
+
+    junction : of the sparse form, the unknowns that are the junction's deflections.
+    """
     if not isinstance(scene, JointScene):
         return []
-    return [entry for effect in scene.effects for entry in _entries(effect, scene, built, form)]
+    return [entry for effect in scene.effects for entry in _entries(effect, scene, built, junction)]
 
 
 def not_called_for(scene: JointScene) -> list[str]:
@@ -66,7 +68,9 @@ def not_called_for(scene: JointScene) -> list[str]:
     return [kind for kind in effect_kinds() if kind not in named]
 
 
-def _entries(effect: Effect, scene: JointScene, built: bool, form: Form) -> Iterator[Entry]:
+def _entries(
+    effect: Effect, scene: JointScene, built: bool, junction: NDArray[np.intp] | None
+) -> Iterator[Entry]:
     joint = scene.joint
     name = " ".join(filter(None, [effect.kind, getattr(effect, "part", None)]))
     for first, second in effect.contacts:
@@ -86,14 +90,14 @@ def _entries(effect: Effect, scene: JointScene, built: bool, form: Form) -> Iter
         yield Entry(name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", cost.seconds, cost.mib)
     alone = replace(scene, effects=(*scene.stiffness_effects, effect))
     with measured() as cost:
-        load = load_case(alone, form)
+        load = load_case(alone, "dual" if junction is None else "sparse")
     if isinstance(effect, GapEffect):
         yield Entry(name, "gap", _gap(load.g), cost.seconds, cost.mib)
-    elif form == "sparse" and isinstance(effect, PartLoadEffect):
+    elif junction is not None and isinstance(effect, PartLoadEffect):
         amount = f"on {np.count_nonzero(load.f)} unknowns of {effect.part}"
         yield Entry(name, "load", amount, cost.seconds, cost.mib)
     else:
-        f = load.f[_junction(alone)] if form == "sparse" else load.f
+        f = load.f if junction is None else load.f[junction]
         yield Entry(name, "load", _forces(f, joint), cost.seconds, cost.mib)
 
 
@@ -115,9 +119,3 @@ def _sum(f: Vector) -> str:
     if abs(f.sum()) < BALANCE * abs(f).sum():
         return f"±{abs(f).max():.4g} N in balance"
     return f"{f.sum():+.4g} N"
-
-
-def _junction(scene: JointScene) -> NDArray[np.intp]:
-    from problems.uncondensed.whole_model import WholeModel  # only for the sparse form
-
-    return WholeModel.of(scene).junction

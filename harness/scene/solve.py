@@ -106,7 +106,8 @@ def solve(
     if data.assembly.altered:
         console.print(f"{ALTERED}.", style="yellow")
     with steps.step("the effects, each alone"):
-        entries = ledger(scene, steps.condensed or road.form == "sparse", road.form)
+        built = steps.condensed or road.form == "sparse"
+        entries = ledger(scene, built, data.assembly.junction)
     with steps.step("loads and gaps"):
         load = load_case(scene, road.form)
         p = data.dual_load(load)

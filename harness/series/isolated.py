@@ -22,12 +22,11 @@ from harness.measurement.stored_files import StoredFiles
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.verification.batched.assess import Assessment
-from harness.verification.batched.bound import Bound
 from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
 
-from .session import Attempt, Job, Result, SeriesSession
+from .session import Attempt, Job, Result, SeriesSession, assessor
 
 
 class Isolated(Limited):
@@ -67,7 +66,7 @@ def solve_isolated(job: Job, numbers: Sequence[int]) -> Generator[list[Result], 
 
     Raises InputError if the plug-in cannot be imported or made.
     """
-    Bound.of(prepared(job.scene))  # what the cache lacks is built here, without a limit
+    assessor(prepared(job.scene, form=job.form))  # what the cache lacks is built here, without a limit
     with Isolated(job, numbers) as child:
         while not child.over():
             child.listen(POLL_S)

@@ -75,7 +75,8 @@ class Result:
 Assess = Callable[[Sequence[LoadCase], Sequence[Vector], Sequence[Vector | None]], list[Assessment]]
 
 
-def _assessor(data: Prepared) -> Assess:
+def assessor(data: Prepared) -> Assess:
+    """What judges a block of answers."""
     if isinstance(data, SparsePrepared):
         return partial(sparse.assess, data)
     return partial(assess, Bound.of(data))
@@ -99,7 +100,7 @@ class SeriesSession:
         self.job = job
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)
-        self.assess = _assessor(self.data)
+        self.assess = assessor(self.data)
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.options, job.plugin)
         self.row: Row = {}  # of the case being solved
