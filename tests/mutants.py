@@ -256,7 +256,7 @@ MUTANTS = [
     Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "float(y[lam > 0].min(initial=0.0))"),
     Mutant(KKT, "(abs(p) + size)", "abs(p)"),
     Mutant(KKT, "(abs(p) + size)", "(abs(Q) @ lam)"),
-    Mutant(KKT, "4 * EPS", "8 * EPS"),
+    Mutant(KKT, "4 * EPS * float((abs(p) + size)", "8 * EPS * float((abs(p) + size)"),
     # What reading has altered
     Mutant(ALTERATION, "outer(self.f, np.ones_like(x_size)) + ", ""),
     Mutant(ALTERATION, " + outer(self.K, x_size)", ""),

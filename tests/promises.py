@@ -6,7 +6,7 @@ import numpy as np
 from exact_draws import ExactLoad
 from solving import TOLERANCES
 
-from harness.verification.judge import conditioned_limit
+from harness.verification.judge import LIMIT_MM, conditioned_limit
 from problems.forms.prepared import Prepared
 
 COMPLIANCE = 0.1  # mm/N, as in ipm's CONTACT_COMPLIANCE
@@ -27,15 +27,17 @@ def promised(name: str, D: float, m: int, weakest: float, force: float, rounding
 
 
 def promises(data: Prepared, each: ExactLoad, condition: float) -> dict[str, tuple[float, float]]:
-    """max|x − x*|, mm, that each solver's promise and the judge's limit leave; the latter is for joints no
-    more compliant than ipm assumes.
+    """max|x − x*|, mm, that each solver's promise and the judge's limit leave.
+
+    The latter is for joints no more compliant than ipm assumes, and for units in which 1e-7 mm is more than
+    the rounding of K⁻¹f: where it is less, the judge knows of cond(K), not of nearly dependent contacts.
     """
     m, c = data.assembly.m, abs(data.assembly.A).max(axis=0).toarray().ravel()
     D = float(np.diag(data.solve_K(np.eye(data.assembly.n))).max())
     weakest = float(np.linalg.eigvalsh(data.Q / c / c[:, None])[0])
     size = float(max(abs(v).max() for v in (each.x, data.solve_K(each.load.f), each.load.g / c)))
     rounding = conditioned_limit(0.0, condition, size)
-    judged = conditioned_limit(1e-7, condition, size) if D <= COMPLIANCE else np.inf
+    judged = LIMIT_MM if D <= COMPLIANCE and rounding <= LIMIT_MM else np.inf
     force = float((c * each.lam).sum())
     return {
         name: (promised(name, D, m, weakest, force, rounding / 10) + rounding, judged) for name in TOLERANCES

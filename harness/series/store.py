@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import json
 import os
-import zlib
 from collections.abc import Iterator, Sequence
-from io import BytesIO
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -30,10 +28,10 @@ from problems.input.bounded import LARGEST, regular_file
 from problems.load_cases.base import LoadCases
 from problems.storage.cache import digest
 
+from .gap_file import CRC, GAPS, GapFile, checksum, write_gaps
 from .session import Result
 
-CASES, GAPS, CONTACTS, SERIES = "cases.jsonl", "gaps.f4", "contacts.npz", "series.json"
-CRC = "gaps_crc32"  # of a row
+CASES, CONTACTS, SERIES = "cases.jsonl", "contacts.npz", "series.json"
 UNITS = ("_mm", "_s")  # of the fields that are numbers
 AGAIN = "run the same `series` command again"
 DELETE = f"delete it, and {AGAIN}"
@@ -41,7 +39,6 @@ MAX_CASES = 10**9
 CHUNK = 2**20  # bytes
 MAX_MIB = 1024  # of contacts.npz
 MAX_FAULTS = 10  # named at once
-BYTES = np.dtype(np.float32).itemsize
 
 
 def series_key(identity: dict[str, Any]) -> str:
@@ -157,31 +154,6 @@ def contacts_in(directory: Path) -> int:
     return m if whole and all((abs(places) <= LARGEST).all() for places in (nodes, fasteners)) else 0
 
 
-class GapFile:
-    """gaps.f4, to compare with the rows."""
-
-    def __init__(self, directory: Path, m: int) -> None:
-        self.path, self.size = directory / GAPS, m * BYTES
-
-    def __enter__(self) -> GapFile:
-        self.file = self.path.open("rb") if self.path.is_file() else BytesIO()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.file.close()
-
-    def whole(self, row: records.Row, older: bool = False) -> bool:
-        """Whether a row's gaps are there and are those that were written with it.
-
-        older : a row without a checksum, as older versions wrote them, only has to have gaps.
-        """
-        if row["verdict"] == "no_answer":
-            return True
-        self.file.seek(row["case"] * self.size)
-        found = self.file.read(self.size)
-        return len(found) == self.size and ((older and CRC not in row) or row.get(CRC) == zlib.crc32(found))
-
-
 def rows(directory: Path) -> Iterator[records.Row]:
     """The rows one by one; none if there is no file. Raises InputError at a line that is no row."""
     path = directory / CASES
@@ -191,7 +163,7 @@ def rows(directory: Path) -> Iterator[records.Row]:
 
 def _lines(path: Path) -> Iterator[tuple[bytes, records.Row]]:
     """The lines that end, and the rows in them."""
-    with path.open("rb") as file:
+    with regular_file(path, "content", inf).open("rb") as file:
         for number, line in enumerate(file, start=1):
             if not line.endswith(b"\n"):
                 return
@@ -221,18 +193,9 @@ def _valid(name: str, value: object) -> bool:
 
 def append(directory: Path, results: Sequence[Result], m: int, key: str) -> None:
     """Gaps first, then rows, each synced. key : of the series."""
-    with_gaps = [(result.row["case"], result.gap) for result in results if result.gap is not None]
-    if with_gaps:
-        descriptor = os.open(directory / GAPS, os.O_WRONLY | os.O_CREAT, 0o644)
-        try:
-            for case, gap in with_gaps:
-                assert gap is not None
-                os.pwrite(descriptor, gap.tobytes(), case * m * BYTES)
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+    write_gaps(directory, [(result.row["case"], result.gap) for result in results], m)
     checked = [
-        result.row | {"series": key} | ({} if result.gap is None else {CRC: zlib.crc32(result.gap.tobytes())})
+        result.row | {"series": key} | ({} if result.gap is None else {CRC: checksum(result.gap)})
         for result in results
     ]
     records.append(directory / CASES, *checked)
@@ -240,7 +203,7 @@ def append(directory: Path, results: Sequence[Result], m: int, key: str) -> None
 
 def _cut_torn_line(path: Path) -> None:
     """Cut off what follows the last newline: the case of a torn row is solved again."""
-    size = path.stat().st_size
+    size = regular_file(path, "content", inf).stat().st_size
     with path.open("rb") as file:
         end = size
         while end:
