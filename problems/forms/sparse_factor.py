@@ -21,7 +21,7 @@ from .assembly import Matrix
 
 Order = NDArray[np.intp]
 
-BAND_TO_ROW = 20  # a band at most this many times longer than K's mean row is worth it
+BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 LOST = 2.0**-50  # of an unknown's stiffness: a smaller pivot is but the rounding of a zero
 SOFT = 2.0**-30  # of an unknown's stiffness: springs that hold a mechanism
 

@@ -43,7 +43,7 @@ def prepared(scene: Scene) -> SparsePrepared:
             if graded.work < WORTH * model.work:
                 coarser = graded.assembly
         case MatricesScene():
-            assembly = _own(scene)[0]
+            assembly = _sparse(_own(scene)[0], scene)
             folders += ("problems/input", "problems/formats")
         case MadeScene():
             assembly = _sparse(scene.made.assembly, scene)
@@ -88,10 +88,10 @@ def load_case(scene: Scene) -> LoadCase:
 
 
 def _own(scene: MatricesScene) -> tuple[Assembly, LoadCase]:
-    from problems.input.user_matrices import read_matrices  # only for own matrices
+    from problems.input.stored_matrices import stored_matrices  # only for own matrices
 
-    assembly, load = read_matrices(dict(scene.files), sparse=True)
-    return _sparse(assembly, scene), load
+    assembly, load, _, _ = stored_matrices(dict(scene.files), scene.assembly_key, sparse=True)
+    return assembly, load
 
 
 def _sparse(assembly: Assembly, scene: Scene) -> Assembly:
