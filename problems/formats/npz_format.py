@@ -12,11 +12,11 @@ import numpy as np
 
 from problems.formats import NAMES, Data
 from problems.input import sparse_npz
+from problems.input.stored_matrices import SMALL
 
 DESCRIPTION = "a file .npz, bit for bit"
 SUFFIXES = (".npz",)
 DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
-SMALL = 2000  # unknowns up to which K is stored as an array
 
 
 def accepts(path: Path) -> bool:

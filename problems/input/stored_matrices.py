@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.io
 import scipy.sparse as sp
 
 from problems.forms.alteration import Alteration
@@ -19,6 +20,7 @@ from . import user_matrices
 
 ALTERED = tuple(field.name for field in fields(Alteration))
 PARTS = ("data", "indices", "indptr")
+SMALL = 2000  # unknowns up to which a K is solved in the dense forms
 
 
 def stored_matrices(
@@ -45,6 +47,18 @@ def stored_matrices(
     A = _matrix(arrays, "A", facts["shape"])
     assembly = Assembly(blocks, A, arrays.get("nodes"), tuple(facts["parts"]), altered)
     return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
+
+
+def holds_sparse(files: dict[str, Path]) -> bool:
+    """Whether K is stored as a sparse matrix, and large; a file that cannot be read does not."""
+    try:
+        if "problem" in files:
+            with np.load(files["problem"]) as archive:
+                return "K_shape" in archive.files and archive["K_shape"][0] > SMALL
+        rows, _, _, layout, _, _ = scipy.io.mminfo(files["K"])
+        return bool(layout == "coordinate" and rows > SMALL)
+    except Exception:  # zipfile, pickle and mminfo raise their own kinds; whoever reads it says what is wrong
+        return False
 
 
 def _packed(assembly: Assembly, load: LoadCase, sparse: bool) -> cache.Entry:
