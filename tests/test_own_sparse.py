@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from harness.cli.app import app
 from harness.planning import own_matrices, road
 from harness.verification.general_definite import shifted_bound
+from problems import formats
 from problems.build import load_case, prepared
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
@@ -85,6 +86,11 @@ def test_import_validate_and_solve_make_nothing_dense(scipy_npz: bool, tmp_path:
     scene = read_scene(str(out))
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     K, A = data.assembly.blocks[0], data.assembly.A
+    gaps = np.random.default_rng(1).uniform(-0.1, 0.3, (2, M))
+    np.save(tmp_path / "gaps.npy", gaps)
+    series = ("series", str(out), "--gaps", str(tmp_path / "gaps.npy"), "--out", str(tmp_path / "series"))
+    code, said = run(*series)
+    assert (code, "2 within" in said) == (0, True), said
     x, lam = answer(tmp_path / "answer"), np.load(tmp_path / "answer" / "solution.npz")["lam"]
     np.testing.assert_allclose(x, spsolve(K, load.f - A @ lam), atol=1e-11)
     gap = load.g - A.T @ x
@@ -130,3 +136,15 @@ def test_the_bound_without_a_band_is_below_the_smallest_eigenvalue_and_near_it(s
     assert shifted_bound(K, 1.001 * least) == 0.0
     tiny = sp.csc_array(K - (1 - 1e-15) * least * sp.eye_array(150))
     assert shifted_bound(tiny, 1e-16 * least) == 0.0  # within rounding
+
+
+def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:
+    from pyyeti.nastran import op4
+
+    K = band_matrix(np.random.default_rng(2), 50, 2)
+    path, f = tmp_path / "k.op4", np.arange(50.0)[:, None]
+    op4.OP4().write(str(path), {"k": sp.csc_matrix(K), "f": sp.csc_matrix(f)}, binary=True, sparse="bigmat")
+    found = formats.read(path)
+    assert sp.issparse(found["K"])
+    np.testing.assert_array_equal(found["K"].toarray(), K.toarray())
+    np.testing.assert_array_equal(found["f"], f.ravel())
