@@ -21,6 +21,7 @@ from problems.build import load_case, prepared
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
+from problems.input import user_matrices
 from problems.scene import read_scene
 
 N, M = 3000, 40
@@ -148,3 +149,17 @@ def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:
     assert sp.issparse(found["K"])
     np.testing.assert_array_equal(found["K"].toarray(), K.toarray())
     np.testing.assert_array_equal(found["f"], f.ravel())
+
+
+@pytest.mark.parametrize("wrong", ["", "7 7 3,5", "7 7 3D5", "7 7", "7 7 1_0"])
+def test_a_wrong_line_far_down_a_file_is_found_and_counted(
+    wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In blocks of a few lines, of which most are plain; a line that is left out is missed."""
+    monkeypatch.setattr(user_matrices, "CHUNK", 64)
+    lines = [f"{k + 1} {k + 1} {k + 0.5!r}" for k in range(200)]
+    lines[150] = wrong
+    path = tmp_path / "K.mtx"
+    path.write_text("%%MatrixMarket matrix coordinate real general\n200 200 200\n" + "\n".join(lines) + "\n")
+    with pytest.raises(ValueError, match="line 153" if wrong else "truncated: 199 of 200"):
+        user_matrices.read_mtx(path)
