@@ -15,6 +15,7 @@ from test_matrices import write_mtx
 from harness.measurement.solver_session import SolverSession
 from harness.verification.reference import reference, refined_active_set
 from problems.build import load_case, prepared
+from problems.forms import sparse_prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
@@ -122,6 +123,7 @@ def test_what_sweeps_do_not_settle_is_settled_by_sets(
         monkeypatch.setattr(sparse_newton, "MAX_SWEEPS", 1)
     else:
         monkeypatch.setattr(SparsePrepared, "near_compliance", lambda *_: None)
+        monkeypatch.setattr(sparse_prepared, "FEW", -1)
     by_sets = 0
     for load in cases(dense, 6, 3):
         session = session_of(dense)
@@ -151,7 +153,7 @@ def test_sets_alone_solve_a_scene(name: str, monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize("kind", [BandFactor, GeneralFactor])
 def test_a_users_own_sparse_matrices(kind: type, with_nodes: bool, tmp_path: Path) -> None:
     """K in Matrix Market files, a contact on any unknowns; no grid, in one case no band."""
-    random, n, m = np.random.default_rng(7), 350, 40
+    random, n, m = np.random.default_rng(7), 800, 40
     K = graph_matrix(random, n) if kind is GeneralFactor else band_matrix(random, n, 3)
     unit = sp.eye_array(n, format="csc")
     ends = random.permutation(n)

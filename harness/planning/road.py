@@ -9,9 +9,10 @@ from harness.results.machine import physical_memory_mib
 from problems.condensation.build import built
 from problems.errors import InputError
 from problems.forms.names import DENSE_FORMS, Form, default_form
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import JointScene, MatricesScene, Scene
 
 from .estimate import estimated, estimated_sparse, refuse_what_cannot_fit
+from .own_matrices import own_size, refuse_own
 
 FLOPS_PER_S = 2e10  # the comparison hardly depends on it
 WORTH_S = 1.0  # a smaller saving is not worth another road
@@ -37,7 +38,9 @@ def chosen_form(
         return cheaper(scene, taken, cases, in_house)
     if asked not in taken:
         raise InputError.one("--form", "form", asked, f"the solver takes {' and '.join(taken)}")
-    if asked in DENSE_FORMS:
+    if isinstance(scene, MatricesScene):
+        refuse_own(scene, asked)
+    elif asked in DENSE_FORMS:
         refuse_what_cannot_fit(scene, scene.name)
     return Choice(asked)
 
@@ -48,6 +51,8 @@ def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1, in_house: bool 
     Raises InputError if the only form that this machine's memory could hold is not among them.
     """
     usual = default_form([form for form in taken if form in DENSE_FORMS] or taken)
+    if isinstance(scene, MatricesScene):
+        return _own(scene, taken, usual, in_house)
     if not isinstance(scene, JointScene):
         return Choice(usual)
     condensed, sparse = estimated(scene, FLOPS_PER_S), estimated_sparse(scene, FLOPS_PER_S)
@@ -56,10 +61,7 @@ def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1, in_house: bool 
         why = f"its condensed matrices would take {condensed.peak_mib:.0f} MiB"
         if "sparse" in taken and sparse.peak_mib <= physical:
             return Choice("sparse", f"{why}, the sparse model takes {sparse.peak_mib:.0f} MiB")
-        nodes = list(scene.joint.junction.nodes)
-        instead = "" if sparse.peak_mib > physical else "; `newton` takes the sparse form, which would fit"
-        allowed = f"fewer nodes: {why}, this machine has {physical} MiB{instead}"
-        raise InputError.one(scene.name, "junction.nodes", nodes, allowed)
+        refuse_what_cannot_fit(scene, scene.name)
     if not in_house or "sparse" not in taken or usual == "sparse" or sparse.peak_mib > physical:
         return Choice(usual)
     build_s = 0.0 if built(scene) else condensed.build_s
@@ -69,3 +71,23 @@ def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1, in_house: bool 
     if sparse_s + WORTH_S > dense_s:
         return Choice(usual)
     return Choice("sparse", f"about {sparse_s:.0f} s, where condensing first would take {dense_s:.0f} s")
+
+
+def _own(scene: MatricesScene, taken: Sequence[Form], usual: Form, in_house: bool) -> Choice:
+    """The sparse form of a user's sparse K where the dense one does not fit or takes longer."""
+    size = own_size(scene)
+    if size is None or usual == "sparse" or "sparse" not in taken:
+        refuse_own(scene, usual)
+        return Choice(usual)
+    if size.dense_mib > physical_memory_mib():
+        refuse_own(scene, "sparse")
+        dense, sparse = size.dense_mib, size.sparse_mib
+        return Choice(
+            "sparse", f"dense matrices would take {dense:.0f} MiB, the sparse ones {sparse:.0f} MiB"
+        )
+    if not in_house or size.sparse_mib > physical_memory_mib():
+        return Choice(usual)
+    dense_s, sparse_s = size.dense_flops / FLOPS_PER_S, size.sparse_flops / FLOPS_PER_S
+    if sparse_s + WORTH_S > dense_s:
+        return Choice(usual)
+    return Choice("sparse", f"about {sparse_s:.0f} s, where dense factors would take {dense_s:.0f} s")

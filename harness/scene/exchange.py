@@ -10,19 +10,27 @@ import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
 
+from harness.planning.road import cheaper
+from harness.verification.independence import independence
 from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import Fault, InputError
 from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase
+from problems.forms.names import FORMS
 from problems.forms.prepared import Prepared
+from problems.forms.sparse_prepared import SparsePrepared
+from problems.input.digits import DOUBLE
 from problems.input.user_matrices import checked
 from problems.model.scene import MatricesScene
 from problems.scene import read_scene
 
-from .few_digits import digits_sentence
+from .answer import answer_of
+from .few_digits import digits_of, digits_sentence
 from .into_place import into_place
+
+TOLERANCE = 1e-11  # of newton, mm
 
 
 def export(source: str, format: str, out: Path, console: Console) -> None:
@@ -56,7 +64,7 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     given = [(name, Path(path)) for name, _, path in (file.rpartition("=") for file in files)]
     with into_place(out, [path for _, path in given]) as new:
         data, origin = _read_all(given)
-        checked(data, {name: str(path) for name, path in origin.items()})
+        checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)
         formats.write("npz", new, data | {name: sp.csr_array(data[name]) for name in "KA"})
         _refuse_unusable(new, origin)
     _print_facts(out, console)
@@ -109,7 +117,13 @@ def _named(found: formats.Data, name: str, path: Path) -> object:
 def _refuse_unusable(path: Path, origin: dict[str, Path]) -> None:
     """Raise InputError, naming the matrix's own file, if K is indefinite or A's columns are dependent."""
     try:
-        _ = prepared(read_scene(str(path))).Q
+        scene = read_scene(str(path))
+        data = prepared(scene, form=cheaper(scene, FORMS).form)
+        if not isinstance(data, SparsePrepared):
+            _ = data.Q
+        elif data.sparse_factors and data.assembly.m and not independence(data.assembly) > 0:
+            allowed = "no column may depend on the others"
+            raise InputError.one(scene.source_of("A"), "A", "dependent columns", allowed)
     except InputError as error:
         own = [
             replace(fault, where=str(origin["A" if fault.key[0] == "A" else "K"])) for fault in error.faults
@@ -120,13 +134,26 @@ def _refuse_unusable(path: Path, origin: dict[str, Path]) -> None:
 def _print_facts(out: Path, console: Console) -> None:
     """Print size, definiteness, condition and digits of what was read."""
     scene = read_scene(str(out))
-    data = prepared(scene)
-    load = load_case(scene)
-    blocks = " + ".join(str(len(K)) for K in data.assembly.blocks)
+    form = cheaper(scene, FORMS).form
+    data, load = prepared(scene, form=form), load_case(scene, form)
+    blocks = " + ".join(str(K.shape[0]) for K in data.assembly.blocks)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
-    console.print(f"K is symmetric and positive definite, cond(K) = {data.facts['cond_K']:.2e}.")
+    if isinstance(data, SparsePrepared):
+        condition = f"about {data.condition:.1e} in balanced units"
+    else:
+        condition = f"{data.facts['cond_K']:.2e}"
+    console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
     if data.assembly.altered:
         console.print(f"{ALTERED}.", style="yellow")
-    known = reference(data, load)
-    sentence, few = digits_sentence(data, known.x, known.lam)
+    if digits_of(data.assembly) == DOUBLE:
+        x, lam = np.zeros(data.assembly.n), np.zeros(data.assembly.m)  # which the sentence does not need
+    elif isinstance(data, SparsePrepared):
+        from solvers.registry import make_solver  # slow to import
+
+        answer = answer_of("newton", make_solver("newton", {}), data, form, load, TOLERANCE)
+        x, lam = np.asarray(answer.x), np.asarray(answer.lam)
+    else:
+        known = reference(data, load)
+        x, lam = known.x, known.lam
+    sentence, few = digits_sentence(data, x, lam)
     console.print(f"{sentence}.", style="yellow" if few else None)

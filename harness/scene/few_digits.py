@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import scipy.sparse as sp
 
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Assembly, Vector
@@ -12,7 +15,11 @@ from problems.input.digits import DOUBLE, apparent_digits, expected_error
 
 def digits_of(assembly: Assembly) -> int:
     """The fewest digits that the entries of a block of K seem to have, at most 16."""
-    return min(apparent_digits(K[np.nonzero(K)]) for K in assembly.blocks)
+    return min(apparent_digits(_entries(K)) for K in assembly.blocks)
+
+
+def _entries(K: Any) -> Vector:
+    return K.data if sp.issparse(K) else K[np.nonzero(K)]
 
 
 def digits_sentence(data: Prepared, x: Vector, lam: Vector) -> tuple[str, bool]:

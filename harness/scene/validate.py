@@ -17,9 +17,12 @@ from harness.planning.estimate import (
     estimated_sparse,
     refuse_what_cannot_fit,
 )
+from harness.planning.road import cheaper
 from harness.results.machine import physical_memory_mib
 from problems.build import prepared
 from problems.condensation.build import built
+from problems.forms.names import FORMS
+from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, Scene
@@ -81,10 +84,13 @@ def _sparse(estimate: SparseEstimate) -> str:
 
 def _matrices(scene: Scene, console: Console) -> None:
     """Print the sizes and digits of given matrices. Raises InputError if K is not positive definite."""
-    data = prepared(scene)
-    _ = data.Q
+    road = cheaper(scene, FORMS)
+    data = prepared(scene, form=road.form)
+    _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.Q
     assembly = data.assembly
-    blocks = ", ".join(str(len(K)) for K in assembly.blocks)
+    blocks = ", ".join(str(K.shape[0]) for K in assembly.blocks)
+    if isinstance(data, SparsePrepared):
+        console.print(f"Sparse form by default: {road.why}.")
     console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")

@@ -21,7 +21,7 @@ from harness.results.schema import VERDICTS
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
-from problems.model.scene import JointScene, Scene
+from problems.model.scene import JointScene
 
 from . import store
 from .isolated import solve_isolated
@@ -59,7 +59,7 @@ def run(
     with records.locked(directory, ()):
         store.open_series(directory, identity(job) | facts, metadata(job))
         key = store.series_key(identity(job) | facts)
-        done, removed = store.solved(directory, job.cases, key, contact_count(job.scene))
+        done, removed = store.solved(directory, job.cases, key, contact_count(job))
         if removed:
             again = "their gaps were missing or damaged, or they were there twice"
             console.print(f"{removed} rows removed: {again}", style="yellow")
@@ -192,10 +192,10 @@ def record_contacts(job: Job, directory: Path) -> int:
     return assembly.m
 
 
-def contact_count(scene: Scene) -> int:
+def contact_count(job: Job) -> int:
     """m, without opening the assembly unless only its files say it."""
-    size = scene.expected_size
-    return prepared(scene).assembly.m if size is None else size[1]
+    size = job.scene.expected_size
+    return prepared(job.scene, form=job.form).assembly.m if size is None else size[1]
 
 
 def summary(tally: Tally, asked: int, console: Console) -> int:

@@ -2,7 +2,8 @@
 
 DKD has the digits of K and a diagonal between 1/2 and 2 (see problems.forms.balance). As in `definite`, a
 Cholesky factorisation of fl(DKD − sI) that runs to completion proves λmin(DKD) ≥ s − γ_{2(b+2)} ‖|R|ᵀ|R|‖₂ …,
-where no sum has more than b + 1 terms in a band of half-width b (Higham 2002, theorem 10.3).
+where no sum has more than b + 1 terms in a band of half-width b (Higham 2002, theorem 10.3). A K without a
+narrow band is factored as it is for the solutions (see `general_definite`).
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from scipy.linalg import blas, lapack
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.balance import least_eigenvalue
-from problems.forms.sparse_factor import lower_band, narrowest_order
+from problems.forms.sparse_factor import GeneralFactor, Renumbered, lower_band
 from problems.forms.sparse_prepared import SparsePrepared
 
 from .definite import SMALLEST
 from .exact_residual import U, gamma
+from .general_definite import shifted_bound
 
 SHARES = (0.5, 0.1, 0.01)  # of the estimate, tried in turn
 
@@ -28,11 +30,15 @@ def smallest_eigenvalue(prepared: SparsePrepared, D: Vector) -> float:
     for k, (K, rows) in enumerate(zip(assembly.blocks, assembly.slices, strict=True)):
         d = D[rows]
         scaled = sp.csc_array(sp.diags_array(d) @ K @ sp.diags_array(d))
-        order = narrowest_order(scaled, None if assembly.nodes is None else assembly.nodes[rows])
-        if order is not None:
-            scaled = sp.csc_array(scaled[order][:, order])
-        solve = prepared.sparse_factors[k].solve
-        least = min(least, _of_band(scaled, least_eigenvalue(solve, d)))
+        factor = prepared.sparse_factors[k]
+        estimate = least_eigenvalue(factor.solve, d)
+        if isinstance(factor, GeneralFactor):
+            bounds = (shifted_bound(scaled, share * estimate) for share in SHARES)
+            least = min(least, next((bound for bound in bounds if bound > 0), 0.0))
+            continue
+        if isinstance(factor, Renumbered):
+            scaled = sp.csc_array(scaled[factor.order][:, factor.order])
+        least = min(least, _of_band(scaled, estimate))
     return float(least)
 
 

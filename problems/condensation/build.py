@@ -7,16 +7,13 @@ scene → LoadCase (f, g), loads beyond the junction condensed
 from __future__ import annotations
 
 import time
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.stages import Progress, Stored, indefinite
-from problems.input import user_matrices
 from problems.model.effect import ForceEffect, GapEffect, TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
@@ -25,8 +22,6 @@ from problems.storage.fingerprint import fingerprint
 
 from .condense import NotPositiveDefinite
 from .condensed_part import condensed_part, part_key
-
-ALTERED = tuple(field.name for field in fields(Alteration))
 
 
 def prepared(scene: Scene, progress: Progress) -> Stored:
@@ -38,15 +33,8 @@ def prepared(scene: Scene, progress: Progress) -> Stored:
         case JointScene():
             return _condensed(scene, progress)
         case MatricesScene():
-            (arrays, facts), key = _user_matrices(scene)
-            columns = tuple(arrays[f"A_{name}"] for name in ("data", "indices", "indptr"))
-            A = sp.csc_array(columns, shape=facts["shape"])
-            blocks = tuple(arrays[f"K{k}"] for k in range(len(facts["parts"])))
-            altered = (
-                Alteration(*(arrays[f"altered_{name}"] for name in ALTERED)) if facts["altered"] else None
-            )
-            assembly = Assembly(blocks, A, arrays.get("nodes"), tuple(facts["parts"]), altered)
-            return Stored(assembly, key, facts["seconds"], scene.source_of, True, progress)
+            assembly, _, seconds, key = _own(scene)
+            return Stored(assembly, key, {"condensation": seconds}, scene.source_of, True, progress)
         case MadeScene():
             no_time = {"condensation": 0.0}
             return Stored(scene.made.assembly, scene.assembly_key, no_time, scene.source_of, True, progress)
@@ -66,8 +54,7 @@ def load_case(scene: Scene) -> LoadCase:
         case JointScene():
             return _load_of_effects(scene)
         case MatricesScene():
-            (arrays, _), _ = _user_matrices(scene)
-            return LoadCase(np.array(arrays["f"]), np.array(arrays["g"]))
+            return _own(scene)[1]
         case MadeScene():
             return scene.made.load
     raise TypeError(type(scene).__name__)
@@ -123,30 +110,10 @@ def _springs(scene: JointScene, untied_key: str) -> tuple[sp.csc_array, Vector, 
     return T, k, cache.digest("springs", untied_key, T.indices.tolist(), T.data.tolist(), k.tolist(), code)
 
 
-def _user_matrices(scene: MatricesScene) -> tuple[cache.Entry, str]:
-    """A user's K, A, f, g, read and checked once, and their key."""
-    key = cache.digest("own", scene.assembly_key, fingerprint([Path(user_matrices.__file__)]))
+def _own(scene: MatricesScene) -> tuple[Assembly, LoadCase, float, str]:
+    from problems.input.stored_matrices import stored_matrices  # only for own matrices
 
-    def made() -> cache.Entry:
-        start = time.perf_counter()
-        assembly, load = user_matrices.read_matrices(dict(scene.files))
-        A = assembly.A
-        arrays = {"A_data": A.data, "A_indices": A.indices, "A_indptr": A.indptr, "f": load.f, "g": load.g}
-        if assembly.nodes is not None:
-            arrays["nodes"] = assembly.nodes
-        arrays |= {f"K{k}": K for k, K in enumerate(assembly.blocks)}
-        if assembly.altered:
-            arrays |= {f"altered_{name}": getattr(assembly.altered, name) for name in ALTERED}
-        steps = {"condensation": time.perf_counter() - start}
-        facts = {
-            "parts": assembly.parts,
-            "shape": A.shape,
-            "altered": bool(assembly.altered),
-            "seconds": steps,
-        }
-        return arrays, facts
-
-    return cache.load_or_make(key, made), key
+    return stored_matrices(dict(scene.files), scene.assembly_key, sparse=False)
 
 
 def _load_of_effects(scene: JointScene) -> LoadCase:

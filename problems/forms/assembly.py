@@ -89,6 +89,11 @@ class Assembly:
             found += [sparse.data, sparse.indices, sparse.indptr] if sp.issparse(K) else [K]
         return found
 
+    @property
+    def sparse_blocks(self) -> tuple[sp.csc_array, ...]:
+        """K's blocks as sparse matrices; not copied if they are."""
+        return tuple(sp.csc_array(K) for K in self.blocks)
+
     def multiply_K(self, x: Matrix) -> Matrix:
         """K x, block by block."""
         return np.concatenate([K @ x[s] for K, s in zip(self.blocks, self.slices, strict=True)])

@@ -67,7 +67,7 @@ def near_inverse(factor: BandFactor, rows: Rows, reach: int, single: bool = True
     Z = np.zeros((0, 0), dtype, order="F")
     columns: list[Entries] = []  # of the following blocks: Z_{i+1,j} at the columns asked for
     for i in reversed(range(count)):
-        diagonal, below = _blocks(L, int(edges[i]), int(edges[i + 1]), width, dtype)
+        diagonal, below = band_blocks(L, int(edges[i]), int(edges[i + 1]), width, dtype)
         inverse = potri(diagonal, lower=1)[0]
         Z_ii = np.tril(inverse) + np.tril(inverse, -1).T
         if i + 1 < count:
@@ -81,7 +81,7 @@ def near_inverse(factor: BandFactor, rows: Rows, reach: int, single: bool = True
     return NearInverse(rows, starts, tuple(panels))
 
 
-def _blocks(
+def band_blocks(
     L: NDArray[np.float64], start: int, stop: int, width: int, dtype: np.dtype[Any]
 ) -> tuple[Entries, Entries]:
     """L_ii, lower triangular, and L_{i+1,i} (upper triangular, as many rows as there are)."""

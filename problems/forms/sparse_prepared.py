@@ -19,8 +19,10 @@ from .near_compliance import NearCompliance, near_compliance
 from .near_inverse import Rows
 from .prepared import MIB, Prepared
 from .sparse_factor import BandFactor, Factor, GeneralFactor, NotPositiveDefinite, Renumbered, factored
+from .whole_compliance import whole_compliance
 
 SAMPLE = 3  # contacts, for the size of Q
+FEW = 3000  # contacts for which Q is small beside K
 SINGLE_BITS = 18  # of cond(Q_WW): more are lost in float32
 
 
@@ -123,8 +125,11 @@ class SparsePrepared(Prepared):
     def approximate_inverse(self) -> ApproximateInverse | None:
         """M ≈ Q⁻¹ with a narrow band, and about the diagonal of Q; None where K has no band.
 
-        In single precision; in double where some Q_WW is not positive definite in that.
+        In single precision; in double where some Q_WW is not positive definite in that. Of few contacts
+        without coordinates M = Q⁻¹.
         """
+        if self.assembly.contact_nodes is None and self.assembly.m <= FEW:
+            return self._exact_inverse()
         windows = self._windows()
         for single in (True, False) if self._single_might_do() else (False,):
             near = self.near_compliance(windows.contacts(), single)
@@ -136,6 +141,16 @@ class SparsePrepared(Prepared):
                 diagonal[line] = np.diag(near.submatrix(line))
             with suppress(np.linalg.LinAlgError):
                 return ApproximateInverse(of_windows(windows, near.submatrix), diagonal)
+        return None
+
+    def _exact_inverse(self) -> ApproximateInverse | None:
+        pairs = zip(self.sparse_factors, self.assembly.slices, strict=True)
+        Q = sum(whole_compliance(factor, sp.csc_array(self.assembly.A[rows])) for factor, rows in pairs)
+        assert isinstance(Q, np.ndarray)
+        diagonal = np.array(Q.diagonal())
+        m = self.assembly.m
+        with suppress(np.linalg.LinAlgError):
+            return ApproximateInverse(of_windows(Windows(np.arange(m), m), lambda _: Q), diagonal)
         return None
 
     def _single_might_do(self) -> bool:

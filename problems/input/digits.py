@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
 from problems.forms.compliance import dense_submatrix
@@ -52,9 +53,10 @@ def expected_error(prepared: Prepared, x: Vector, lam: Vector, digits: int) -> f
     for _ in range(DRAWS):
         force = np.zeros(assembly.n)
         for K, own in zip(assembly.blocks, assembly.slices, strict=True):
-            size = 0.5 * 10.0 ** (np.floor(np.log10(np.where(K == 0, 1.0, abs(K)))) + 1 - digits)
-            drawn = random.uniform(-1, 1, K.shape) * size * (K != 0)
-            force[own] = (np.triu(drawn) + np.triu(drawn, 1).T) @ x[own]
+            upper = sp.coo_array(sp.triu(sp.coo_array(K)))
+            size = 0.5 * 10.0 ** (np.floor(np.log10(abs(upper.data))) + 1 - digits)
+            drawn = sp.csr_array((random.uniform(-1, 1, size.shape) * size, upper.coords), shape=K.shape)
+            force[own] = (drawn + sp.triu(drawn, 1).T) @ x[own]
         dx = prepared.solve_K(force)
         if closed.size:
             dx -= prepared.solve_K(A_C @ np.linalg.solve(Q_CC, A_C.T @ dx))

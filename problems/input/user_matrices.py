@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from problems.errors import Fault, InputError
 from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase
 
+from . import sparse_npz
 from .bounded import LARGEST
 
 U = 2.0**-53  # relative rounding error of float64
@@ -148,8 +150,7 @@ def _ends_of_blocks(K: sp.csr_array) -> Iterator[tuple[int, int]]:
 
 def _read_npz(path: Path) -> dict[str, Any]:
     try:
-        with np.load(path) as archive:
-            return {key: archive[key] for key in (*"KAfg", "nodes") if key in archive.files}
+        return sparse_npz.read(path, (*"KAfg", "nodes"))
     except (OSError, ValueError, EOFError, KeyError) as error:
         raise InputError.one(path, "file", str(error), "a readable .npz with K, A, f, g") from error
     except Exception as error:  # zipfile and pickle raise their own kinds
@@ -165,6 +166,12 @@ def _read_mtx(path: Path, key: str) -> Any:
 
 
 Kind = Callable[[bytes], float]  # int or float
+CHUNK = 2**20  # bytes of lines that are checked at once
+#: Most lines of most files: two indices and a decimal number, or a number alone.
+PLAIN = {
+    "coordinate": re.compile(rb"(?:\d++ ++\d++ ++[-+]?+\d++(?:\.\d*+)?+(?:[eE][-+]?+\d++)?+\n)++"),
+    "array": re.compile(rb"(?:[-+]?+\d++(?:\.\d*+)?+(?:[eE][-+]?+\d++)?+\n)++"),
+}
 
 
 def read_mtx(path: Path) -> Any:
@@ -190,22 +197,30 @@ def _refuse_wrong_lines(path: Path, entries: int, layout: str, field: str) -> No
     """Raise ValueError unless the lines after the sizes are `entries` entries, with indices if sparse."""
     values: dict[str, list[Kind]] = {"pattern": [], "integer": [int], "complex": [float, float]}
     kinds = ([int, int] if layout == "coordinate" else []) + values.get(field, [float])
-    found = -1  # the size line
+    found, before = -1, 0  # the size line is none
     with path.open("rb") as file:
-        for number, line in enumerate(file, start=1):
-            words = line.split()
-            if not words or line.startswith(b"%"):
+        while lines := file.readlines(CHUNK):
+            if found >= 0 and field == "real" and PLAIN[layout].fullmatch(b"".join(lines)):
+                found, before = found + len(lines), before + len(lines)
                 continue
-            found += 1
-            if found == 0:
-                continue
-            try:
-                for kind, word in zip(kinds, words, strict=True):
-                    kind(word)
-                if b"_" in line:
-                    raise ValueError
-            except ValueError:
-                text = line[:LONGEST_LINE].decode(errors="replace").rstrip()
-                raise ValueError(f"line {number}: {text!r}; each line must hold one entry") from None
+            for number, line in enumerate(lines, start=before + 1):
+                words = line.split()
+                if not words or line.startswith(b"%"):
+                    continue
+                found += 1
+                if found:
+                    _refuse_wrong_line(number, line, words, kinds)
+            before += len(lines)
     if found != entries:
         raise ValueError(f"truncated: {found} of {entries} entries")
+
+
+def _refuse_wrong_line(number: int, line: bytes, words: list[bytes], kinds: list[Kind]) -> None:
+    try:
+        for kind, word in zip(kinds, words, strict=True):
+            kind(word)
+        if b"_" in line:
+            raise ValueError
+    except ValueError:
+        text = line[:LONGEST_LINE].decode(errors="replace").rstrip()
+        raise ValueError(f"line {number}: {text!r}; each line must hold one entry") from None

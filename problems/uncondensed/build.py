@@ -25,6 +25,7 @@ from .whole_model import WholeModel
 
 WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
 DENSEST = 0.25  # of a block's entries: a denser K gains nothing from this form
+LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 SMALL = 200  # unknowns up to which any K is taken
 
 
@@ -43,7 +44,7 @@ def prepared(scene: Scene) -> SparsePrepared:
             if graded.work < WORTH * model.work:
                 coarser = graded.assembly
         case MatricesScene():
-            assembly = _own(scene)[0]
+            assembly = _sparse(_own(scene)[0], scene)
             folders += ("problems/input", "problems/formats")
         case MadeScene():
             assembly = _sparse(scene.made.assembly, scene)
@@ -56,7 +57,7 @@ def prepared(scene: Scene) -> SparsePrepared:
 
 
 class _OfScene(SparsePrepared):
-    """Says of a mechanism where it moves, as an error of the scene."""
+    """Says of a mechanism where it moves, as an error of the scene, and refuses a nearly singular own K."""
 
     def __init__(self, scene: Scene, *given: Any) -> None:
         super().__init__(*given)
@@ -65,7 +66,7 @@ class _OfScene(SparsePrepared):
     @cached_property
     def sparse_factors(self) -> tuple[Factor, ...]:
         try:
-            return super().sparse_factors
+            found = super().sparse_factors
         except NotPositiveDefinite as error:
             from problems.forms.stages import indefinite  # which imports the code of dense factors
 
@@ -73,6 +74,13 @@ class _OfScene(SparsePrepared):
             where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[unknown])
             key, moves = f"x[{unknown}]{where}", "moves without a force"
             raise indefinite(self.scene.source_of("K"), key, moves) from error
+        if isinstance(self.scene, MatricesScene):
+            self.__dict__["sparse_factors"] = found  # which the condition number needs
+            if self.condition > LARGEST_CONDITION:
+                from problems.forms.stages import indefinite
+
+                raise indefinite(self.scene.source_of("K"), "cond(K), in balanced units", self.condition)
+        return found
 
 
 def load_case(scene: Scene) -> LoadCase:
@@ -88,10 +96,10 @@ def load_case(scene: Scene) -> LoadCase:
 
 
 def _own(scene: MatricesScene) -> tuple[Assembly, LoadCase]:
-    from problems.input.user_matrices import read_matrices  # only for own matrices
+    from problems.input.stored_matrices import stored_matrices  # only for own matrices
 
-    assembly, load = read_matrices(dict(scene.files), sparse=True)
-    return _sparse(assembly, scene), load
+    assembly, load, _, _ = stored_matrices(dict(scene.files), scene.assembly_key, sparse=True)
+    return assembly, load
 
 
 def _sparse(assembly: Assembly, scene: Scene) -> Assembly:

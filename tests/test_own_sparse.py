@@ -1,0 +1,165 @@
+"""A user's own sparse K from its files to the answer: nothing dense, and one message for what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
+from sparse_matrices import band_matrix, graph_matrix, renumbered
+from typer.testing import CliRunner
+
+from harness.cli.app import app
+from harness.planning import own_matrices, road
+from harness.verification.general_definite import shifted_bound
+from problems import formats
+from problems.build import load_case, prepared
+from problems.forms.assembly import Vector
+from problems.forms.prepared import Prepared
+from problems.forms.sparse_prepared import SparsePrepared
+from problems.input import user_matrices
+from problems.scene import read_scene
+
+N, M = 3000, 40
+
+
+def dense(self: Any) -> None:
+    raise AssertionError("a dense matrix was asked for")
+
+
+@pytest.fixture(autouse=True)
+def _nothing_dense(monkeypatch: pytest.MonkeyPatch) -> None:
+    for kind in (Prepared, SparsePrepared):
+        monkeypatch.setattr(kind, "factors", property(dense))
+        monkeypatch.setattr(kind, "Q", property(dense))
+    monkeypatch.setattr(road, "physical_memory_mib", lambda: 150)  # holds the sparse form alone
+    monkeypatch.setattr(own_matrices, "physical_memory_mib", lambda: 200)
+
+
+def files(folder: Path, K: sp.csc_array | None = None, scipy_npz: bool = False) -> list[str]:
+    """Two bodies in one K, their unknowns interleaved at random, contacts between them, as files."""
+    random = np.random.default_rng(3)
+    order = random.permutation(N)
+    if K is None:
+        K = sp.csc_array(sp.block_diag([band_matrix(random, N // 2, 4)] * 2))
+    unit = sp.eye_array(N, format="csc")
+    A = sp.csc_array(unit[:, :M] - unit[:, N // 2 : N // 2 + M])
+    f, g = random.normal(0, 1, N), random.uniform(-0.1, 0.3, M)
+    K, A = renumbered(K, order), sp.csc_array(A[order])
+    if scipy_npz:
+        sp.save_npz(folder / "K.npz", sp.csc_matrix(K))
+        sp.save_npz(folder / "A.npz", sp.csr_matrix(A))
+    else:
+        scipy.io.mmwrite(folder / "K.mtx", K, symmetry="symmetric", precision=17)
+        scipy.io.mmwrite(folder / "A.mtx", A, precision=17)
+    for name, vector in (("f", f), ("g", g)):
+        scipy.io.mmwrite(folder / f"{name}.mtx", vector[:, None], precision=17)
+    suffix = "npz" if scipy_npz else "mtx"
+    return [str(folder / f"{name}.{suffix if name in 'KA' else 'mtx'}") for name in "KAfg"]
+
+
+def run(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, list(words))
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done.exit_code, " ".join(done.output.split())
+
+
+def answer(folder: Path) -> Vector:
+    return np.asarray(np.load(folder / "solution.npz")["x"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scipy_npz", [False, True])
+def test_import_validate_and_solve_make_nothing_dense(scipy_npz: bool, tmp_path: Path) -> None:
+    out = tmp_path / "mine.npz"
+    code, said = run("import", *files(tmp_path, scipy_npz=scipy_npz), "--out", str(out))
+    assert (code, "positive definite, cond(K) = about" in said) == (0, True), said
+    assert out.stat().st_size < 8 * N**2 / 20
+    code, said = run("validate", str(out))
+    assert (code, "Sparse form by default" in said) == (0, True), said
+    code, said = run("solve", str(out), "--out", str(tmp_path / "answer"))
+    assert (code, "proven" in said) == (0, True), said
+    # The optimality conditions in the user's numbering, by another factorisation.
+    scene = read_scene(str(out))
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    K, A = data.assembly.blocks[0], data.assembly.A
+    gaps = np.random.default_rng(1).uniform(-0.1, 0.3, (2, M))
+    np.save(tmp_path / "gaps.npy", gaps)
+    series = ("series", str(out), "--gaps", str(tmp_path / "gaps.npy"), "--out", str(tmp_path / "series"))
+    code, said = run(*series)
+    assert (code, "2 within" in said) == (0, True), said
+    x, lam = answer(tmp_path / "answer"), np.load(tmp_path / "answer" / "solution.npz")["lam"]
+    np.testing.assert_allclose(x, spsolve(K, load.f - A @ lam), atol=1e-11)
+    gap = load.g - A.T @ x
+    assert lam.min() >= 0
+    assert gap.min() >= -1e-11
+    assert 0 < np.count_nonzero(lam) < M
+    assert abs(lam * gap).max() < 1e-10
+
+
+def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path) -> None:
+    ends = np.array([1.0, *[2.0] * (N - 2), 1.0])
+    chain = sp.diags_array([ends, -np.ones(N - 1), -np.ones(N - 1)], offsets=[0, 1, -1], shape=(N, N))
+    K = sp.csc_array(chain + 1e-15 * sp.eye_array(N))
+    code, said = run("import", *files(tmp_path, K), "--out", str(tmp_path / "mine.npz"))
+    assert code == 2
+    assert "K.mtx" in said
+    assert "is a part held against every rigid motion?" in said
+    assert not (tmp_path / "mine.npz").exists()
+
+
+def test_a_form_that_cannot_fit_is_refused_with_the_figures(tmp_path: Path) -> None:
+    out = tmp_path / "mine.npz"
+    assert run("import", *files(tmp_path), "--out", str(out))[0] == 0
+    code, said = run("solve", str(out), "--form", "dual", "--out", str(tmp_path / "answer"))
+    assert code == 2
+    assert f"{N} unknowns" in said
+    assert "this machine has 200; the sparse form (--form sparse) needs 1" in said
+
+
+def test_a_mechanism_is_named(tmp_path: Path) -> None:
+    K = sp.csc_array(sp.block_diag([band_matrix(np.random.default_rng(1), N - 1, 4), [[0.0]]]))
+    code, said = run("import", *files(tmp_path, K), "--out", str(tmp_path / "mine.npz"))
+    order = np.random.default_rng(3).permutation(N)
+    assert code == 2
+    assert f"x[{np.flatnonzero(order == N - 1)[0]}]" in said
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_bound_without_a_band_is_below_the_smallest_eigenvalue_and_near_it(seed: int) -> None:
+    K = graph_matrix(np.random.default_rng(seed), 150)
+    least = float(np.linalg.eigvalsh(K.toarray())[0])
+    assert 0.89 * least < shifted_bound(K, 0.9 * least) <= 0.9 * least
+    assert shifted_bound(K, 1.001 * least) == 0.0
+    tiny = sp.csc_array(K - (1 - 1e-15) * least * sp.eye_array(150))
+    assert shifted_bound(tiny, 1e-16 * least) == 0.0  # within rounding
+
+
+def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:
+    from pyyeti.nastran import op4
+
+    K = band_matrix(np.random.default_rng(2), 50, 2)
+    path, f = tmp_path / "k.op4", np.arange(50.0)[:, None]
+    op4.OP4().write(str(path), {"k": sp.csc_matrix(K), "f": sp.csc_matrix(f)}, binary=True, sparse="bigmat")
+    found = formats.read(path)
+    assert sp.issparse(found["K"])
+    np.testing.assert_array_equal(found["K"].toarray(), K.toarray())
+    np.testing.assert_array_equal(found["f"], f.ravel())
+
+
+@pytest.mark.parametrize("wrong", ["", "7 7 3,5", "7 7 3D5", "7 7", "7 7 1_0"])
+def test_a_wrong_line_far_down_a_file_is_found_and_counted(
+    wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In blocks of a few lines, of which most are plain; a line that is left out is missed."""
+    monkeypatch.setattr(user_matrices, "CHUNK", 64)
+    lines = [f"{k + 1} {k + 1} {k + 0.5!r}" for k in range(200)]
+    lines[150] = wrong
+    path = tmp_path / "K.mtx"
+    path.write_text("%%MatrixMarket matrix coordinate real general\n200 200 200\n" + "\n".join(lines) + "\n")
+    with pytest.raises(ValueError, match="line 153" if wrong else "truncated: 199 of 200"):
+        user_matrices.read_mtx(path)
