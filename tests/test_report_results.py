@@ -68,7 +68,7 @@ def test_a_section_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 # Layers.
 
 LAYERS = ("document", "results", "analysis", "figures", "sections", "writers")
-FROM_OUTSIDE = {"harness.results.schema", "harness.results.provenance"}
+FROM_OUTSIDE = {"harness.results.digits", "harness.results.provenance", "harness.results.schema"}
 OWN = ("harness", "solvers", "problems", "report")
 
 

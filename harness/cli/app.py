@@ -1,4 +1,4 @@
-"""The command line: run, report, gate, list; the other commands are in check.py, series.py and scene.py.
+"""The command line: run, report, gate, list; each other file of this folder has further commands.
 
 Modules that are slow to import are imported inside the commands.
 """
@@ -17,6 +17,7 @@ import typer
 from harness.terminal.console import FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
 
 from . import check as check_command
+from . import compare as compare_command
 from . import scene as scene_commands
 from . import series as series_command
 
@@ -24,6 +25,7 @@ app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
 app.add_typer(check_command.app)
+app.add_typer(compare_command.app)
 app.add_typer(scene_commands.app)
 app.add_typer(series_command.app)
 
@@ -47,11 +49,12 @@ def harness() -> None:
       python -m harness run --plugin mine.py      with a solver of your own
       python -m harness solve scene.toml --out d  one scene: gaps, displacements, forces, with pictures
       python -m harness series SCENE --out DIR    thousands of load cases on one assembly
+      python -m harness compare OLD NEW           what became worse between two runs
       python -m harness COMMAND --help            help on each command
 
     \b
-    Exit codes: 0 ok, 1 accuracy lost, 2 wrong usage or bad input,
-                3 nothing could be judged, 130 interrupted.
+    Exit codes: 0 ok, 1 accuracy lost, 2 wrong usage or bad input, 3 nothing could be judged,
+                4 gap larger than allowed, 5 inputs that do not belong together, 130 interrupted.
     """
 
 

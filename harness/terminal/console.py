@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .exit_codes import INTERRUPTED, WRONG_USAGE
+from .exit_codes import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,6 +53,7 @@ def error_reporting(
     interrupted: str = "Interrupted. The rows so far are kept: run the same command again to continue.",
 ) -> Iterator[Console]:
     """A console; each user error becomes a red line and an exit code, not a traceback."""
+    from harness.results.incomparable import Incomparable
     from problems.errors import InputError
 
     from .plain_console import PlainConsole
@@ -65,7 +66,7 @@ def error_reporting(
             errors.print(str(fault), style="red")
         if (more := len(error.faults) - MOST_FAULTS) > 0:
             errors.print(f"… and {more} more", style="red")
-        raise typer.Exit(WRONG_USAGE) from None
+        raise typer.Exit(NOT_COMPARABLE if isinstance(error, Incomparable) else WRONG_USAGE) from None
     except UnicodeEncodeError as error:
         where = error.object.count("\n", 0, error.start)
         line = error.object.split("\n")[where][:LONGEST_LINE]

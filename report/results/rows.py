@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import of_kind
+from report.document.escape import quoted
 
 from .older import as_today
 
@@ -45,6 +46,11 @@ def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str
         asked = rows["solver"].map(lambda s, key=name: options.get(s, {}).get(key, suite.get(key)))
         rows[name] = rows[name].fillna(pd.to_numeric(asked, errors="coerce"))
     return rows.drop_duplicates([*CELL, "repeat", "case"], keep="last").reset_index(drop=True)
+
+
+def of_records(records: list[dict[str, Any]]) -> pd.DataFrame:
+    """Rows without the scenes and the suite that they belong to, with every text quoted."""
+    return frame(quoted(records), pd.DataFrame(), {})
 
 
 def _text(value: object) -> str:

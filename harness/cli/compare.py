@@ -1,0 +1,82 @@
+"""The command `compare`: what became worse between runs?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from harness.terminal.console import error_reporting, option
+
+if TYPE_CHECKING:
+    from harness.results.sides import Side
+    from report.writers.comparison import Comparison
+
+app = typer.Typer(rich_markup_mode=None)
+
+MAX_SLOWDOWN = 1.3
+
+
+@app.command()
+def compare(
+    old: Annotated[str, typer.Argument(metavar="OLD", help="Directory that `run` wrote, or DIR@COMMIT.")],
+    new: Annotated[list[str], typer.Argument(metavar="NEW...", help="Those to compare with it.")],
+    max_digits_lost: Annotated[float, option("N", "Digits of the error that may be lost.", min=0.0)] = 1.0,
+    max_slowdown: Annotated[
+        float | None, option("FACTOR", f"Ratio of times that is allowed.  [default: {MAX_SLOWDOWN}]", min=1.0)
+    ] = None,
+    out: Annotated[Path | None, option("DIR", "Write comparison.md and comparison.csv there.")] = None,
+) -> None:
+    """Compare runs, measurement by measurement; what became worse comes first.
+
+    Worse is a worse verdict, more digits of the error lost than allowed, a time per load case beyond the
+    allowed ratio and beyond the noise of both sides, or a measurement that is missing. Every NEW is compared
+    with OLD. DIR@COMMIT are the rows of one commit alone, those that `run` has set aside included. Times are
+    compared if both sides are of one machine.
+
+    \b
+    Examples:
+      python -m harness compare results/published/default results/default
+      python -m harness compare results/gate@1a2b3c4 results/gate@5d6e7f8
+      python -m harness compare before after --max-digits-lost 0.5 --max-slowdown 2 --out compared
+
+    \b
+    Exit codes: 0 nothing worse, 1 something became worse, 2 wrong usage or bad input,
+                5 not comparable: other problems, limits or suites; --max-slowdown on another machine.
+    """
+    with error_reporting() as console:
+        from harness.results.sides import read_side
+        from harness.terminal.changes import show
+        from harness.terminal.exit_codes import DONE, FAILED
+        from report.analysis.comparison import WORSE
+        from report.writers.comparison import write
+
+        before = read_side(old)
+        compared = [_compared(before, read_side(name), max_digits_lost, max_slowdown) for name in new]
+        for comparison in compared:
+            show(comparison, console)
+        if out:
+            console.print(f"Comparison: {write(out, compared)}")
+        raise typer.Exit(FAILED if any(each.count(*WORSE) for each in compared) else DONE)
+
+
+def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float | None) -> Comparison:
+    from harness.results.incomparable import Incomparable
+    from harness.results.sides import measurement, refuse_incomparable
+    from report.analysis.comparison import compared
+    from report.document.escape import quoted
+    from report.results.rows import of_records
+    from report.writers.comparison import Comparison
+
+    refuse_incomparable(old, new)
+    timed = len(old.machines | new.machines) == 1
+    untimed = "" if timed else "Times are not compared: they are of different machines."
+    if not timed and max_slowdown is not None:
+        allowed = f"times of one machine: {'; '.join(sorted(old.machines | new.machines))}"
+        raise Incomparable.one(new.name, "--max-slowdown", max_slowdown, allowed)
+    before, after = (
+        of_records([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)
+    )
+    table = compared(before, after, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
+    return Comparison(quoted(old.name), quoted(new.name), table, untimed)

@@ -1,0 +1,121 @@
+"""What changed between two runs, measurement by measurement, what became worse first.
+
+Repeats are merged so that nothing looks better than it was: the worst verdict with its status, the largest
+error, the median of the iterations and of the seconds per load case t = set-up + solve + form. The ratio of
+times, median over median, has the interval
+
+    [least t_new / most t_old, most t_new / least t_old]
+
+over the repeats. A side with fewer than three is taken to vary by the factor TIE, as single runs do. With
+three on each side, all of the new ones are slower by chance alone once in 20 times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from harness.results.digits import digits_lost, floor_mm
+from harness.results.schema import ANSWERED, VERDICTS
+
+from .standings import TIE
+
+ENOUGH = 3  # repeats whose spread says how much times vary
+MISSING = "not measured"
+#: The kinds of lines, in their order.
+GONE, JUDGED_WORSE, DIGITS, SLOWER, CHANGED, BETTER, ADDED, SAME = range(8)
+WORSE = (GONE, JUDGED_WORSE, DIGITS, SLOWER)
+
+
+def compared(
+    old: pd.DataFrame, new: pd.DataFrame, timed: bool, max_digits_lost: float, max_slowdown: float
+) -> pd.DataFrame:
+    """One line per measurement of either side. old, new : rows with their `measurement`.
+
+    timed : whether times can be compared. Beside the figures of both sides, with the endings _old and _new:
+    `digits_lost`, `ratio` with `ratio_least` and `ratio_most`, `kind` and `change`, what is to be said of it.
+    """
+    before, after = merged(old).add_suffix("_old"), merged(new).add_suffix("_new")
+    table = before.join(after, how="outer").reset_index()
+    for side in ("old", "new"):
+        for name in ("verdict", "status"):
+            table[f"{name}_{side}"] = table[f"{name}_{side}"].fillna(MISSING)
+    table["digits_lost"] = [_digits(*line) for line in zip(*_errors(table), strict=True)]
+    if timed:
+        table["ratio"] = table["seconds_new"] / table["seconds_old"]
+        table["ratio_least"] = table["least_s_new"] / table["most_s_old"]
+        table["ratio_most"] = table["most_s_new"] / table["least_s_old"]
+    else:
+        table[["ratio", "ratio_least", "ratio_most"]] = np.nan
+    found = [_change(line, max_digits_lost, max_slowdown) for line in table.to_dict("records")]
+    table[["kind", "change", "size"]] = pd.DataFrame(found, table.index, ["kind", "change", "size"])
+    order = {"kind": True, "size": False, "measurement": True}
+    return table.sort_values([*order], ascending=[*order.values()], ignore_index=True).drop(columns="size")
+
+
+def merged(rows: pd.DataFrame) -> pd.DataFrame:
+    """One line per measurement, its repeats merged."""
+    timed = rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()
+    seconds = rows[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(timed)
+    rows = rows.assign(seconds=seconds, rank=rows["verdict"].map(_rank))
+    groups = rows.groupby("measurement")
+    worst = rows.sort_values("rank", kind="stable").drop_duplicates("measurement", keep="last")
+    made = worst.set_index("measurement")[["scene", "solver", "verdict", "status", "limit_mm"]].copy()
+    made["error_mm"] = groups["displacement_error_mm"].max()
+    made["bound_mm"] = groups["reference_bound_mm"].max()
+    made["iterations"] = groups["iterations"].median()
+    made["seconds"] = groups["seconds"].median()
+    made["repeats"] = groups["seconds"].count()
+    vary = np.where(made["repeats"] < ENOUGH, TIE, 1.0)
+    made["least_s"] = np.minimum(groups["seconds"].min(), made["seconds"] / vary)
+    made["most_s"] = np.maximum(groups["seconds"].max(), made["seconds"] * vary)
+    return made
+
+
+def _rank(verdict: str) -> int:
+    return VERDICTS.index(verdict) if verdict in VERDICTS else len(VERDICTS)
+
+
+def _errors(table: pd.DataFrame) -> list[pd.Series[float]]:
+    bounds = table[["bound_mm_old", "bound_mm_new"]].max(axis=1)
+    limits = table["limit_mm_old"].fillna(table["limit_mm_new"])
+    return [table["error_mm_old"], table["error_mm_new"], bounds, limits]
+
+
+def _digits(before: float, after: float, bound: float, limit: float) -> float:
+    if not np.isfinite([before, after, limit]).all():
+        return np.nan
+    return digits_lost(before, after, floor_mm(0.0 if np.isnan(bound) else bound, limit))
+
+
+def _change(line: dict[Hashable, Any], max_digits_lost: float, max_slowdown: float) -> tuple[int, str, float]:
+    """The kind of a line, what is to be said of it, and how large its change is among those of its kind."""
+    before, after = (line[f"verdict_{side}"] for side in ("old", "new"))
+    lost, ratio = line["digits_lost"], line["ratio"]
+    verdict, ranks = f"{_words(before)} → {_words(after)}", _rank(after) - _rank(before)
+    if after == MISSING:
+        return GONE, "no longer measured", 0.0
+    if before == MISSING:
+        return ADDED, "new", 0.0
+    if ranks > 0:
+        return JUDGED_WORSE, verdict, ranks
+    if lost > max_digits_lost:
+        return DIGITS, f"{lost:.1f} digits lost", lost
+    if ratio > max_slowdown and line["ratio_least"] > 1:
+        return SLOWER, f"{ratio:.2f} times as long", ratio
+    if ranks < 0:
+        return BETTER, verdict, np.inf
+    if lost < -max_digits_lost:
+        return BETTER, f"{-lost:.1f} digits gained", -lost
+    if ratio < 1 / max_slowdown and line["ratio_most"] < 1:
+        return BETTER, f"{1 / ratio:.2f} times as fast", 0.0
+    if line["status_old"] != line["status_new"]:
+        return CHANGED, f"{_words(line['status_old'])} → {_words(line['status_new'])}", 0.0
+    return SAME, "", 0.0
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

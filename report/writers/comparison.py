@@ -1,0 +1,126 @@
+"""Writes what changed between runs: comparison.md, and comparison.csv with every measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from report.analysis.comparison import ADDED, BETTER, CHANGED, SAME, WORSE
+from report.analysis.solver_changes import by_solver
+from report.document.blocks import Block, Column, Section, Table, Text, number, word
+from report.document.escape import csv_frame
+from report.document.numbers import MISSING, as_number, counted, power, significant, whole
+
+from .markdown import save_block
+from .pages import rendered
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One run against an older one. untimed : a sentence that says why times are not compared, or ""."""
+
+    old: str
+    new: str
+    table: pd.DataFrame
+    untimed: str
+
+    def count(self, *kinds: int) -> int:
+        return int(self.table["kind"].isin(kinds).sum())
+
+    @property
+    def summary(self) -> str:
+        """'238 measurements: 3 worse, 5 better, 1 of another status, 229 alike.'"""
+        kinds = {
+            "worse": WORSE,
+            "better": (BETTER,),
+            "of another status": (CHANGED,),
+            "new": (ADDED,),
+            "alike": (SAME,),
+        }
+        counts = [f"{count} {words}" for words, some in kinds.items() if (count := self.count(*some))]
+        return f"{counted(len(self.table), 'measurement')}: {', '.join(counts)}. {self.untimed}".strip()
+
+
+def arrow(before: object, after: object, show: Any = significant) -> str:
+    """'1.2e-11 → 9.0e-8', or one figure if both are the same."""
+    one, other = show(before), show(after)
+    return one if one == other else f"{one} → {other}"
+
+
+def ratio_text(line: Mapping[str, Any]) -> str:
+    """'1.62 (1.40 to 1.85)'."""
+    if as_number(line["ratio"]) is None:
+        return MISSING
+    return f"{line['ratio']:.2f} ({line['ratio_least']:.2f} to {line['ratio_most']:.2f})"
+
+
+def digits_text(line: Mapping[str, Any]) -> str:
+    """'+3.9' digits gained, '−2.0' lost."""
+    lost = as_number(line["digits_lost"])
+    return MISSING if lost is None else f"{0.0 - round(lost, 1):+.1f}"
+
+
+COLUMNS = [
+    word("measurement", "measurement"),
+    word("change", "change"),
+    Column(
+        "error, mm", lambda line: arrow(line["error_mm_old"], line["error_mm_new"], lambda v: power(v, 2))
+    ),
+    Column("digits", digits_text),
+    Column("iterations", lambda line: arrow(line["iterations_old"], line["iterations_new"], whole)),
+    Column("seconds", lambda line: arrow(line["seconds_old"], line["seconds_new"])),
+    Column("ratio of times", ratio_text),
+    Column("status", lambda line: arrow(line["status_old"], line["status_new"], str), "left"),
+]
+SOLVERS = [
+    word("solver", "solver"),
+    *(number(name, name, whole) for name in ("measurements", "worse", "better")),
+    number("digits lost, median", "digits_lost"),
+    number("most", "most_digits_lost"),
+    number("ratio of times, geometric mean", "ratio"),
+]
+GROUPS = (
+    ("worse", "*Worse.*", WORSE),
+    ("changed", "*Another status.*", (CHANGED,)),
+    ("better", "*Better.*", (BETTER,)),
+)
+NOTE = (
+    "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
+    "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
+    "fewer than three are taken to vary by 15 %."
+)
+
+
+def write(out: Path, comparisons: list[Comparison]) -> Path:
+    """Write the comparisons with one older run into the folder `out`, and return the path of the page."""
+    out.mkdir(parents=True, exist_ok=True)
+    sections = [Section("How to read this", [Text(NOTE)])]
+    for place, comparison in enumerate(comparisons, start=1):
+        prefix = f"{place}-" if len(comparisons) > 1 else ""
+        blocks = [save_block(block, out, prefix) for block in _blocks(comparison)]
+        sections.append(Section(f"{comparison.old} → {comparison.new}", blocks))
+    every = [each.table.assign(old=each.old, new=each.new) for each in comparisons]
+    csv_frame(pd.concat(every, ignore_index=True).drop(columns="kind")).to_csv(
+        out / "comparison.csv", index=False
+    )
+    path = out / "comparison.md"
+    title = f"Compared with {comparisons[0].old}"
+    path.write_text(rendered("sections.md.j2", title=title, sections=sections), "utf-8")
+    return path
+
+
+def _blocks(comparison: Comparison) -> list[Block]:
+    table = comparison.table
+    blocks: list[Block] = [Text(f"{comparison.summary} Every measurement: [comparison.csv](comparison.csv).")]
+    for name, caption, kinds in GROUPS:
+        lines = table[table["kind"].isin(kinds)]
+        if len(lines):
+            blocks.append(Table(name, caption, lines.drop(columns="kind"), COLUMNS))
+    solvers = by_solver(table)
+    if len(solvers):
+        blocks.append(Table("solvers", "*Solver by solver.*", solvers, SOLVERS))
+    return blocks

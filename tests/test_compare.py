@@ -1,0 +1,206 @@
+"""`compare`: rows are changed one by one, and what is said of each is known."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+from synthetic_results import no_answer, row, write_rows
+from typer.testing import CliRunner, Result
+
+from harness.cli.app import app
+from harness.results.digits import digits_lost, floor_mm
+from harness.results.records import append
+from harness.results.sides import measurement, read_side
+
+
+def compare(*words: object) -> Result:
+    return CliRunner().invoke(app, ["compare", *map(str, words)])
+
+
+def repeats(times: list[float], **figures: Any) -> list[dict[str, Any]]:
+    """Rows with these seconds per load case in all."""
+    setup = {"setup_s": 0.0, "form_s": None}
+    return [row(repeat=k, solve_s=time, **setup | figures) for k, time in enumerate(times)]
+
+
+def lines(out: Path) -> list[dict[str, str]]:
+    with (out / "comparison.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_equal_runs_have_no_change(tmp_path: Path) -> None:
+    old, new = (write_rows(tmp_path / name, repeats([1.0, 1.1, 1.2])) for name in ("old", "new"))
+    done = compare(old, new, "--out", tmp_path / "out")
+    assert done.exit_code == 0
+    assert "1 measurement: 1 alike" in done.stdout
+    (line,) = lines(tmp_path / "out")
+    assert float(line["digits_lost"]) == 0
+    assert float(line["ratio"]) == 1
+    assert float(line["ratio_least"]) == pytest.approx(1.0 / 1.2)
+    assert float(line["ratio_most"]) == pytest.approx(1.2)
+
+
+CHANGES: dict[str, tuple[dict[str, Any], int, str]] = {
+    "digits": ({"displacement_error_mm": 9e-8}, 1, "2.0 digits lost"),
+    "few digits": ({"displacement_error_mm": 9e-9}, 0, ""),
+    "gained": ({"displacement_error_mm": 9e-12}, 0, "2.0 digits gained"),
+    "below the bound": ({"displacement_error_mm": 1e-9, "reference_bound_mm": 1e-7}, 0, ""),
+    "outside": ({"displacement_error_mm": 2e-7, "verdict": "outside"}, 1, "within → outside"),
+    "no answer": (no_answer("crashed"), 1, "within → no answer"),
+    "status": ({"status": "inaccurate"}, 0, "solved → inaccurate"),
+}
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_a_change_of_an_answer_is_named(kind: str, tmp_path: Path) -> None:
+    figures, code, change = CHANGES[kind]
+    old = write_rows(tmp_path / "old", [row(displacement_error_mm=9e-10)])
+    new = write_rows(tmp_path / "new", [row(**{"displacement_error_mm": 9e-10} | figures)])
+    done = compare(old, new, "--out", tmp_path / "out")
+    assert done.exit_code == code, done.output
+    (line,) = lines(tmp_path / "out")
+    assert line["change"] == change
+    assert change in (tmp_path / "out" / "comparison.md").read_text()
+    assert change in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "code"),
+    [
+        ([1.0, 1.0, 1.0], [1.4, 1.4, 1.4], 1),
+        ([1.0, 1.0, 1.0], [1.2, 1.2, 1.2], 0),  # less than allowed
+        ([1.0, 1.0, 1.5], [1.4, 1.4, 1.4], 0),  # within the noise of the old ones
+        ([1.0, 1.0, 1.0], [0.9, 1.4, 1.4], 0),  # of the new ones
+        ([1.0], [1.31], 0),  # single runs vary by 15 % each
+        ([1.0], [1.4], 1),
+    ],
+)
+def test_slower_is_what_exceeds_the_noise_of_both(
+    before: list[float], after: list[float], code: int, tmp_path: Path
+) -> None:
+    old, new = write_rows(tmp_path / "old", repeats(before)), write_rows(tmp_path / "new", repeats(after))
+    assert compare(old, new).exit_code == code
+    assert compare(old, new, "--max-slowdown", 5).exit_code == 0
+
+
+def test_what_became_worse_comes_first_and_the_worst_at_the_top(tmp_path: Path) -> None:
+    scenes = [f"4386/{k:04d}" for k in range(6)]
+    changed: list[dict[str, Any]] = [
+        {},
+        {"displacement_error_mm": 1e-11},
+        {"solve_s": 9.0},
+        {"displacement_error_mm": 5e-8},
+        {"displacement_error_mm": 9e-8},
+        {"verdict": "outside", "displacement_error_mm": 2e-7},
+    ]
+    old = write_rows(tmp_path / "old", [row(scene) for scene in (*scenes, "4386/0007")])
+    new = [row(scene, **figures) for scene, figures in zip(scenes, changed, strict=True)]
+    out = tmp_path / "out"
+    assert compare(old, write_rows(tmp_path / "new", [*new, row("4386/0008")]), "--out", out).exit_code == 1
+    found = [line["measurement"].split()[0] for line in lines(out)]
+    assert found == [f"4386/000{k}" for k in (7, 5, 4, 3, 2, 1, 8, 0)]
+    assert "8 measurements: 5 worse, 1 better, 1 new, 1 alike" in (out / "comparison.md").read_text()
+
+
+def test_the_worst_of_the_repeats_counts(tmp_path: Path) -> None:
+    old = write_rows(tmp_path / "old", repeats([1.0, 1.0]))
+    bad = {"verdict": "outside", "displacement_error_mm": 1e-3}
+    new = write_rows(tmp_path / "new", [row(repeat=0, **bad), row(repeat=1)])
+    assert compare(old, new).exit_code == 1
+
+
+def test_the_cases_of_a_series_are_measurements_of_their_own(tmp_path: Path) -> None:
+    cases = [row(case=k, displacement_error_mm=1e-9) for k in range(3)]
+    old = write_rows(tmp_path / "old", cases)
+    new = write_rows(tmp_path / "new", [*cases[:2], cases[2] | {"displacement_error_mm": 8e-8}])
+    done = compare(old, new)
+    assert "case=2" in done.stdout
+    assert "1 worse, 2 alike" in done.stdout
+
+
+def test_times_of_other_machines_are_refused_and_accuracy_is_not(tmp_path: Path) -> None:
+    old = write_rows(tmp_path / "old", [row()])
+    slow = write_rows(tmp_path / "slow", [row(machine="another", solve_s=100.0)])
+    done = compare(old, slow)
+    assert done.exit_code == 0
+    assert "Times are not compared" in done.stdout
+    assert compare(old, slow, "--max-slowdown", 2).exit_code == 5
+    far = write_rows(tmp_path / "far", [row(machine="another", displacement_error_mm=9e-8)])
+    assert compare(old, far).exit_code == 1
+
+
+def test_two_commits_of_one_directory(tmp_path: Path) -> None:
+    one, other = "1a2b3c" + 34 * "0", "5d6e7f" + 34 * "0"
+    append(tmp_path / "measurements.outdated.jsonl", row(commit=one))
+    append(tmp_path / "measurements.jsonl", row(commit=other, displacement_error_mm=9e-8))
+    done = compare(f"{tmp_path}@1a2b3c", f"{tmp_path}@5d6e7f")
+    assert done.exit_code == 1
+    assert "2.0 digits lost" in done.stdout
+    assert len(read_side(str(tmp_path)).rows) == 1
+    for commit in ("1a2", "9999", ""):
+        assert compare(tmp_path, f"{tmp_path}@{commit}").exit_code == 2
+
+
+def test_more_than_two_runs(tmp_path: Path) -> None:
+    old = write_rows(tmp_path / "old", [row()])
+    news = [write_rows(tmp_path / f"new{k}", [row(displacement_error_mm=10.0**-k)]) for k in (9, 7)]
+    done = compare(old, *news, "--out", tmp_path / "out")
+    assert done.exit_code == 1
+    page = (tmp_path / "out" / "comparison.md").read_text()
+    assert page.count("## ") == 3
+    assert [line["change"] for line in lines(tmp_path / "out")] == ["", "2.0 digits lost"]
+
+
+BAD: dict[str, tuple[dict[str, Any], int, str]] = {
+    "problem": ({"scene_key": "another"}, 5, "another problem"),
+    "size": ({"n": 12}, 5, "another problem"),
+    "limit": ({"limit_mm": 1e-9}, 5, "another limit"),
+    "suite": ({"scene": "4386/0107", "suite": "other"}, 5, "suite = ['other']"),
+    "kind": ({"solve_s": "fast"}, 2, "line 1: solve_s"),
+    "verdict": ({"verdict": None}, 2, "verdict"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_what_cannot_be_compared_is_refused(kind: str, tmp_path: Path) -> None:
+    figures, code, message = BAD[kind]
+    old = write_rows(tmp_path / "old", [row(scene_key="one")])
+    new = write_rows(tmp_path / "new", [row(**{"scene_key": "one"} | figures)])
+    done = compare(old, new)
+    assert done.exit_code == code
+    assert message in done.stderr
+
+
+def test_a_directory_without_rows_is_bad_input(tmp_path: Path) -> None:
+    full, empty = write_rows(tmp_path / "full", [row()]), write_rows(tmp_path / "empty", [])
+    for words in ((full, empty), (tmp_path / "none", full)):
+        assert compare(*words).exit_code == 2
+
+
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
+    name = "4386/[bold]|`\x1b[31m<b>"
+    old = write_rows(tmp_path / "old", [row(solver=name)])
+    new = write_rows(tmp_path / "new", [row(solver=name, displacement_error_mm=9e-8)])
+    done = compare(old, new, "--out", tmp_path / "out")
+    assert done.exit_code == 1
+    page = (tmp_path / "out" / "comparison.md").read_text()
+    assert "<b>" not in page
+    assert "\x1b" not in page + done.stdout
+
+
+def test_digits_are_those_above_the_floor() -> None:
+    floor = floor_mm(1e-12, 1e-7)
+    assert floor == 1e-12
+    assert floor_mm(0.0, 1e-7) == pytest.approx(1e-13)
+    assert digits_lost(1e-11, 9e-8, floor) == pytest.approx(3.954, abs=1e-3)
+    assert digits_lost(9e-8, 1e-11, floor) == pytest.approx(-3.954, abs=1e-3)
+    assert digits_lost(0.0, 1e-13, floor) == 0
+
+
+def test_a_measurement_is_named_by_what_was_asked() -> None:
+    asked = row("4386/0107", "gi", "dual", variant="v", case=3, batched=8)
+    assert measurement(asked) == "4386/0107 gi dual v tol=1e-09 threads=2 batched=8 case=3"
+    assert measurement(asked | {"repeat": 1}) == measurement(asked)
