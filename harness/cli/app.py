@@ -180,26 +180,38 @@ def report(
 def gate(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")],
     reference_limit: ReferenceLimit = None,
+    baseline: Annotated[
+        Path | None, option("DIR", "An earlier run, whose errors must not be exceeded by the margin.")
+    ] = None,
+    margin: Annotated[float, option("FACTOR", "The allowed factor over the baseline.", min=1.0)] = 10.0,
+    json: Annotated[Path | None, option("FILE", "Write the findings as JSON.")] = None,
+    junit: Annotated[Path | None, option("FILE", "Write the findings as JUnit XML.")] = None,
 ) -> None:
     """Judge the saved answers again, and fail if accuracy was lost.
 
-    The numbers in the rows are not trusted: each answer is compared with the reference of its scene.
+    The numbers in the rows are not trusted: each answer is compared with the reference of its scene. With a
+    baseline, an error that is still within the limit fails if it is more than the margin times what it was;
+    what lies below the reference's error bound does not count.
 
     \b
     Examples:
       python -m harness run gate && python -m harness gate results/gate
+      python -m harness gate results/gate --baseline baseline --margin 10 --junit gate.xml
 
     \b
     Exit codes:
       0  every gated row is within 1e-7 mm (on a rung of a ladder, within what conditioning allows)
-      1  accuracy lost: a gated row is outside, cannot be judged, has no answer, or was never measured
+      1  accuracy lost: a gated row is outside, cannot be judged, has no answer, was never measured, or is
+         worse than the baseline
       2  wrong usage or bad input
       3  nothing could be judged
+      5  the baseline has none of these measurements, other problems or other limits
     """
     with error_reporting() as console:
         from harness.verification.gate import gate as judge_directory
 
-        raise typer.Exit(judge_directory(directory, console, reference_limit))
+        code = judge_directory(directory, console, reference_limit, baseline, margin, json, junit)
+        raise typer.Exit(code)
 
 
 @app.command("list")

@@ -7,7 +7,7 @@ data and the reference are made from the scene.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -26,6 +26,9 @@ from problems.errors import Fault, InputError
 from problems.forms.names import road_of
 from problems.input.validation import validation_faults
 
+from .baseline import MARGIN, Baseline, read_baseline
+from .finding import Finding
+from .gate_files import write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
 from .reference_problem import ReferenceProblem, reference_problem
 
@@ -35,39 +38,55 @@ NULLABLE = ("answer", "message")
 MAX_CASES = 10**9
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One gated measurement, judged again. why : the reason if it is not within the limit."""
-
-    key: str
-    judgement: Judgement
-    limit_mm: float
-    why: str = ""
-
-
-def gate(directory: Path, console: Console, reference_limit_s: float | None = None) -> int:
+def gate(
+    directory: Path,
+    console: Console,
+    reference_limit_s: float | None = None,
+    baseline: Path | None = None,
+    margin: float = MARGIN,
+    json_file: Path | None = None,
+    junit_file: Path | None = None,
+) -> int:
     """Judge every gated row of DIRECTORY.
 
+    baseline : the directory of an earlier run, whose errors may be exceeded by the factor `margin` at most.
     Returns 0 if all gated rows are within 1e-7 mm (on a rung of a ladder, what conditioning allows), 1 if
-    not (a row is outside, has no answer, is missing or cannot be judged), 3 if no answer at all could be
-    judged. Raises InputError.
+    not (a row is outside, has no answer, is missing, cannot be judged, or is worse than the baseline), 3 if
+    no answer at all could be judged. Raises InputError, Incomparable if the baseline is another suite's.
     """
     if not directory.is_dir():
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
     rows = gated_rows(directory / records.MEASUREMENTS)
-    findings = [*judged(rows, directory, reference_limit_s), *never_measured(rows, directory)]
+    standard = read_baseline(baseline, margin, str(directory), rows.values()) if baseline else None
+    found = judged(rows, directory, reference_limit_s, standard)
+    findings = [*found, *never_measured(rows, directory)]
     console.print(table(findings))
+    code = concluded(findings, standard, console)
+    if json_file:
+        write_json(json_file, directory, findings, code)
+    if junit_file:
+        write_junit(junit_file, findings)
+    return code
+
+
+def concluded(findings: list[Finding], baseline: Baseline | None, console: Console) -> int:
+    """The exit code, and a sentence on it."""
     verdicts = [finding.judgement.verdict for finding in findings]
-    fine = verdicts.count("within")
-    if not fine and "outside" not in verdicts:
+    if not {"within", "outside"} & set(verdicts):
         console.print("Nothing could be judged: no gated row has an answer that can be.", style="red")
         return NOTHING_JUDGED
-    if fine < len(findings):
-        console.print(f"Accuracy lost: {len(findings) - fine} of {len(findings)} gated rows.", style="red")
+    failed = sum(not finding.passed for finding in findings)
+    if failed:
+        console.print(f"Accuracy lost: {failed} of {len(findings)} gated rows.", style="red")
         return FAILED
     wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
-    console.print(f"Passed: all {fine} gated rows are within {limits}.", style="green")
+    console.print(f"Passed: all {len(findings)} gated rows are within {limits}.", style="green")
+    if baseline:
+        known = sum(finding.baseline_mm is not None for finding in findings)
+        console.print(
+            f"{known} of them are in {baseline.name}: none exceeds its error there {baseline.margin:g} times."
+        )
     return DONE
 
 
@@ -104,7 +123,9 @@ def gated_rows(path: Path) -> dict[str, Row]:
     return {row["key"]: row for row in rows if row["gated"]}
 
 
-def judged(rows: dict[str, Row], directory: Path, limit_s: float | None = None) -> Iterator[Finding]:
+def judged(
+    rows: dict[str, Row], directory: Path, limit_s: float | None = None, baseline: Baseline | None = None
+) -> Iterator[Finding]:
     """The rows' answers, judged scene by scene, so that each scene is opened once per road."""
     problem: ReferenceProblem | None = None
     opened: tuple[str, str] | None = None
@@ -112,7 +133,8 @@ def judged(rows: dict[str, Row], directory: Path, limit_s: float | None = None) 
         wanted = row["source"], road_of(row["form"])
         if problem is None or wanted != opened:
             problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
-        yield judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
+        found = judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
+        yield held_to(baseline, row, found) if baseline else found
 
 
 def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
@@ -137,6 +159,18 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
     return Finding(row["key"], judgement, limit, why)
 
 
+def held_to(baseline: Baseline, row: Row, finding: Finding) -> Finding:
+    """A finding with its error in the baseline, and whether that is exceeded."""
+    judgement, then = finding.judgement, baseline.error_mm(row)
+    error, bound = judgement.displacement_error_mm, judgement.reference_bound_mm or 0.0
+    finding = replace(finding, baseline_mm=then)
+    if judgement.verdict != "within" or error is None or then is None:
+        return finding
+    if not baseline.exceeded(row, error, bound, finding.limit_mm):
+        return finding
+    return replace(finding, why=f"more than {baseline.margin:g} times the baseline's {then:.1e} mm")
+
+
 def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:
     """The gated measurements of the suite that was run without a row; suite.toml itself if it is missing."""
     path = directory / "suite.toml"
@@ -158,5 +192,6 @@ def table(findings: list[Finding]) -> Table:
         error, verdict = finding.judgement.displacement_error_mm, finding.judgement.verdict
         shown = "–" if error is None else f"{error:.1e}"
         limit = f"{finding.limit_mm:.0e}"
-        made.add_row(finding.key, shown, limit, verdict, finding.why, style=STYLES[verdict])
+        style = STYLES[verdict if finding.passed or verdict != "within" else "outside"]
+        made.add_row(finding.key, shown, limit, verdict, finding.why, style=style)
     return made

@@ -1,0 +1,66 @@
+"""The gate's findings as files for a CI: JSON, and JUnit XML, which most of them show row by row."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+from harness.results.records import replace_text, to_line
+from harness.terminal.plain_console import legible
+
+from .finding import Finding
+
+SUITE = "rivetbench gate"
+
+
+def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: int) -> None:
+    """An object with `directory`, `exit_code`, `passed` and `measurements`, one object per finding."""
+    content = {
+        "directory": str(directory),
+        "exit_code": code,
+        "passed": code == 0,
+        "measurements": [
+            {
+                "key": finding.key,
+                "passed": finding.passed,
+                "verdict": finding.judgement.verdict,
+                "displacement_error_mm": finding.judgement.displacement_error_mm,
+                "reference_bound_mm": finding.judgement.reference_bound_mm,
+                "limit_mm": finding.limit_mm,
+                "baseline_mm": finding.baseline_mm,
+                "why": finding.why,
+            }
+            for finding in findings
+        ],
+    }
+    _write(path, json.dumps(json.loads(to_line(content)), indent=1) + "\n")
+
+
+def write_junit(path: Path, findings: Sequence[Finding]) -> None:
+    """A test case per finding: a failure if accuracy was lost, an error if nothing could be said."""
+    lost = [finding for finding in findings if not finding.passed and _judged(finding)]
+    unknown = [finding for finding in findings if not finding.passed and not _judged(finding)]
+    counts = {"tests": str(len(findings)), "failures": str(len(lost)), "errors": str(len(unknown))}
+    root = ElementTree.Element("testsuites", counts)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": SUITE} | counts)
+    for finding in findings:
+        scene, _, name = legible(finding.key).partition(" ")
+        case = ElementTree.SubElement(suite, "testcase", {"classname": scene, "name": name or scene})
+        if not finding.passed:
+            kind = "failure" if _judged(finding) else "error"
+            ElementTree.SubElement(
+                case, kind, {"type": finding.judgement.verdict, "message": legible(finding.why)}
+            )
+    ElementTree.indent(root)
+    _write(path, ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n")
+
+
+def _judged(finding: Finding) -> bool:
+    return finding.judgement.verdict in ("within", "outside")
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    replace_text(path, text)

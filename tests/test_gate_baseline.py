@@ -1,0 +1,120 @@
+"""The gate held to an earlier run, and its findings as JSON and JUnit XML."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from io import StringIO
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import tiny
+from rich.console import Console
+from typer.testing import CliRunner, Result
+
+from harness.cli.app import app
+from harness.measurement.run import run
+from harness.planning.suite import read_suite
+from harness.results import records
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("gate")
+    suite = read_suite(str(tiny.write_suite(folder, tolerances=[1e-6, 1e-8])))
+    assert run(suite, folder / "finished", Console(file=StringIO())) == 0
+    return folder / "finished"
+
+
+@pytest.fixture
+def copy(finished: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(finished, tmp_path / "copy"))
+
+
+def gate(directory: Path, *words: object) -> Result:
+    return CliRunner().invoke(app, ["gate", str(directory), *map(str, words)])
+
+
+def changed(directory: Path, **figures: Any) -> Path:
+    path = directory / records.MEASUREMENTS
+    records.rewrite(path, [row | figures for row in records.read(path)])
+    return directory
+
+
+def moved(directory: Path, shift: float) -> None:
+    row = records.read(directory / records.MEASUREMENTS)[0]
+    with np.load(directory / row["answer"]) as saved:
+        x, lam = saved["x"].copy(), saved["lam"]
+    x[3] += shift
+    np.savez(directory / row["answer"], x=x, lam=lam)
+
+
+@pytest.mark.parametrize(
+    ("shift", "margin", "code"), [(0.0, 10, 0), (9e-8, 10, 1), (9e-8, 1e7, 0), (5e-13, 10, 0), (2e-7, 1e9, 1)]
+)
+def test_digits_lost_within_the_limit_are_news(
+    finished: Path, copy: Path, shift: float, margin: float, code: int
+) -> None:
+    """The solver's own error is some 1e-15 mm: what counts below 1e-13 mm, the floor, is the floor."""
+    moved(copy, shift)
+    assert gate(copy).exit_code == (1 if shift > 1e-7 else 0)
+    done = gate(copy, "--baseline", finished, "--margin", margin)
+    assert done.exit_code == code, done.output
+    if not code:
+        assert "2 of them are in" in done.stdout
+
+
+def test_a_baseline_outside_its_limit_is_no_standard(finished: Path, copy: Path, tmp_path: Path) -> None:
+    other = changed(Path(shutil.copytree(finished, tmp_path / "other")), verdict="outside")
+    moved(copy, 9e-8)
+    done = gate(copy, "--baseline", other)
+    assert done.exit_code == 0
+    assert "0 of them are in" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("figures", "message"),
+    [
+        ({"scene": "another", "suite": "other"}, "suite other"),
+        ({"scene_key": "another"}, "another problem"),
+        ({"limit_mm": 1e-3}, "another limit"),
+    ],
+)
+def test_a_baseline_of_other_measurements_is_refused(
+    finished: Path, copy: Path, figures: dict[str, Any], message: str
+) -> None:
+    done = gate(finished, "--baseline", changed(copy, **figures))
+    assert done.exit_code == 5
+    assert message in done.stderr
+
+
+def test_a_baseline_that_is_no_directory_is_bad_input(finished: Path, tmp_path: Path) -> None:
+    assert gate(finished, "--baseline", tmp_path / "none").exit_code == 2
+
+
+def test_the_findings_are_files_for_a_ci(finished: Path, copy: Path, tmp_path: Path) -> None:
+    moved(copy, 9e-8)
+    rows = records.read(copy / records.MEASUREMENTS)
+    (copy / rows[1]["answer"]).unlink()
+    files = ["--json", tmp_path / "new" / "gate.json", "--junit", tmp_path / "new" / "gate.xml"]
+    assert gate(copy, "--baseline", finished, *files).exit_code == 1
+    content = json.loads((tmp_path / "new" / "gate.json").read_text())
+    assert (content["passed"], content["exit_code"]) == (False, 1)
+    first, second = content["measurements"]
+    assert (first["verdict"], first["passed"]) == ("within", False)
+    assert first["why"].startswith("more than 10 times the baseline's")
+    assert first["displacement_error_mm"] == pytest.approx(9e-8, rel=1e-3)
+    assert 0 <= first["baseline_mm"] < 1e-12
+    assert (second["key"], second["verdict"]) == (rows[1]["key"], "no_answer")
+    root = ElementTree.parse(tmp_path / "new" / "gate.xml").getroot()
+    assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("2", "1", "1")
+    assert [child.tag for case in root.iter("testcase") for child in case] == ["failure", "error"]
+    assert {case.get("classname") for case in root.iter("testcase")} == {"tiny"}
+    assert gate(finished, *files).exit_code == 0
+    root = ElementTree.parse(tmp_path / "new" / "gate.xml").getroot()
+    assert (root.get("failures"), root.get("errors")) == ("0", "0")
