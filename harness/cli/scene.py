@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from harness.terminal.console import FormName, ReferenceLimit, SceneName, error_reporting, option
+from harness.terminal.console import AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -27,6 +27,7 @@ def solve(
         option("FORM", "primal, dual or sparse: without condensation.  [default: the cheaper one]"),
     ] = None,
     reference_limit: ReferenceLimit = None,
+    allow_gap: AllowGap = None,
 ) -> None:
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
 
@@ -38,16 +39,18 @@ def solve(
     Examples:
       python -m harness solve gallery/heavy-sheet-on-tool --out results/sheet
       python -m harness solve my-scene.toml --solver piqp --out results/mine
+      python -m harness solve my-scene.toml --allow-gap 0.05 --out results/mine
 
     \b
-    Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input.
+    Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input,
+                3 --allow-gap cannot be told from what is proven, 4 a gap is larger than --allow-gap.
     """
     with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.solve import solve as solve_scene
 
-        raise typer.Exit(
-            solve_scene(scene, solver, tolerance, out, console, reference_limit, form.value if form else None)
-        )
+        taken: Any = form.value if form else None
+        code = solve_scene(scene, solver, tolerance, out, console, reference_limit, taken, allow_gap)
+        raise typer.Exit(code)
 
 
 @app.command()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from harness.terminal.console import (
+    AllowGap,
     FormName,
     MemoryLimit,
     Plugin,
@@ -67,6 +68,7 @@ def series(
     ] = 60.0,
     memory_limit: MemoryLimit = 8192,
     scheduler: Scheduler = None,
+    allow_gap: AllowGap = None,
 ) -> None:
     """Solve many load cases on one assembly: random gaps, measured gaps, or a sweep.
 
@@ -79,6 +81,7 @@ def series(
       python -m harness series 4386/1074 --cases 1000 --out results/gaps
       python -m harness series 4386/0107 --sd 0.2 --correlation-length 150 --cases 200 --out results/var
       python -m harness series 4386/1074 --gaps measured.csv --out results/measured
+      python -m harness series 4386/1074 --gaps measured.csv --allow-gap 0.05 --out results/measured
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.2,0.4 \\
                                          --sweep fasteners.preload=500:1500:11 --out results/both
@@ -86,19 +89,23 @@ def series(
 
     \b
     Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
-                3 nothing could be judged, 130 interrupted.
+                3 nothing could be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with error_reporting() as console:
         from harness.measurement.describe import described
         from harness.planning.road import chosen_form
+        from harness.scene.allowed_gap import refuse_unusable
+        from harness.series.allowed_gap import check as check_allowed_gap
         from harness.series.run import run
         from harness.series.session import Job
         from harness.series.store import CASES, SERIES, read_series
+        from harness.terminal.exit_codes import DONE
         from harness.terminal.waiting import waiting
         from problems.errors import Fault, InputError
         from problems.load_cases.sweep import sweep as swept
         from problems.scene import read_scene
 
+        refuse_unusable(allow_gap)
         random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
         drawn = [name for name, value in random.items() if value is not None]
         sources = [
@@ -145,4 +152,6 @@ def series(
             from report.writers.series import write  # slow to import: not before the first row
 
             console.print(f"Report: {write(out)}")
+        if code == DONE and allow_gap is not None:
+            code = check_allowed_gap(job, out, allow_gap, console)
         raise typer.Exit(code)

@@ -36,6 +36,7 @@ from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.scene import read_scene
 from solvers.base import Solver
 
+from . import allowed_gap
 from .answer import answer_of
 from .few_digits import digits_sentence
 from .layout import layout
@@ -81,16 +82,19 @@ def solve(
     console: Console,
     reference_limit_s: float | None = None,
     form: Form | None = None,
+    allow_gap_mm: float | None = None,
 ) -> int:
     """Solve a scene, write DIR, show the outcome. Returns 0 if the answer is within 1e-7 mm, else 1.
 
-    form : by default the cheaper one, see `harness.planning.road`. Raises InputError.
+    form : by default the cheaper one, see `harness.planning.road`. allow_gap_mm : returns 4 if a remaining
+    gap is larger, 3 if that cannot be told. Raises InputError.
     """
     started = time.perf_counter()
     steps = Steps(console)
     with steps.step("reading the scene"):
         if not 0 < tolerance < inf:
             raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
+        allowed_gap.refuse_unusable(allow_gap_mm)
         scene = read_scene(source)
     chosen = _solver(solver) if solver else None
     with steps.step("choosing the form"):
@@ -155,6 +159,11 @@ def solve(
         "steps": steps.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
     }
+    gap = load.g - data.assembly.A.T @ x
+    if allow_gap_mm is not None:
+        error_mm = known.bound_mm + (record["judged_error_mm"] or 0.0)
+        uncertainty = allowed_gap.uncertainty_mm(data.assembly, error_mm)
+        record["allowed_gap"] = allowed_gap.checked(allow_gap_mm, gap, uncertainty, record["pairs"])
     save(out, record, data.assembly, load, x, lam)
     with steps.step("pictures and files"):
         from report.writers.solution import write  # slow to import: not before the answer is saved
@@ -162,7 +171,10 @@ def solve(
         written = write(out)
     show(record, entries, known, console)
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
-    return DONE if record["verdict"] == "within" else FAILED
+    code = DONE if record["verdict"] == "within" else FAILED
+    if allow_gap_mm is not None:
+        code = code or allowed_gap.show(record["allowed_gap"], gap, data.assembly.contact_nodes, console)
+    return code
 
 
 def _solver(name: str) -> Solver:

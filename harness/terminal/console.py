@@ -42,6 +42,9 @@ ReferenceLimit = Annotated[
         "SECONDS", "For each reference's search.  [default: 60 per thousand contacts, at least 60]", min=0.001
     ),
 ]
+AllowGap = Annotated[
+    float | None, option("MM", "Fail if a remaining gap is larger than this, and say where.", min=0.0)
+]
 Scheduler = Annotated[
     str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
 ]

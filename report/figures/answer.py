@@ -34,7 +34,9 @@ def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str
 
 
 def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
-    """Both gaps of each pair on one square-root scale; closed contacts are outlined."""
+    """Both gaps of each pair on one square-root scale; closed contacts are outlined, and in red those whose
+    gap is larger than allowed.
+    """
     before, after = arrays["gap_before"], arrays["gap_after"]
     titles = [f"gap {when}: {pair_name(pair)}" for pair in record["pairs"] for when in ("before", "after")]
     maps = _sheet(arrays["contact_nodes"], titles, 2, len(record["marks"]))
@@ -46,6 +48,8 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
             drawn = draw(axes, nodes, values[own], norm, "viridis")
             _mark(axes, record["marks"])
         _outline(axes, nodes, arrays["lam"][own] > 0, "white")
+        if allowed := record.get("allowed_gap"):
+            _outline(axes, nodes, after[own] > allowed["allowed_mm"], style.VERMILLION)
     return maps.finished(drawn, "gap, mm")
 
 

@@ -31,7 +31,11 @@ def write(directory: Path) -> Path:
         arrays = {name: saved[name] for name in saved.files}
     _write_csv(directory / "nodes.csv", _nodes(record, arrays))
     if record["m"]:
-        _write_csv(directory / "contacts.csv", _contacts(record, arrays))
+        contacts = _contacts(record, arrays)
+        _write_csv(directory / "contacts.csv", contacts)
+        if check := record.get("allowed_gap"):
+            larger = {name: [column[k] for k in check["contacts"]] for name, column in contacts.items()}
+            _write_csv(directory / "exceeding.csv", larger)
     figures = answer_figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():

@@ -1,0 +1,56 @@
+"""In how many cases of a series the remaining gap is larger than allowed, and at which contacts.
+
+A displacement of a case is known up to its bound e, a gap up to norm · e, norm = maxⱼ ‖a_j‖₁. A case exceeds
+the allowed gap if its largest gap does by more than that, and is undecided if it does by less. The gaps of
+the contacts are stored as float32, whose rounding, 6e-8 of the gap, is added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from report.results.series import Array, Series
+
+ROUNDING = 2.0**-24
+AT_ONCE = 2**22  # gaps read at a time
+
+
+@dataclass(frozen=True)
+class Exceeding:
+    """cases : those that exceed the allowed gap, the worst first, of `answered`. shares : (m,), at each
+    contact, the share of the answered cases whose gap there is larger. largest : (m,) mm, of the cases above.
+    """
+
+    allowed_mm: float
+    answered: int
+    cases: pd.DataFrame
+    undecided: int
+    uncertainty_mm: float
+    shares: Array
+    largest: Array
+
+
+def exceeding(series: Series, allowed_mm: float, norm: float) -> Exceeding:
+    """The check of a series."""
+    bounds = series.cases["bound_mm"].fillna(np.inf).to_numpy()
+    gaps = series.cases["max_gap_mm"].to_numpy()
+    e = norm * bounds + ROUNDING * abs(gaps)
+    told = allowed_mm >= e
+    larger = told & (gaps - e > allowed_mm)
+    undecided = ~told | (~larger & (gaps + e > allowed_mm))
+    cases = series.cases.assign(e=e)[larger].sort_values("max_gap_mm", ascending=False, kind="stable")
+    m = series.gaps.shape[1]
+    counts, largest = np.zeros(m), np.zeros(m)
+    rows = max(AT_ONCE // m, 1)
+    for start in range(0, len(cases), rows):
+        block = cases.iloc[start : start + rows]
+        some = series.gaps[block["case"].to_numpy()].astype(float)
+        counts += (some - block["e"].to_numpy()[:, None] > allowed_mm).sum(axis=0)
+        largest = np.maximum(largest, some.max(axis=0))
+    shares = counts / max(len(gaps), 1)
+    return Exceeding(
+        allowed_mm, len(gaps), cases, int(undecided.sum()), float(e.max(initial=0.0)), shares, largest
+    )
