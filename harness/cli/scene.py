@@ -1,4 +1,4 @@
-"""The commands for one scene: solve, validate, export, import."""
+"""The commands for one scene: solve, validate."""
 
 from __future__ import annotations
 
@@ -68,53 +68,3 @@ def validate(scene: SceneName) -> None:
         from harness.scene.validate import validate as validate_scene
 
         validate_scene(scene, console)
-
-
-@app.command()
-def export(
-    scene: SceneName,
-    form: Annotated[str, typer.Option("--format", metavar="FORMAT", help="A name from `list formats`.")],
-    out: Annotated[Path, option("PATH", "A file, or a folder for a format with one file per matrix.")],
-) -> None:
-    """Write K, A, f, g of a scene for another program.
-
-    \b
-    Examples:
-      python -m harness export 4386/0107 --format npz --out joint.npz
-      python -m harness export gallery/three-part-stack --format qpsolvers --out stack.npz
-
-    \b
-    Exit codes: 0 written, 2 wrong usage or bad input.
-    """
-    with error_reporting(SAFE, INTERRUPTED) as console:
-        from harness.scene.exchange import export as export_scene
-
-        export_scene(scene, form, out, console)
-
-
-@app.command("import")
-def import_(
-    files: Annotated[
-        list[str], typer.Argument(metavar="[NAME=]FILE...", help="Files with K, A, f, g; see below.")
-    ],
-    out: Annotated[Path, option("FILE.npz", "Output file.")],
-) -> None:
-    """Read K, A, f, g from other programs' files, check them, and write one .npz for `run` and `solve`.
-
-    Matrix Market and Abaqus matrix text (.mtx) hold one matrix, named by the file or by NAME=; .npz (also
-    of qpsolvers), Nastran .op4 and DMIG (.pch, .bdf) name theirs. K is checked for symmetry, definiteness and
-    apparent precision.
-
-    \b
-    Examples:
-      python -m harness import K.mtx A.mtx f.mtx g.mtx --out mine.npz
-      python -m harness import K=job_STIF2.mtx A.mtx f.mtx g.mtx --out mine.npz
-      python -m harness import joint.op4 --out mine.npz
-
-    \b
-    Exit codes: 0 read and written, 2 wrong usage or bad input.
-    """
-    with error_reporting(SAFE, INTERRUPTED) as console:
-        from harness.scene.exchange import import_ as import_files
-
-        import_files(files, out, console)

@@ -33,6 +33,22 @@ from .into_place import into_place
 TOLERANCE = 1e-11  # of newton, mm
 
 
+def places(sources: list[str], out: Path, format: str) -> list[tuple[str, Path]]:
+    """Each scene with the path to write it to: `out` itself, or one per scene inside it. Raises InputError if
+    two would have the same.
+    """
+    if len(sources) == 1:
+        return [(sources[0], out)]
+    suffix = formats.suffix(format) if format in formats.names() else ""
+    found: dict[Path, str] = {}
+    for source in sources:
+        path = out / (read_scene(source).name.replace("/", "_") + suffix)
+        if path in found:
+            raise InputError.one("SCENE", "name", source, f"{found[path]} would be written to {path} as well")
+        found[path] = source
+    return [(source, path) for path, source in found.items()]
+
+
 def export(source: str, format: str, out: Path, console: Console) -> None:
     """Write K, A, f, g of a scene in a format of problems.formats. Raises InputError."""
     if format not in formats.names():

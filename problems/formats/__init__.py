@@ -38,6 +38,12 @@ def description(name: str) -> str:
     return str(_module(name).DESCRIPTION)
 
 
+def suffix(name: str) -> str:
+    """The suffix of what the format writes; "" if that is a folder."""
+    module = _module(name)
+    return "" if module.DESCRIPTION.startswith("a folder") else str(module.SUFFIXES[0])
+
+
 def write(name: str, path: Path, data: Data) -> None:
     """Write data in the format of that name."""
     _module(name).write(path, data)

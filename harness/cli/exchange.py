@@ -1,0 +1,127 @@
+"""The commands for exchange with other programs: export, import, judge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from harness.terminal.console import FormName, ReferenceLimit, SceneName, error_reporting, option
+
+app = typer.Typer(rich_markup_mode=None)
+
+SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
+
+
+@app.command()
+def export(
+    scene: Annotated[
+        list[str], typer.Argument(metavar="SCENE...", help="Scenes: names, paths of .toml or .npz.")
+    ],
+    out: Annotated[
+        Path, option("PATH", "A file, or a folder for a format of several; for several scenes a folder.")
+    ],
+    format: Annotated[
+        str | None,
+        option("FORMAT", "A name from `list formats`; with --form mtx or npz.  [default with --form: mtx]"),
+    ] = None,
+    form: Annotated[
+        FormName | None, option("FORM", "The quadratic program in this form: primal, dual or sparse.")
+    ] = None,
+    with_reference: Annotated[
+        bool, typer.Option("--with-reference", help="With --form: x*, λ*, their error bound, the limit.")
+    ] = False,
+    reference_limit: ReferenceLimit = None,
+) -> None:
+    """Write scenes for another program: K, A, f, g in a file format, or the program of a form.
+
+    With --form: P, q, G, h (or the lower bounds lb) of min ½zᵀPz + qᵀz, Gz ≤ h. Readers in Python, C++, Julia
+    and Matlab: docs/exchange.md.
+
+    \b
+    Examples:
+      python -m harness export 4386/0107 --format npz --out joint.npz
+      python -m harness export gallery/three-part-stack --format qpsolvers --out stack.npz
+      python -m harness export scaling/1170 --form dual --with-reference --out problem
+      python -m harness export 4386/0107 4386/1471 --form primal --with-reference --format npz --out problems
+
+    \b
+    Exit codes: 0 written, 2 wrong usage or bad input.
+    """
+    with error_reporting(SAFE, INTERRUPTED) as console:
+        from harness.scene.exchange import export as export_scene
+        from harness.scene.exchange import places
+        from harness.scene.form_export import export_form
+        from problems.errors import InputError
+
+        if format is None and form is None:
+            raise InputError.one("export", "--format", None, "is needed without --form; see `list formats`")
+        if with_reference and form is None:
+            raise InputError.one("--with-reference", "form", None, "needs --form: primal, dual or sparse")
+        taken: Any = form.value if form else None
+        for source, path in places(scene, out, format or "mtx"):
+            if form is None:
+                export_scene(source, format or "", path, console)
+            else:
+                export_form(source, taken, format, path, console, with_reference, reference_limit)
+
+
+@app.command("import")
+def import_(
+    files: Annotated[
+        list[str], typer.Argument(metavar="[NAME=]FILE...", help="Files with K, A, f, g; see below.")
+    ],
+    out: Annotated[Path, option("FILE.npz", "Output file.")],
+) -> None:
+    """Read K, A, f, g from other programs' files, check them, and write one .npz for `run` and `solve`.
+
+    Matrix Market and Abaqus matrix text (.mtx) hold one matrix, named by the file or by NAME=; .npz (also
+    of qpsolvers), Nastran .op4 and DMIG (.pch, .bdf) name theirs. K is checked for symmetry, definiteness and
+    apparent precision.
+
+    \b
+    Examples:
+      python -m harness import K.mtx A.mtx f.mtx g.mtx --out mine.npz
+      python -m harness import K=job_STIF2.mtx A.mtx f.mtx g.mtx --out mine.npz
+      python -m harness import joint.op4 --out mine.npz
+
+    \b
+    Exit codes: 0 read and written, 2 wrong usage or bad input.
+    """
+    with error_reporting(SAFE, INTERRUPTED) as console:
+        from harness.scene.exchange import import_ as import_files
+
+        import_files(files, out, console)
+
+
+@app.command()
+def judge(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npy, .npz, .csv, .txt or .mtx.")],
+    scene: SceneName,
+    form: Annotated[
+        FormName, option("FORM", "The form it was computed in: a file without names has x, of dual λ.")
+    ] = FormName.primal,
+    limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
+    reference_limit: ReferenceLimit = None,
+) -> None:
+    """Judge an answer that was computed elsewhere: its error, against the certified reference of the scene.
+
+    An .npz has arrays x or lam, a .csv such columns or nodes.csv's displacement_mm; x is in mm, λ in N. Where
+    there is only λ, x is recovered from it. In the sparse form x has all the unknowns of the model.
+
+    \b
+    Examples:
+      python -m harness judge x.npy 4386/0107
+      python -m harness judge lambda.txt scaling/1170 --form dual
+      python -m harness judge results/sheet/nodes.csv gallery/heavy-sheet-on-tool
+
+    \b
+    Exit codes: 0 within the limit, 1 outside, 2 wrong usage or bad input (NaN, not numbers),
+                3 the reference is not proven well enough, 5 an x of another problem's length.
+    """
+    with error_reporting(SAFE, INTERRUPTED) as console:
+        from harness.scene.judge_file import judge_file
+
+        taken: Any = form.value
+        raise typer.Exit(judge_file(file, scene, taken, limit, console, reference_limit))

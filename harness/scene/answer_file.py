@@ -1,0 +1,95 @@
+"""An answer that was computed elsewhere: x or λ from a .npy, .npz, .csv, .txt or .mtx file."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+
+from problems.errors import InputError
+from problems.forms.assembly import Vector
+from problems.input.bounded import regular_file
+
+MIB = 1024
+#: The headings of a column of displacements and of contact forces, in a table with several.
+HEADINGS = {"x": ("x", "displacement_mm"), "lam": ("lam", "force_N")}
+ALLOWED = "a .npy, .npz, .csv, .txt or .mtx file with numbers"
+
+
+def read_answer(path: Path) -> dict[str, Vector]:
+    """What the file holds: "x" (displacements), "lam" (contact forces), or "" for a vector without a name.
+
+    An .npz has arrays x or lam, or one alone; a .csv has a header with a column x or displacement_mm, lam or
+    force_N (as in nodes.csv and contacts.csv of `solve`), or one column of numbers. Raises InputError.
+    """
+    regular_file(path, "file", MIB)
+    try:
+        found = _read(path)
+    except InputError:
+        raise
+    except Exception as error:  # numpy, zipfile, csv and scipy raise kinds of their own
+        raise InputError.one(path, "file", f"{type(error).__name__}: {error}", ALLOWED) from error
+    for name, vector in found.items():
+        wrong = np.flatnonzero(~np.isfinite(vector))
+        if len(wrong):
+            key = f"{name or 'entry'}[{wrong[0]}]"
+            allowed = f"must be finite; {len(wrong)} of {len(vector)} are not"
+            raise InputError.one(path, key, float(vector[wrong[0]]), allowed)
+    return found
+
+
+def _read(path: Path) -> dict[str, Vector]:
+    match path.suffix.lower():
+        case ".npy":
+            return {"": _vector(np.load(path, allow_pickle=False))}
+        case ".npz":
+            with np.load(path, allow_pickle=False) as archive:
+                named = {name: _vector(archive[name]) for name in HEADINGS if name in archive.files}
+                return named or {"": _vector(archive[_only(path, archive.files)])}
+        case ".csv":
+            return _columns(path)
+        case ".txt":
+            return {"": _vector(np.loadtxt(path, dtype=float, ndmin=1))}
+        case ".mtx":
+            return {"": _vector(scipy.io.mmread(path))}
+    raise InputError.one(path, "suffix", path.suffix, ALLOWED)
+
+
+def _columns(path: Path) -> dict[str, Vector]:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        first, *rest = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+    heading = [cell.strip() for cell in first]
+    if len(heading) == 1 and _is_number(heading[0]):
+        return {"": np.array([float(row[0]) for row in (first, *rest)])}
+    named = {}
+    for name, headings in HEADINGS.items():
+        known = [heading.index(each) for each in headings if each in heading]
+        if known:
+            named[name] = np.array([float(row[known[0]]) for row in rest])
+    return named or {"": np.array([float(row[heading.index(_only(path, heading))]) for row in rest])}
+
+
+def _only(path: Path, names: list[str]) -> str:
+    if len(names) != 1:
+        wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
+        raise InputError.one(path, "names", names, f"{wanted}, or one alone")
+    return names[0]
+
+
+def _vector(array: object) -> Vector:
+    values = np.asarray(array)
+    if values.dtype.kind not in "fiu":
+        raise ValueError(f"an array of {values.dtype}")
+    if values.size != max(values.shape, default=1):
+        raise ValueError(f"an array of shape {values.shape}, not a vector")
+    return values.astype(float).ravel()
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,118 @@
+"""A scene as a quadratic program for another program to read, with its solution and the accuracy to reach.
+
+    min ½zᵀPz + qᵀz   subject to   Gz ≤ h     primal: z = x, n displacements, mm; sparse: z = û, N unknowns
+                                   z ≥ lb     dual: z = λ, m contact forces, N
+
+P, q, G, h or lb; with the reference also x (mm), lam (the multipliers of Gz ≤ h, N), bound_mm, the proven
+bound on max|x − x*|, and limit_mm, within which an answer has to be. As a folder of Matrix Market files, one
+per array and with 17 digits, or as one .npz; about.json, or the texts in the .npz, say which problem it is.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
+from rich.console import Console
+
+from harness.planning.road import chosen_form
+from harness.verification.judge import LIMIT_MM
+from harness.verification.reference_problem import reference_problem
+from problems.build import load_case, prepared
+from problems.errors import InputError
+from problems.forms.names import FORMS, Form
+from problems.forms.problem import in_form
+from problems.model.scene import MatricesScene, Scene
+from problems.scene import read_scene
+
+from .into_place import into_place
+
+FORMATS = ("mtx", "npz")
+
+
+@dataclass(frozen=True)
+class Program:
+    """A quadratic program: arrays and matrices by name, and what it is of."""
+
+    arrays: dict[str, Any]
+    about: dict[str, Any]
+
+
+def export_form(
+    source: str,
+    form: Form,
+    format: str | None,
+    out: Path,
+    console: Console,
+    with_reference: bool = False,
+    reference_limit_s: float | None = None,
+) -> None:
+    """Write a scene in a form, by default as .npz if `out` ends in that, else as Matrix Market files.
+
+    Raises InputError.
+    """
+    format = format or ("npz" if out.suffix == ".npz" else "mtx")
+    if format not in FORMATS:
+        allowed = f"{' or '.join(FORMATS)} with --form; other formats hold K, A, f, g"
+        raise InputError.one("--format", "format", format, allowed)
+    scene = read_scene(source)
+    own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
+    with into_place(out, [Path(source), *own]) as new:
+        program = in_one_form(source, scene, form, with_reference, reference_limit_s)
+        (_write_npz if format == "npz" else _write_mtx)(new, program)
+    z, about = len(program.arrays["q"]), program.about
+    console.print(f"{about['scene']}, {form} form, {z} unknowns, {about['m']} contacts: {out}")
+
+
+def in_one_form(
+    source: str, scene: Scene, form: Form, with_reference: bool, limit_s: float | None = None
+) -> Program:
+    """The program of a scene; refuses a dense one that this machine's memory cannot hold."""
+    chosen_form(scene, FORMS, form)
+    reference = reference_problem(source, limit_s=limit_s, form=form) if with_reference else None
+    data = reference.prepared if reference else prepared(scene, form=form)
+    problem = in_form(data, form)
+    (load,) = problem.loads([reference.load if reference else load_case(scene, form)])
+    blocks = problem.blocks
+    P = blocks[0] if len(blocks) == 1 else sp.csc_array(sp.block_diag(blocks))
+    arrays: dict[str, Any] = {"P": P, "q": problem.q(load)}
+    if problem.G is None:
+        arrays["lb"] = np.zeros(len(load.g))
+    else:
+        arrays |= {"G": problem.G, "h": problem.h(load)}
+    if reference:
+        known = reference.reference
+        arrays |= {"x": known.x, "lam": known.lam, "bound_mm": np.array([known.bound_mm])}
+        arrays["limit_mm"] = np.array([reference.limit_mm(LIMIT_MM)])
+    about = {"scene": scene.name, "title": scene.title, "scene_key": scene.key, "form": form}
+    return Program(arrays, about | {"n": problem.assembly.n, "m": problem.assembly.m})
+
+
+def _write_npz(path: Path, program: Program) -> None:
+    """Matrices of the sparse form as the three arrays of the compressed columns, and their shape."""
+    arrays: dict[str, Any] = {name: np.array(value) for name, value in program.about.items()}
+    for name, M in program.arrays.items():
+        if not sp.issparse(M):
+            arrays[name] = M
+        elif program.about["form"] != "sparse":
+            arrays[name] = M.toarray()
+        else:
+            columns = sp.csc_array(M)
+            parts = {"data": columns.data, "indices": columns.indices, "indptr": columns.indptr}
+            arrays |= {f"{name}_{part}": array for part, array in parts.items()}
+            arrays[f"{name}_shape"] = np.array(M.shape)
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def _write_mtx(path: Path, program: Program) -> None:
+    path.mkdir()
+    for name, M in program.arrays.items():
+        matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
+        scipy.io.mmwrite(path / f"{name}.mtx", matrix, precision=17, symmetry="general")
+    (path / "about.json").write_text(json.dumps(program.about, indent=1) + "\n", "utf-8")

@@ -1,0 +1,255 @@
+"""`export --form` and `judge`: problems to other programs, bit for bit, and their answers back."""
+
+from __future__ import annotations
+
+import runpy
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse as sp
+import tiny
+from small import solve_by_nnls
+from strip import write_strip
+from typer.testing import CliRunner, Result
+
+from harness.cli.app import app
+from problems.build import load_case, prepared
+from problems.forms.names import Form
+from problems.forms.problem import in_form
+from problems.scene import read_scene
+
+READERS = Path(__file__).parents[1] / "examples" / "readers"
+EIGEN = Path("/usr/include/eigen3")
+
+
+def harness(*words: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, words)])
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scenes")
+    write_strip(folder)
+    tiny.write_problem(folder / "tiny.npz")
+    return folder
+
+
+def read_problem(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = runpy.run_path(str(READERS / "read_problem.py"))["read_problem"](folder)
+    return found
+
+
+def dense(M: Any) -> np.ndarray:
+    return M.toarray() if sp.issparse(M) else np.asarray(M)
+
+
+@pytest.mark.parametrize("form", ["primal", "dual", "sparse"])
+def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Path) -> None:
+    source = scenes / "strip.toml"
+    done = harness("export", source, "--form", form, "--with-reference", "--out", tmp_path / "p")
+    assert done.exit_code == 0, done.output
+    found = read_problem(tmp_path / "p")
+    problem = in_form(prepared(read_scene(str(source)), form=form), form)
+    (load,) = problem.loads([load_case(read_scene(str(source)), form)])
+    assert np.array_equal(dense(found["P"]), dense(sp.block_diag(problem.blocks)))
+    assert np.array_equal(found["q"], problem.q(load))
+    if form == "dual":
+        assert np.array_equal(found["lb"], np.zeros(45))
+        assert "G" not in found
+    else:
+        assert np.array_equal(dense(found["G"]), dense(problem.G))
+        assert np.array_equal(found["h"], problem.h(load))
+    assert float(found["limit_mm"][0]) == 1e-7
+    assert 0 < float(found["bound_mm"][0]) < 1e-9
+
+
+def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: Path) -> None:
+    """The files alone, solved by nnls."""
+    assert (
+        harness(
+            "export", scenes / "tiny.npz", "--form", "primal", "--with-reference", "--out", tmp_path / "p"
+        ).exit_code
+        == 0
+    )
+    scene = read_scene(str(scenes / "tiny.npz"))
+    x, lam = solve_by_nnls(prepared(scene), load_case(scene))
+    found = read_problem(tmp_path / "p")
+    np.testing.assert_allclose(found["x"], x, atol=1e-12)
+    np.testing.assert_allclose(found["lam"], lam, atol=1e-11)
+    residual = found["P"] @ x + found["q"] + found["G"].T @ lam
+    assert abs(residual).max() < 1e-11
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+def test_one_npz_holds_the_same(form: Form, scenes: Path, tmp_path: Path) -> None:
+    asked = ("export", scenes / "strip.toml", "--form", form, "--with-reference", "--out")
+    assert harness(*asked, tmp_path / "p").exit_code == 0
+    assert harness(*asked, tmp_path / "p.npz").exit_code == 0
+    found = read_problem(tmp_path / "p")
+    with np.load(tmp_path / "p.npz") as archive:
+        arrays = dict(archive)
+    if form == "sparse":
+        for name in "PG":
+            parts = [arrays.pop(f"{name}_{part}") for part in ("data", "indices", "indptr", "shape")]
+            arrays[name] = sp.csc_array(tuple(parts[:3]), shape=tuple(parts[3])).toarray()
+    assert str(arrays["scene"]) == "strip"
+    for name, M in found.items():
+        assert np.array_equal(arrays[name], dense(M)), name
+
+
+def test_several_scenes_are_folders_or_files_in_one(scenes: Path, tmp_path: Path) -> None:
+    both = (scenes / "strip.toml", scenes / "tiny.npz")
+    assert harness("export", *both, "--form", "dual", "--out", tmp_path / "forms").exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "forms").iterdir()) == ["strip", "tiny"]
+    assert harness("export", *both, "--format", "npz", "--out", tmp_path / "files").exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == ["strip.npz", "tiny.npz"]
+    assert harness("export", both[0], both[0], "--form", "dual", "--out", tmp_path / "twice").exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--format", "op4", "--form", "dual"], "mtx or npz"),
+        (["--format", "npz", "--with-reference"], "needs --form"),
+        ([], "is needed without --form"),
+    ],
+)
+def test_options_that_do_not_go_together(
+    words: list[str], message: str, scenes: Path, tmp_path: Path
+) -> None:
+    done = harness("export", scenes / "tiny.npz", *words, "--out", tmp_path / "p")
+    assert done.exit_code == 2
+    assert message in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("g++") and EIGEN.is_dir()), reason="needs g++ and Eigen")
+def test_the_reader_in_cpp_agrees_with_the_one_in_python(scenes: Path, tmp_path: Path) -> None:
+    compiled = tmp_path / "read_problem"
+    command = ["g++", "-I", str(EIGEN), str(READERS / "read_problem.cpp"), "-o", str(compiled)]
+    subprocess.run(command, check=True)
+    for form in ("dual", "sparse"):
+        asked = (
+            "export",
+            scenes / "strip.toml",
+            "--form",
+            form,
+            "--with-reference",
+            "--out",
+            tmp_path / form,
+        )
+        assert harness(*asked).exit_code == 0
+        said = subprocess.run([compiled, tmp_path / form], capture_output=True, text=True, check=True).stdout
+        unknowns, residual = map(float, said.split())
+        assert unknowns == len(read_problem(tmp_path / form)["q"])
+        assert residual < 1e-9
+
+
+# The answer back.
+
+
+@pytest.fixture(scope="module")
+def answer(scenes: Path) -> tuple[np.ndarray, np.ndarray]:
+    scene = read_scene(str(scenes / "tiny.npz"))
+    x, lam = solve_by_nnls(prepared(scene), load_case(scene))
+    return np.asarray(x), np.asarray(lam)
+
+
+def written(path: Path, x: np.ndarray) -> Path:
+    match path.suffix:
+        case ".npy":
+            np.save(path, x)
+        case ".npz":
+            np.savez(path, x=x)
+        case ".txt":
+            np.savetxt(path, x)
+        case ".mtx":
+            scipy.io.mmwrite(path, x[:, None], precision=17)
+        case ".csv":
+            path.write_text(
+                "node,displacement_mm\n" + "".join(f"{k},{v!r}\n" for k, v in enumerate(x.tolist()))
+            )
+    return path
+
+
+@pytest.mark.parametrize("name", ["x.npy", "x.npz", "x.txt", "x.mtx", "x.csv"])
+@pytest.mark.parametrize(("shift", "code"), [(0.0, 0), (5e-8, 0), (2e-7, 1)])
+def test_an_answer_is_judged_by_its_displacements(
+    name: str, shift: float, code: int, scenes: Path, answer: Any, tmp_path: Path
+) -> None:
+    x = answer[0].copy()
+    x[7] += shift
+    done = harness("judge", written(tmp_path / name, x), scenes / "tiny.npz")
+    assert done.exit_code == code, done.output
+    assert ("Outside" if code else "Within") in done.stdout
+    if shift:
+        assert f"{shift:.3e} at entry 7" in done.stdout
+
+
+def test_forces_alone_are_judged_by_the_displacements_that_they_give(
+    scenes: Path, answer: Any, tmp_path: Path
+) -> None:
+    _, lam = answer
+    np.savetxt(tmp_path / "lam.txt", lam)
+    done = harness("judge", tmp_path / "lam.txt", scenes / "tiny.npz", "--form", "dual")
+    assert done.exit_code == 0, done.output
+    assert "largest unbalanced force" in done.stdout
+    np.savetxt(tmp_path / "lam.txt", lam + 1e-3 * (lam > 0))
+    assert harness("judge", tmp_path / "lam.txt", scenes / "tiny.npz", "--form", "dual").exit_code == 1
+
+
+def test_the_tables_of_solve_are_answers(
+    scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    assert harness("solve", scenes / "strip.toml", "--out", tmp_path).exit_code == 0
+    assert harness("judge", tmp_path / "nodes.csv", scenes / "strip.toml").exit_code == 0
+    assert harness("judge", tmp_path / "contacts.csv", scenes / "strip.toml").exit_code == 0
+    assert harness("judge", tmp_path / "solution.npz", scenes / "strip.toml").exit_code == 0
+
+
+def test_a_limit_below_what_is_proven_cannot_be_judged(scenes: Path, answer: Any, tmp_path: Path) -> None:
+    path = written(tmp_path / "x.npy", answer[0])
+    done = harness("judge", path, scenes / "tiny.npz", "--limit", "1e-16")
+    assert done.exit_code == 3
+    assert "Cannot be judged" in done.stdout
+
+
+BAD: dict[str, tuple[Any, int, str]] = {
+    "nan.npy": (np.full(20, np.nan), 2, "20 of 20 are not"),
+    "infinite.txt": (np.full(20, np.inf), 2, "must be finite"),
+    "short.npy": (np.zeros(19), 5, "20 in the primal form"),
+    "forces.txt": (np.zeros(10), 5, "name another form"),
+    "matrix.npy": (np.zeros((4, 5)), 2, "not a vector"),
+    "text.npy": (np.array(["a"]), 2, "an array of"),
+    "x.bin": (np.zeros(20), 2, "suffix"),
+    "words.txt": ("zero one two", 2, "numbers"),
+    "heading.csv": ("a,b\n1,2\n", 2, "displacement_mm"),
+    "empty.csv": ("", 2, "file"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_no_answer_of_this_problem_is_refused(name: str, scenes: Path, tmp_path: Path) -> None:
+    content, code, message = BAD[name]
+    path = tmp_path / name
+    if isinstance(content, str):
+        path.write_text(content)
+    elif path.suffix == ".bin":
+        path.write_bytes(content.tobytes())
+    else:
+        written(path, content)
+    done = harness("judge", path, scenes / "tiny.npz")
+    assert done.exit_code == code, done.output
+    assert message in done.stderr
+
+
+def test_a_limit_that_is_none_is_refused(scenes: Path, answer: Any, tmp_path: Path) -> None:
+    path = written(tmp_path / "x.npy", answer[0])
+    for limit in ("0", "nan", "-1"):
+        assert harness("judge", path, scenes / "tiny.npz", "--limit", limit).exit_code == 2
