@@ -19,6 +19,7 @@ from harness.terminal.console import FormName, Plugin, ReferenceLimit, Scheduler
 from . import check as check_command
 from . import compare as compare_command
 from . import exchange as exchange_commands
+from . import reproduce as reproduce_command
 from . import scene as scene_commands
 from . import series as series_command
 
@@ -28,6 +29,7 @@ app = typer.Typer(
 app.add_typer(check_command.app)
 app.add_typer(compare_command.app)
 app.add_typer(exchange_commands.app)
+app.add_typer(reproduce_command.app)
 app.add_typer(scene_commands.app)
 app.add_typer(series_command.app)
 
