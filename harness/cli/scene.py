@@ -1,4 +1,4 @@
-"""The commands for one scene: solve, validate."""
+"""The commands for a scene: init, validate, solve."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
 @app.command()
 def solve(
     scene: SceneName,
+    other: Annotated[
+        str | None, typer.Argument(metavar="[OTHER]", help="A second scene on the same junction.")
+    ] = None,
+    *,
     out: Annotated[Path, option("DIR", "Output directory.")],
     solver: Annotated[
         str | None, option("NAME", "A solver by name.  [default: the active-set method of the references]")
@@ -35,22 +39,34 @@ def solve(
     that answer. If the parts do not meet, this is a linear solve. A ledger lists what was computed, for which
     effect, and what was skipped.
 
+    Two scenes with the same contacts, such as two plans of fasteners, are solved into DIR/first and
+    DIR/second and compared: gaps side by side, a map of the difference, the force in each fastener.
+    --allow-gap then decides on the second.
+
     \b
     Examples:
       python -m harness solve gallery/heavy-sheet-on-tool --out results/sheet
       python -m harness solve my-scene.toml --solver piqp --out results/mine
       python -m harness solve my-scene.toml --allow-gap 0.05 --out results/mine
+      python -m harness solve before.toml after.toml --out results/both
 
     \b
     Exit codes: 0 solved, 1 no answer or not within 1e-7 mm, 2 wrong usage or bad input,
-                3 --allow-gap cannot be told from what is proven, 4 a gap is larger than --allow-gap.
+                3 --allow-gap cannot be told from what is proven, 4 a gap is larger than --allow-gap,
+                5 the two scenes have other contacts.
     """
     with error_reporting(SAFE, INTERRUPTED) as console:
         from harness.scene.solve import solve as solve_scene
+        from harness.scene.two_scenes import solve_both
 
         taken: Any = form.value if form else None
-        code = solve_scene(scene, solver, tolerance, out, console, reference_limit, taken, allow_gap)
-        raise typer.Exit(code)
+
+        def solved(source: str, folder: Path) -> int:
+            return solve_scene(source, solver, tolerance, folder, console, reference_limit, taken, allow_gap)
+
+        if other is None:
+            raise typer.Exit(solved(scene, out))
+        raise typer.Exit(solve_both((scene, other), out, solved, console))
 
 
 @app.command()
@@ -68,3 +84,22 @@ def validate(scene: SceneName) -> None:
         from harness.scene.validate import validate as validate_scene
 
         validate_scene(scene, console)
+
+
+@app.command()
+def init(
+    file: Annotated[Path, typer.Argument(metavar="[FILE]", help="The scene to write.")] = Path("joint.toml"),
+) -> None:
+    """Write a commented scene to start from: a joint of two sheets, a gap, fasteners.
+
+    \b
+    Examples:
+      python -m harness init joint.toml && python -m harness solve joint.toml --out results/joint
+
+    \b
+    Exit codes: 0 written, 2 the file exists, or is no .toml.
+    """
+    with error_reporting(SAFE, INTERRUPTED) as console:
+        from harness.scene.starter import write
+
+        write(file, console)

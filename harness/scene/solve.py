@@ -38,6 +38,7 @@ from solvers.base import Solver
 
 from . import allowed_gap
 from .answer import answer_of
+from .fastener_forces import fastener_forces
 from .few_digits import digits_sentence
 from .layout import layout
 from .ledger import ledger, not_called_for
@@ -153,6 +154,7 @@ def solve(
         "error_bound_mm": known.bound_mm,
         "route": known.route,
         **layout(scene, data.assembly),
+        "fasteners": fastener_forces(scene, data.assembly.at_junction(x)),
         "ledger": [vars(entry) for entry in entries],
         "digits": digits_sentence(data, known.x, known.lam)[0] if isinstance(scene, MatricesScene) else None,
         "skipped": list(_skipped(scene, steps, road, has_contact, solver, p)),

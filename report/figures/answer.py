@@ -39,17 +39,17 @@ def _gap(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     """
     before, after = arrays["gap_before"], arrays["gap_after"]
     titles = [f"gap {when}: {pair_name(pair)}" for pair in record["pairs"] for when in ("before", "after")]
-    maps = _sheet(arrays["contact_nodes"], titles, 2, len(record["marks"]))
+    maps = map_sheet(arrays["contact_nodes"], titles, 2, len(record["marks"]))
     norm = PowerNorm(0.5, 0.0, max(float(before.max()), float(after.max()), 0.0) or 1.0)
     for k, pair in enumerate(record["pairs"]):
         own = slice(pair["start"], pair["stop"])
         nodes = arrays["contact_nodes"][own]
         for axes, values in zip(maps.axes[2 * k : 2 * k + 2], (before, after), strict=True):
             drawn = draw(axes, nodes, values[own], norm, "viridis")
-            _mark(axes, record["marks"])
-        _outline(axes, nodes, arrays["lam"][own] > 0, "white")
+            marked(axes, record["marks"])
+        outlined(axes, nodes, arrays["lam"][own] > 0, "white")
         if allowed := record.get("allowed_gap"):
-            _outline(axes, nodes, after[own] > allowed["allowed_mm"], style.VERMILLION)
+            outlined(axes, nodes, after[own] > allowed["allowed_mm"], style.VERMILLION)
     return maps.finished(drawn, "gap, mm")
 
 
@@ -57,14 +57,14 @@ def _forces(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     """The forces on a square-root scale, so that small ones are visible."""
     pairs, lam = record["pairs"], np.nan_to_num(arrays["lam"])
     titles = [f"contact forces: {pair_name(pair)}" for pair in pairs]
-    maps = _sheet(arrays["contact_nodes"], titles, len(pairs), len(record["marks"]))
+    maps = map_sheet(arrays["contact_nodes"], titles, len(pairs), len(record["marks"]))
     norm = PowerNorm(0.5, 0.0, float(lam.max(initial=0.0)) or 1.0)
     for axes, pair in zip(maps.axes, pairs, strict=True):
         own = slice(pair["start"], pair["stop"])
         nodes, closed = arrays["contact_nodes"][own], lam[own] > 0
         drawn = draw(axes, nodes, np.where(closed, lam[own], np.nan), norm, "magma_r")
-        _outline(axes, nodes, closed, "#444444")
-        _mark(axes, record["marks"])
+        outlined(axes, nodes, closed, "#444444")
+        marked(axes, record["marks"])
     return maps.finished(drawn, "force, N")
 
 
@@ -74,7 +74,7 @@ def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
     corners = np.array([(x, y) for part in parts for x in part["outline"][:2] for y in part["outline"][2:]])
     supports = any(part["supports"] for part in parts)
     titles = [f"displacement of {part['name']}" for part in parts]
-    maps = _sheet(corners, titles, len(parts), len(record["marks"]) + supports)
+    maps = map_sheet(corners, titles, len(parts), len(record["marks"]) + supports)
     norm = Normalize(float(arrays["x"].min()), float(arrays["x"].max()))
     for axes, part in zip(maps.axes, parts, strict=True):
         west, east, south, north = part["outline"]
@@ -86,11 +86,11 @@ def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         for side, y in (("south", south), ("north", north)):
             if side in part["clamped"]:
                 axes.plot([west, east], [y, y], color="#222222", lw=3.0, clip_on=False)
-        _mark(axes, record["marks"] | ({"supports": part["supports"]} if part["supports"] else {}))
+        marked(axes, record["marks"] | ({"supports": part["supports"]} if part["supports"] else {}))
     return maps.finished(drawn, "displacement, mm")
 
 
-def _sheet(nodes: Array, titles: list[str], beside: int, marks: int) -> Sheet:
+def map_sheet(nodes: Array, titles: list[str], beside: int, marks: int) -> Sheet:
     """Maps of the bounding box of the nodes: stacked if it is a wide strip, all side by side if it is
     upright, else `beside` and at most three per row.
     """
@@ -102,12 +102,12 @@ def _sheet(nodes: Array, titles: list[str], beside: int, marks: int) -> Sheet:
     return sheet(middle - size / 2, middle + size / 2, titles, columns, marks)
 
 
-def _outline(axes: Axes, nodes: Array, closed: Any, colour: str) -> None:
+def outlined(axes: Axes, nodes: Array, closed: Any, colour: str) -> None:
     if grid := grid_of(nodes):
         axes.add_collection(LineCollection(outline(grid, closed), colors=colour, linewidths=0.9))
 
 
-def _mark(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
+def marked(axes: Axes, marks: dict[str, list[list[float]]]) -> None:
     """Rings with a white rim, visible on any colour without hiding what is inside them."""
     for kind, points in marks.items():
         x, y = np.array(points).T

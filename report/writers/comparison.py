@@ -109,7 +109,7 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
     )
     path = out / "comparison.md"
     title = f"Compared with {comparisons[0].old}"
-    path.write_text(rendered("sections.md.j2", title=title, sections=sections), "utf-8")
+    path.write_text(rendered("sections.md.j2", title=title, sections=sections, csv=False), "utf-8")
     return path
 
 

@@ -42,7 +42,7 @@ def write(directory: Path) -> Path:
         saved = [Section(s.title, [save_block(block, target) for block in s.blocks]) for s in sections]
     path = target / "report.md"
     title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
-    path.write_text(rendered("sections.md.j2", title=title, sections=saved), "utf-8")
+    path.write_text(rendered("sections.md.j2", title=title, sections=saved, csv=True), "utf-8")
     return path
 
 

@@ -36,6 +36,8 @@ def write(directory: Path) -> Path:
         if check := record.get("allowed_gap"):
             larger = {name: [column[k] for k in check["contacts"]] for name, column in contacts.items()}
             _write_csv(directory / "exceeding.csv", larger)
+    if record.get("fasteners"):
+        _write_csv(directory / "fasteners.csv", _fasteners(record["fasteners"]))
     figures = answer_figures(record, arrays) if "nodes" in arrays else {}
     with style.applied():
         for name, drawing in figures.items():
@@ -65,6 +67,17 @@ def _contacts(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
         "gap_before_mm": arrays["gap_before"].tolist(),
         "gap_after_mm": arrays["gap_after"].tolist(),
         "force_N": arrays["lam"].tolist(),
+    }
+
+
+def _fasteners(entries: list[dict[str, Any]]) -> Columns:
+    """One row per fastener and contact."""
+    return {
+        "kind": [entry["kind"] for entry in entries],
+        "contact": [pair_name(entry) for entry in entries],
+        "x_mm": [entry["x"] for entry in entries],
+        "y_mm": [entry["y"] for entry in entries],
+        "force_N": [entry["force_N"] for entry in entries],
     }
 
 

@@ -1,0 +1,66 @@
+"""Two scenes on one junction, such as two plans of fasteners, solved and compared contact by contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from harness.results.incomparable import Incomparable
+from harness.terminal.exit_codes import FAILED
+from problems.build import prepared
+from problems.model.scene import JointScene
+from problems.scene import read_scene
+
+FOLDERS = ["first", "second"]
+
+
+def solve_both(
+    sources: tuple[str, str], out: Path, solve: Callable[[str, Path], int], console: Console
+) -> int:
+    """Solve both into DIR/first and DIR/second, write DIR/comparison.md and its files, print what changed.
+
+    Returns the exit code of the second, or 1 if the first has no good answer. Raises InputError, Incomparable
+    if their contacts are not the same.
+    """
+    refuse_other_contacts(*sources)
+    codes = []
+    for source, folder in zip(sources, FOLDERS, strict=True):
+        console.print(f"\n{source}", style="bold")
+        codes.append(solve(source, out / folder))
+    from report.document.escape import plain
+    from report.writers.two_answers import write
+
+    path, pairs = write(out, FOLDERS)
+    table = Table("contact", "", "first", "second", title=f"{sources[0]} and {sources[1]}")
+    for line in pairs.to_dict("records"):
+        figures = {"largest gap left, mm": "largest_{}_mm", "mean, mm": "mean_{}_mm", "closed": "closed_{}"}
+        for words, name in figures.items():
+            both = [f"{line[name.format(side)]:.4g}" for side in FOLDERS]
+            table.add_row(plain(str(line["contact"])), words, *both)
+        closed, opened = (f"{line[name]:.4g}" for name in ("most_closed_mm", "most_opened_mm"))
+        table.add_row(plain(str(line["contact"])), "closed further by up to, mm", "", closed)
+        table.add_row(plain(str(line["contact"])), "opened by up to, mm", "", opened)
+    console.print(table)
+    console.print(f"Comparison: {path}")
+    return FAILED if codes[0] == FAILED else codes[1]
+
+
+def refuse_other_contacts(first: str, second: str) -> None:
+    """Raise Incomparable unless both scenes have the same contacts at the same nodes."""
+    one, other = read_scene(first), read_scene(second)
+    if isinstance(one, JointScene) and isinstance(other, JointScene):
+        contacts = [list(pair) for pair in other.joint.pairs]
+        same = one.joint.pairs == other.joint.pairs and np.array_equal(one.joint.nodes, other.joint.nodes)
+        if not (same and contacts):
+            allowed = f"the contacts of {first}, at least one, at the same nodes"
+            raise Incomparable.one(second, "contacts", contacts, allowed)
+        return
+    counts = [prepared(scene).assembly.m for scene in (one, other)]
+    if counts[0] != counts[1] or not counts[0]:
+        raise Incomparable.one(
+            second, "contacts", counts[1], f"as many as {first} has, {counts[0]}, at least one"
+        )

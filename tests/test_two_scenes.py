@@ -1,0 +1,172 @@
+"""`solve A B`, the force in each fastener, and `init`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from strip import write_strip
+from typer.testing import CliRunner, Result
+
+from harness.cli.app import app
+from harness.scene.fastener_forces import fastener_forces
+from harness.scene.starter import STARTER
+from problems.build import load_case, prepared
+from problems.scene import read_scene
+
+FASTENERS = """
+[[effect]]
+kind = "fasteners"
+preload = 80.0
+points = [[30.0, 70.0], [150.0, 70.0]]
+"""
+JOINT = """
+[joint]
+junction = { length = 160.0, width = 80.0, nodes = [9, 5] }
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = { length = 40.0, elements = 2 }
+clamped = ["north"]
+[[joint.part]]
+name = "b"
+thickness = 3.0
+south = { length = 60.0, elements = 2 }
+clamped = ["south"]
+[[effect]]
+kind = "initial_gap"
+mean = 0.3
+"""
+SPRINGS = """
+[[effect]]
+kind = "installed_fasteners"
+points = [[80.0, 40.0], [120.0, 20.0]]
+stiffness = 500.0
+approach = 0.2
+"""
+
+
+def harness(*words: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, words)])
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_springs_and_contacts_balance_what_the_parts_without_them_resist(tmp_path: Path) -> None:
+    """K₀, A, f₀ of the scene without springs: K₀x + Aλ − f₀ is at each tied node the pull of its spring."""
+    tied = write(tmp_path / "tied.toml", JOINT + FASTENERS + SPRINGS)
+    bare = write(tmp_path / "bare.toml", JOINT + FASTENERS)
+    assert harness("solve", tied, "--out", tmp_path / "out").exit_code == 0
+    with np.load(tmp_path / "out" / "solution.npz") as saved:
+        x, lam = saved["x"], saved["lam"]
+    scene = read_scene(str(bare))
+    data, load = prepared(scene), load_case(scene)
+    pull = data.assembly.multiply_K(x) + data.assembly.A @ lam - load.f
+    found = fastener_forces(read_scene(str(tied)), x)
+    springs = [entry for entry in found if entry["kind"] == "installed_fasteners"]
+    assert [(entry["x"], entry["y"]) for entry in springs] == [(80.0, 40.0), (120.0, 20.0)]
+    for entry in springs:
+        node = round(entry["x"] / 20) + 9 * round(entry["y"] / 20)
+        assert pull[node] == pytest.approx(entry["force_N"], abs=1e-8)
+        assert pull[45 + node] == pytest.approx(-entry["force_N"], abs=1e-8)
+        assert abs(entry["force_N"]) > 1.0
+    preloads = [entry["force_N"] for entry in found if entry["kind"] == "fasteners"]
+    assert preloads == [80.0, 80.0]
+    table = rows(tmp_path / "out" / "fasteners.csv")
+    assert [float(row["force_N"]) for row in table] == [entry["force_N"] for entry in found]
+
+
+def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path) -> None:
+    first = write(tmp_path / "before.toml", JOINT)
+    second = write(tmp_path / "after.toml", JOINT + FASTENERS + SPRINGS)
+    done = harness("solve", first, second, "--out", tmp_path / "both", "--allow-gap", 0.29)
+    assert done.exit_code == 0, done.output  # the first alone has a gap of 0.3 mm
+    gaps = []
+    for name in ("first", "second"):
+        with np.load(tmp_path / "both" / name / "solution.npz") as saved:
+            gaps.append(saved["gap_after"])
+    table = rows(tmp_path / "both" / "contacts.csv")
+    np.testing.assert_array_equal([float(row["change_mm"]) for row in table], gaps[1] - gaps[0])
+    np.testing.assert_array_equal([float(row["gap_after_first_mm"]) for row in table], gaps[0])
+    (pair,) = rows(tmp_path / "both" / "pairs.csv")
+    assert float(pair["largest_second_mm"]) == gaps[1].max()
+    assert float(pair["most_closed_mm"]) == (gaps[0] - gaps[1]).max()
+    forces = rows(tmp_path / "both" / "fasteners.csv")
+    assert [row["first_N"] for row in forces] == [""] * 4
+    assert [float(row["second_N"]) for row in forces][:2] == [80.0, 80.0]
+    page = (tmp_path / "both" / "comparison.md").read_text()
+    for name in ("gaps", "difference"):
+        assert f"![{name}]({name}.png)" in page
+        picture = imread(tmp_path / "both" / f"{name}.png")[:, :, :3]
+        for border in (picture[:3], picture[-3:], picture[:, :3], picture[:, -3:]):
+            assert (border == 1.0).all()
+
+
+def test_the_same_scene_twice_has_no_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    monkeypatch.setattr("report.writers.two_answers.gap_maps", lambda *_: {})
+    scene = write_strip(tmp_path)
+    assert harness("solve", scene, scene, "--out", tmp_path / "both").exit_code == 0
+    assert {float(row["change_mm"]) for row in rows(tmp_path / "both" / "contacts.csv")} == {0.0}
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("nodes = [9, 5]", "nodes = [9, 4]"),
+        ("length = 160.0", "length = 170.0"),
+        ('name = "a"', 'name = "c"'),
+    ],
+)
+def test_scenes_with_other_contacts_are_refused(old: str, new: str, tmp_path: Path) -> None:
+    first = write(tmp_path / "first.toml", JOINT)
+    second = write(tmp_path / "second.toml", JOINT.replace(old, new))
+    done = harness("solve", first, second, "--out", tmp_path / "both")
+    assert done.exit_code == 5
+    assert "second.toml: contacts" in done.stderr
+    assert not (tmp_path / "both").exists()
+
+
+def test_the_starter_is_a_scene_that_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    path = tmp_path / "new" / "joint.toml"
+    assert harness("init", path).exit_code == 0
+    assert harness("validate", path).exit_code == 0
+    done = harness("solve", path, "--out", tmp_path / "out", "--allow-gap", 0.05)
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "out" / "solution.json").read_text())["qp"]
+    comments = [line for line in path.read_text().splitlines() if line.startswith("# kind")]
+    assert len(comments) >= 3
+    assert f"solve {path}" in path.read_text()
+
+
+def test_what_the_starter_offers_in_comments_is_valid(tmp_path: Path) -> None:
+    """Each commented table, switched on."""
+    text = STARTER.read_text("utf-8")
+    tables = [block for block in text.split("\n\n") if "# [[effect]]" in block]
+    assert len(tables) == 3
+    write(tmp_path / "gaps.csv", "x,y,gap\n0,0,0.3\n600,0,0.3\n0,120,0.4\n")
+    for block in tables:
+        lines = block[block.index("# [[effect]]") :].splitlines()
+        on = "\n".join(line.removeprefix("# ") for line in lines)
+        path = write(tmp_path / "on.toml", text + "\n" + on)
+        assert len(read_scene(str(path)).effects) == 3  # type: ignore[attr-defined]
+
+
+def test_init_overwrites_nothing(tmp_path: Path) -> None:
+    path = write(tmp_path / "mine.toml", "title = 'mine'")
+    assert harness("init", path).exit_code == 2
+    assert path.read_text() == "title = 'mine'"
+    assert harness("init", tmp_path / "joint.txt").exit_code == 2
