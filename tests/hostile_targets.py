@@ -77,7 +77,7 @@ def scene(root: Path) -> Target:
     series = ("series", "@scene.toml", "--threads", "1", "--check", "0", "--out", "@out")
     commands = (
         *[("validate", "@scene.toml")] * 6,
-        ("solve", "@scene.toml", "--out", "@out"),
+        ("solve", "@scene.toml", "--allow-gap", "0.1", "--out", "@out"),
         ("export", "@scene.toml", "--format", "npz", "--out", "@out.npz"),
         (*series, "--gaps", "@gaps.csv"),
         (*series, "--sweep", "initial_gap.mean=0.1:0.2:2"),
@@ -182,7 +182,8 @@ def results(root: Path) -> Target:
         for path in (folder / "done").rglob("*")
         if path.suffix in (".jsonl", ".toml", ".json", ".npz")
     )
-    commands = (*[("gate", "@done")] * 8, ("report", "@done"))
+    baseline = ("gate", "@done", "--baseline", "@done", "--json", "@out.json", "--junit", "@out.xml")
+    commands = (*[("gate", "@done")] * 6, *[baseline] * 2, ("report", "@done"))
     return Target("results", 0.18, folder, names, commands, lambda name: "report/" not in name, accurate)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_comparisons import comparisons
 from hostile_draws import mutate
 from hostile_targets import Fault, Target, all_targets, invoke
 from long import draws
@@ -29,7 +30,7 @@ TIME_LIMIT_S = 60  # per command
 WORST_SHOWN = 25
 DRAWN = 0.02  # of the inputs: pictures are saved, which takes a second
 MEMORY = 6 * 2**30  # bytes of address space: what reads without end is a fault before the machine is full
-CODES = {0, 1, 2, 3}
+CODES = {0, 1, 2, 3, 4, 5}
 
 
 @contextmanager
@@ -68,7 +69,7 @@ def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(root / "cache"))
         patch.setattr(style, "DPI", 30)
-        made = all_targets(root)
+        made = [*all_targets(root), *comparisons(root)]
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, before[1]))
         yield made
     resource.setrlimit(resource.RLIMIT_AS, before)

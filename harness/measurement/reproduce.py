@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,9 +23,10 @@ from harness.results.kinds import refuse_wrong_kinds
 from harness.results.machine import machine
 from harness.results.provenance import provenance
 from harness.results.records import MEASUREMENTS, Row, read
+from harness.results.schema import FIELDS
 from harness.results.sides import batched
 from harness.verification.reference_problem import ANSWER_MIB, reference_problem
-from problems.errors import InputError
+from problems.errors import Fault, InputError
 from problems.input.bounded import regular_file
 from problems.scene import read_scene
 
@@ -66,6 +68,14 @@ def find_row(directory: Path, words: Sequence[str]) -> Row:
         more = f", and {len(fit) - SHOWN} more" if len(fit) > SHOWN else ""
         some = "; ".join(row["key"] for row in fit[:SHOWN])
         raise InputError.one(path, "key", wanted, f"more words: {some}{more}")
+    numbers = {name: value for name, value in fit[0].items() if name in NEEDED and FIELDS[name] == "number"}
+    faults = [
+        Fault(str(path), f"{name} of {fit[0]['key']}", value, "must be finite")
+        for name, value in numbers.items()
+        if not isfinite(value)
+    ]
+    if faults:
+        raise InputError(faults)
     return fit[0]
 
 

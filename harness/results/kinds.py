@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from .schema import FIELDS, PROBLEM_FIELDS, Kind
 
 MAX_MIB = 1024  # of a file beside the rows
 MAX_FAULTS = 20  # named at once
+LARGEST = sys.float_info.max  # of an integer: what is larger is no number of ours
 TYPES: dict[Kind, tuple[type, ...]] = {
     "number": (int, float),
     "text": (str,),
@@ -37,7 +39,7 @@ def refuse_wrong_kinds(
         Fault(str(path), f"line {number}: {name}", value, f"must be a {fields[name]} or null")
         for number, row in enumerate(rows, start=1)
         for name, value in row.items()
-        if name in fields and value is not None and type(value) not in TYPES[fields[name]]
+        if name in fields and value is not None and not _is_of_kind(value, fields[name])
     ]
     faults += [
         Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
@@ -47,6 +49,11 @@ def refuse_wrong_kinds(
     ]
     if faults:
         raise InputError(faults[:MAX_FAULTS])
+
+
+def _is_of_kind(value: object, kind: Kind) -> bool:
+    too_large = isinstance(value, int) and abs(value) > LARGEST
+    return type(value) in TYPES[kind] and not too_large
 
 
 def refuse_unreadable(directory: Path) -> None:

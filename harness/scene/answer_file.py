@@ -6,11 +6,12 @@ import csv
 from pathlib import Path
 
 import numpy as np
-import scipy.io
+import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 from problems.input.bounded import regular_file
+from problems.input.user_matrices import read_mtx
 
 MIB = 1024
 #: The headings of a column of displacements and of contact forces, in a table with several.
@@ -53,7 +54,10 @@ def _read(path: Path) -> dict[str, Vector]:
         case ".txt":
             return {"": _vector(np.loadtxt(path, dtype=float, ndmin=1))}
         case ".mtx":
-            return {"": _vector(scipy.io.mmread(path))}
+            found = read_mtx(path)
+            if sp.issparse(found):  # whose size no file bounds
+                raise ValueError("coordinates, not an array")
+            return {"": _vector(found)}
     raise InputError.one(path, "suffix", path.suffix, ALLOWED)
 
 

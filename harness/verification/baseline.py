@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 from harness.results.digits import floor_mm
@@ -62,5 +63,6 @@ def read_baseline(directory: Path, margin: float, name: str, rows: Iterable[Row]
 def _within(rows: Iterable[Row]) -> Iterator[tuple[str, float, float]]:
     for row in rows:
         error = row.get("displacement_error_mm")
-        if row["verdict"] == "within" and error is not None:
-            yield measurement(row), error, row.get("reference_bound_mm") or 0.0
+        bound = row.get("reference_bound_mm") or 0.0
+        if row["verdict"] == "within" and error is not None and isfinite(error + bound):
+            yield measurement(row), error, bound

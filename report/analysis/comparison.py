@@ -86,9 +86,10 @@ def _errors(table: pd.DataFrame) -> list[pd.Series[float]]:
 
 
 def _digits(before: float, after: float, bound: float, limit: float) -> float:
-    if not np.isfinite([before, after, limit]).all():
+    floor = floor_mm(0.0 if np.isnan(bound) else bound, limit)
+    if not (np.isfinite([before, after, floor]).all() and floor > 0):
         return np.nan
-    return digits_lost(before, after, floor_mm(0.0 if np.isnan(bound) else bound, limit))
+    return digits_lost(before, after, floor)
 
 
 def _change(line: dict[Hashable, Any], max_digits_lost: float, max_slowdown: float) -> tuple[int, str, float]:
