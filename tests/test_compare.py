@@ -160,6 +160,7 @@ BAD: dict[str, tuple[dict[str, Any], int, str]] = {
     "limit": ({"limit_mm": 1e-9}, 5, "another limit"),
     "suite": ({"scene": "4386/0107", "suite": "other"}, 5, "suite = ['other']"),
     "kind": ({"solve_s": "fast"}, 2, "line 1: solve_s"),
+    "huge": ({"solve_s": 10**400}, 2, "line 1: solve_s"),
     "verdict": ({"verdict": None}, 2, "verdict"),
 }
 

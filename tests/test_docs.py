@@ -12,8 +12,11 @@ import pytest
 from matplotlib.image import imread
 from pydantic_core import PydanticUndefined
 from rich.console import Console
+from typer.main import get_command
 
+from harness.cli.app import app
 from harness.scene.solve import solve
+from harness.terminal import exit_codes
 from problems import effects
 from problems.build import load_case, prepared
 from problems.errors import InputError
@@ -144,6 +147,19 @@ def test_the_folders_and_files_of_the_architecture_are_those_of_the_code() -> No
         for folder in (ROOT / package).iterdir():
             if folder.is_dir() and folder.name != "__pycache__" and any(folder.iterdir()):
                 assert f"{folder.name}/" in part, f"{package}/{folder.name}"
+
+
+def test_the_exit_codes_of_the_readme_are_those_of_the_commands() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    table = text[text.index("| exit code |") :].split("\n\n")[0]
+    codes = {value for name, value in vars(exit_codes).items() if name.isupper()}
+    assert {int(code) for code in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)} == codes
+
+
+def test_every_command_is_in_the_readme() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    for name in get_command(app).commands:  # type: ignore[attr-defined]
+        assert re.search(rf"`(?:python -m harness )?{name}\b", text), name
 
 
 def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:

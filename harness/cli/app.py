@@ -51,6 +51,7 @@ def harness() -> None:
       python -m harness run --size 4386           the small problems only
       python -m harness list solvers              what can be measured
       python -m harness run --plugin mine.py      with a solver of your own
+      python -m harness init joint.toml           a commented scene to start from
       python -m harness solve scene.toml --out d  one scene: gaps, displacements, forces, with pictures
       python -m harness series SCENE --out DIR    thousands of load cases on one assembly
       python -m harness compare OLD NEW           what became worse between two runs
