@@ -35,7 +35,7 @@ def compared(root: Path) -> Target:
         ("compare", "@new@1234", "@old"),
         ("reproduce", "@new", "no", "such", "row"),
     )
-    return Target("compared", 0.1, folder, ("new/measurements.jsonl",), commands, checked=counted)
+    return Target("compared", 0.05, folder, ("new/measurements.jsonl",), commands, checked=counted)
 
 
 def judged(root: Path) -> Target:
@@ -57,7 +57,7 @@ def judged(root: Path) -> Target:
             raise Fault("wrong", output[-200:])
 
     commands = tuple(("judge", f"@{name}", "@own.npz") for name in files)
-    return Target("judged", 0.1, folder, files, commands, checked=whole)
+    return Target("judged", 0.05, folder, files, commands, checked=whole)
 
 
 def comparisons(root: Path) -> list[Target]:

@@ -184,7 +184,11 @@ def results(root: Path) -> Target:
     )
     baseline = ("gate", "@done", "--baseline", "@done", "--json", "@out.json", "--junit", "@out.xml")
     commands = (*[("gate", "@done")] * 6, *[baseline] * 2, ("report", "@done"))
-    return Target("results", 0.18, folder, names, commands, lambda name: "report/" not in name, accurate)
+
+    def kept(name: str) -> bool:
+        return "report/" not in name and not name.startswith("out.")
+
+    return Target("results", 0.18, folder, names, commands, kept, accurate)
 
 
 def series(root: Path) -> Target:

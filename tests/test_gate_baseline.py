@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
-from io import StringIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-import tiny
-from rich.console import Console
+from finished import finished_run
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
-from harness.measurement.run import run
-from harness.planning.suite import read_suite
 from harness.results import records
 
 pytestmark = pytest.mark.slow
@@ -25,10 +21,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("gate")
-    suite = read_suite(str(tiny.write_suite(folder, tolerances=[1e-6, 1e-8])))
-    assert run(suite, folder / "finished", Console(file=StringIO())) == 0
-    return folder / "finished"
+    return finished_run(tmp_path_factory)
 
 
 @pytest.fixture
