@@ -80,7 +80,12 @@ def run(
         list[FormName] | None, option("FORM", "Only this form: primal, dual or sparse. Repeatable.")
     ] = None,
     tolerance: Annotated[
-        list[float] | None, option("TOL", "Tolerance passed to the solvers. Repeatable.")
+        list[str] | None,
+        option("TOL", "Tolerance passed to the solvers, repeatable; auto: the loosest decade that suffices."),
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="SOLVER.KEY=VALUE", help="An option of a solver. Repeatable."),
     ] = None,
     repeat: Annotated[int | None, option("N", "Number of repeats.", min=1)] = None,
     threads: Annotated[
@@ -108,6 +113,7 @@ def run(
       python -m harness run --size 4386
       python -m harness run --scene 4386/0107 --solver ipm --solver piqp --form dual
       python -m harness run --scene my-matrices.npz --tolerance 1e-6 --tolerance 1e-9
+      python -m harness run --scene 4386/1471 --solver osqp --tolerance auto --option osqp.scaling=0
       python -m harness run gate --out results/gate
       python -m harness run my-suite.toml --repeat 5 --threads 1 --threads 2
       python -m harness run --scheduler tcp://10.0.0.5:8786
@@ -118,7 +124,7 @@ def run(
     """
     with error_reporting() as console:
         from harness.measurement.run import run as run_suite
-        from harness.planning.overrides import Overrides, overridden
+        from harness.planning.overrides import Overrides, overridden, tolerances_of
         from harness.planning.suite import read_suite
         from harness.results.records import MEASUREMENTS
 
@@ -127,7 +133,8 @@ def run(
             scenes=tuple(scene or ()),
             solvers=tuple(solver or ()),
             forms=tuple(choice.value for choice in form or ()),
-            tolerances=tuple(tolerance or ()),
+            tolerances=tolerances_of(tolerance or []),
+            options=tuple(setting or ()),
             repeats=repeat,
             threads=tuple(threads or ()),
             time_limit_s=time_limit,

@@ -122,7 +122,7 @@ def _row(m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, e
         "n": problem.prepared.assembly.asked,
         "m": problem.prepared.assembly.m,
         "active": int(problem.reference.active.sum()),
-        **{name: getattr(m, name) for name in ("tolerance", "repeat", "options", "gated")},
+        **{name: getattr(m, name) for name in ("tolerance", "searched", "repeat", "options", "gated")},
         "limit_mm": limit_mm,
         "limit_asked_mm": m.limit_mm,
         **of_case,

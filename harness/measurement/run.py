@@ -15,6 +15,7 @@ from rich.console import Console
 
 from harness.planning.estimate import refuse_limits_too_low
 from harness.planning.plan import Measurement, expand
+from harness.planning.search import superfluous
 from harness.planning.suite import Suite, to_toml
 from harness.planning.timeouts import predicted_timeout
 from harness.results import records
@@ -60,8 +61,7 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
             if scene.refused:
                 record_refusal(scene, directory)
         origin = {"machine": record_machine(directory, machine()), **provenance()}
-        done_keys = {row["key"] for row in rows}
-        remaining = [m for m in plan if m.key not in done_keys]
+        remaining = unmeasured(plan, rows)
         done = len(plan) - len(remaining)
         console.print(f"{suite.name}: {len(plan)} measurements, {done} of them already in {directory}")
         if remaining:
@@ -69,10 +69,16 @@ def run(suite: Suite, directory: Path, console: Console, scheduler: str | None =
                 rows = measure_remaining(remaining, rows, done, directory, solvers, origin, outcomes, console)
     planned = {m.key for m in plan}
     code = summary([row for row in rows if row["key"] in planned], console)
-    missing = len(planned - {row["key"] for row in rows})
+    missing = len(unmeasured(plan, rows))
     if missing:
         console.print(f"Not measured: {missing}. Run the same command again.", style="red")
     return FAILED if missing else code
+
+
+def unmeasured(plan: list[Measurement], rows: list[Row]) -> list[Measurement]:
+    """Those without a row that need one."""
+    done = {row["key"] for row in rows}
+    return [m for m in plan if m.key not in done and not superfluous(m, rows)]
 
 
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
@@ -143,6 +149,9 @@ def pending_tasks(
     opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
     for batch in batches(remaining):
         m = batch[0]
+        if superfluous(m, rows):
+            display.passed_over(batch)
+            continue
         if any(problem.scene.name != m.scene for problem in opened.values()):
             opened = {}
         road = road_of(m.form)

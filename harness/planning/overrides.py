@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 from problems.errors import Fault, InputError
 from problems.input.bounded import resolved
+from problems.input.validation import unknown
 from problems.scene import read_scene
 from solvers.base import Form
 
 from .suite import Suite, resolved_scenes, suite_from
 
+WORD = re.compile(r"[\w-]+")  # a text without quotes
+
 
 @dataclass(frozen=True)
 class Overrides:
-    """What the command line changes in a suite; empty or None leaves it as it is."""
+    """What the command line changes in a suite; empty or None leaves it as it is.
+
+    options : "osqp.scaling=0", each with a value as in a suite file.
+    """
 
     sizes: tuple[int, ...] = ()
     scenes: tuple[str, ...] = ()
     solvers: tuple[str, ...] = ()
     forms: tuple[Form, ...] = ()
-    tolerances: tuple[float, ...] = ()
+    tolerances: tuple[float, ...] | Literal["auto"] = ()
+    options: tuple[str, ...] = ()
     repeats: int | None = None
     threads: tuple[int, ...] = ()
     time_limit_s: float | None = None
@@ -54,7 +64,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     own = [change.plugin.stem] if change.plugin and not change.solvers else []
     data["solver"] += [{"name": name} for name in (*change.solvers, *own) if name not in named]
     changes = {
-        "tolerances": list(change.tolerances),
+        "tolerances": change.tolerances if change.tolerances == "auto" else list(change.tolerances),
         "repeats": change.repeats,
         "threads": list(change.threads),
         "time_limit_s": change.time_limit_s,
@@ -71,9 +81,30 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             entry["forms"] = list(change.forms)
         for key in changes:  # of the suite: they override the entry's
             entry.pop(key, None)
+    _set_options(data["solver"], change.options, faults)
     if faults:
         raise InputError(faults)
     return suite_from(data, Path("command line"))
+
+
+def _set_options(entries: list[dict[str, Any]], options: Sequence[str], faults: list[Fault]) -> None:
+    """Give each solver's entries its options."""
+    names = {entry["name"] for entry in entries}
+    for option in options:
+        place, equals, value = option.partition("=")
+        name, _, key = place.strip().partition(".")
+        try:
+            parsed = tomllib.loads(f"value = {value}")["value"] if equals and key else None
+        except tomllib.TOMLDecodeError:
+            parsed = value.strip() if WORD.fullmatch(value.strip()) else None
+        if parsed is None:
+            faults.append(Fault("--option", "option", option, "SOLVER.KEY=VALUE, as osqp.scaling=0"))
+        elif name not in names:
+            faults.append(Fault("--option", "solver", name, unknown("solver", name, sorted(names))))
+        else:
+            for entry in entries:
+                if entry["name"] == name:
+                    entry["options"] = entry.get("options", {}) | {key: parsed}
 
 
 def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
@@ -81,3 +112,18 @@ def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
         size = read_scene(scene).expected_size
         if size is not None:
             yield scene, size[0]
+
+
+def tolerances_of(words: Sequence[str]) -> tuple[float, ...] | Literal["auto"]:
+    """The values of --tolerance: numbers, or "auto" alone. Raises InputError."""
+    if list(words) == ["auto"]:
+        return "auto"
+    found, faults = [], []
+    for word in words:
+        try:
+            found.append(float(word))
+        except ValueError:
+            faults.append(Fault("--tolerance", "tolerance", word, "a number, or auto alone"))
+    if faults:
+        raise InputError(faults)
+    return tuple(found)

@@ -18,12 +18,17 @@ from solvers.base import FORMS, Form
 
 from .suite import RandomCases, SolverEntry, Suite
 
+#: Of tolerances = "auto", the loosest first, and of repeats = "auto".
+DECADES = [float(f"1e-{k}") for k in range(3, 17)]
+MOST_REPEATS = 5
+
 
 @dataclass(frozen=True)
 class Measurement:
     """One solver on one scene in one form: what one process will do.
 
     scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
+    searched, paced : it may turn out to need no measuring (search.py).
     """
 
     suite: str
@@ -46,6 +51,8 @@ class Measurement:
     case: int | None = None
     batched: int | None = None
     reference_limit_s: float | None = None
+    searched: bool = False
+    paced: bool = False
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -96,7 +103,9 @@ def expand(suite: Suite) -> list[Measurement]:
         raise InputError(faults)
     plan: dict[str, Measurement] = {}
     for source, name in names.items():
-        entries = [(e, e.repeats or suite.repeats) for e in suite.solver if _applies(e, name, source)]
+        entries = [
+            (e, _rounds(e.repeats or suite.repeats)) for e in suite.solver if _applies(e, name, source)
+        ]
         rounds = max((repeats for _, repeats in entries), default=0)
         for repeat in range(rounds):
             due = [entry for entry, repeats in entries if repeat < repeats]
@@ -126,7 +135,8 @@ def _shuffled(one_round: list[Measurement], seed: str) -> list[Measurement]:
 def _of_entry(
     suite: Suite, entry: SolverEntry, scene: str, source: str, repeat: int
 ) -> Iterator[Measurement]:
-    tolerances = entry.tolerances or suite.tolerances
+    asked = entry.tolerances or suite.tolerances
+    tolerances = DECADES if asked == "auto" else asked
     n, _ = read_scene(source).expected_size or (0, 0)
     threads_asked = entry.threads or suite.threads
     series = suite.series
@@ -155,7 +165,13 @@ def _of_entry(
             case=case,
             batched=entry.batched,
             reference_limit_s=suite.reference_limit_s,
+            searched=asked == "auto",
+            paced=(entry.repeats or suite.repeats) == "auto",
         )
+
+
+def _rounds(repeats: int | str) -> int:
+    return MOST_REPEATS if isinstance(repeats, str) else repeats
 
 
 def _applies(entry: SolverEntry, name: str, source: str) -> bool:

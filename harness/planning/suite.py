@@ -14,7 +14,7 @@ import json
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, PositiveInt, ValidationError
 
@@ -31,7 +31,8 @@ SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
 OLDER = {"together": "batched"}  # keys that older versions wrote
 FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # what a file may be called
-Repeats = Annotated[int, Field(ge=1, le=1000)]
+Repeats = Annotated[int, Field(ge=1, le=1000)] | Literal["auto"]
+Tolerances = Annotated[list[Positive], NonEmpty] | Literal["auto"]
 Cases = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
@@ -39,7 +40,9 @@ class SolverEntry(BaseModel):
     """One [[solver]]: its name and options, and what it is measured on.
 
     The default of `forms` is the dual, or the primal if the solver takes no other. `threads` and `cases`
-    override the suite's. batched : load cases of a series solved at once, by the solver's `batched`.
+    override the suite's. "auto" as tolerances searches for the loosest decade that reaches the limit on each
+    scene, as repeats it repeats what is quick (see search.py). batched : load cases of a series solved at
+    once, by the solver's `batched`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -48,7 +51,7 @@ class SolverEntry(BaseModel):
     forms: Annotated[list[Form], NonEmpty] | None = None
     variant: Annotated[str, Field(max_length=60, pattern=FILE_NAME)] = ""
     options: dict[str, JsonValue] = {}
-    tolerances: Annotated[list[Positive], NonEmpty] | None = None
+    tolerances: Tolerances | None = None
     scenes: Annotated[list[str], NonEmpty] | None = None
     repeats: Repeats | None = None
     threads: Annotated[list[PositiveInt], NonEmpty] | None = None
@@ -87,7 +90,7 @@ class Suite(BaseModel):
     title: str = ""
     description: str = ""
     scenes: Annotated[list[str], NonEmpty]
-    tolerances: Annotated[list[Positive], NonEmpty] = [1e-9]
+    tolerances: Tolerances = [1e-9]
     repeats: Repeats = 1
     threads: Annotated[list[PositiveInt], NonEmpty] = [2]
     time_limit_s: Positive = 60.0
@@ -144,6 +147,7 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
         faults += validation_faults(path, Suite, error)
     else:
         faults += [*_indistinguishable(suite, path), *_without_series(suite, path)]
+        faults += _searched_in_series(suite, path)
     if faults:
         raise InputError(faults)
     return suite
@@ -205,6 +209,17 @@ def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
             what = "options" if above[entry.name, entry.variant][0] != entry.options else "`batched`"
             allowed = f"{entry.name} has other {what} under this variant above; choose another variant"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
+
+
+def _searched_in_series(suite: Suite, path: Path) -> Iterator[Fault]:
+    places: list[tuple[str, Suite | SolverEntry]] = [("", suite)]
+    places += [(f"solver.{k}.", entry) for k, entry in enumerate(suite.solver)]
+    for where, entry in places:
+        for key in ("tolerances", "repeats"):
+            if suite.series is not None and getattr(entry, key) == "auto":
+                yield Fault(
+                    str(path), where + key, "auto", "numbers: a suite with [series] searches for none"
+                )
 
 
 def _without_series(suite: Suite, path: Path) -> Iterator[Fault]:

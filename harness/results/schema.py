@@ -46,13 +46,13 @@ def _fields(kind: Kind, names: str) -> dict[str, Kind]:
     return dict.fromkeys(names.split(), kind)
 
 
-#: What was requested.
+#: What was requested. searched : the tolerance is one of those tried for the loosest that suffices.
 ASKED: dict[str, Kind] = {
     **_fields("text", "key suite scene source solver form variant"),
     **_fields("number", "tolerance threads_asked repeat case time_limit_s memory_limit_mib"),
     **_fields("number", "limit_mm limit_asked_mm"),
     **_fields("object", "options series"),
-    **_fields("flag", "gated in_house"),
+    **_fields("flag", "gated in_house searched"),
 }
 #: The problem.
 PROBLEM: dict[str, Kind] = {**_fields("number", "n m active"), **_fields("text", "scene_key")}

@@ -111,6 +111,11 @@ class Display:
         self.console.print(row_text(row), soft_wrap=True)
         self.progress.update(self.task, advance=1, left=self._time_left())
 
+    def passed_over(self, batch: list[Measurement]) -> None:
+        """Note that these need not be made."""
+        self.left = [m for m in self.left if m not in batch]
+        self.progress.update(self.task, advance=len(batch), left=self._time_left())
+
     def _time_left(self) -> str:
         """Estimated from the last time of the same step, scaled by size; else from the other steps."""
         if not self.timed or not self.left:

@@ -49,14 +49,16 @@ def _scenes_to_measure(results: Results) -> list[str]:
 
 
 def planned_measurements(suite: dict[str, Any]) -> int:
-    """How many rows the expanded suite file plans; what two entries plan counts once."""
+    """How many rows the expanded suite file plans at least; what two entries plan counts once."""
     planned = set()
     for solver in suite.get("solver", []):
         patterns = solver.get("scenes", ["*"])
         scenes = [s for s in suite.get("scenes", []) if any(fnmatchcase(s, glob) for glob in patterns)]
         tolerances = solver.get("tolerances", suite.get("tolerances", [None]))
+        tolerances = [tolerances] if tolerances == "auto" else tolerances
         what = [(solver.get("name"), solver.get("variant", ""))]
-        repeats = range(solver.get("repeats", suite.get("repeats", 1)))
+        rounds = solver.get("repeats", suite.get("repeats", 1))
+        repeats = range(1 if rounds == "auto" else rounds)
         threads = solver.get("threads", suite.get("threads", [None]))
         cases = range(solver.get("cases", suite.get("series", {}).get("cases", 1)))
         forms = solver.get("forms", [None])

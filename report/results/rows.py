@@ -45,7 +45,18 @@ def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str
     for name in ("time_limit_s", "memory_limit_mib"):
         asked = rows["solver"].map(lambda s, key=name: options.get(s, {}).get(key, suite.get(key)))
         rows[name] = rows[name].fillna(pd.to_numeric(asked, errors="coerce"))
-    return rows.drop_duplicates([*CELL, "repeat", "case"], keep="last").reset_index(drop=True)
+    rows = rows.drop_duplicates([*CELL, "repeat", "case"], keep="last")
+    return rows[_chosen(rows)].reset_index(drop=True)
+
+
+def _chosen(rows: pd.DataFrame) -> pd.Series[bool]:
+    """Of a search for a tolerance, the loosest whose answer is within the limit, else the last tried."""
+    line = [name for name in CELL if name != "tolerance"]
+    searched, first = rows["searched"] == 1.0, rows["repeat"] == 0
+    within = rows["tolerance"].where(first & (rows["verdict"] == "within"))
+    best = rows.assign(tolerance=within).groupby(line, dropna=False)["tolerance"].transform("max")
+    last = rows.groupby(line, dropna=False)["tolerance"].transform("min")
+    return ~searched | (rows["tolerance"] == best.fillna(last))
 
 
 def of_records(records: list[dict[str, Any]]) -> pd.DataFrame:

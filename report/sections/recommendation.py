@@ -54,4 +54,5 @@ def recommended(cells: pd.DataFrame, accuracy: float) -> dict[str, Any]:
 
 
 def _tie(line: dict[Any, Any]) -> str:
-    return f"{line['method']} at {tidy_power(line['tolerance'])} ({significant(line['seconds'])} s)"
+    at = "" if pd.isna(line["tolerance"]) else f" at {tidy_power(line['tolerance'])}"
+    return f"{line['method']}{at} ({significant(line['seconds'])} s)"

@@ -21,6 +21,7 @@ import numpy as np
 from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
 from solvers.balanced import balanced
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.settings import apply, chosen
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",
@@ -31,14 +32,15 @@ STATUS: dict[str, Status] = {
 
 class Clarabel(Solver):
     """direct_solve_method : "faer" factors the dense blocks by supernodes, "qdldl" entry by entry;
-    "auto" would choose qdldl for them.
+    "auto" would choose qdldl for them. settings : Clarabel's own, as equilibrate_enable = true.
     """
 
     forms = FORMS
 
-    def __init__(self, *, direct_solve_method: str = "faer") -> None:
+    def __init__(self, *, direct_solve_method: str = "faer", **settings: object) -> None:
         choice("clarabel", "direct_solve_method", direct_solve_method, ("faer", "qdldl", "auto"))
         self.direct_solve_method = direct_solve_method
+        self.settings = chosen("clarabel", settings, clarabel.DefaultSettings())
 
     def convert(self, problem: Problem) -> Converted:
         problem, units = balanced(problem)
@@ -62,6 +64,7 @@ class Clarabel(Solver):
         settings.equilibrate_enable = state.units is None and not state.problem.bounded
         if state.problem.bounded:
             settings.static_regularization_constant = 1e-12
+        apply(settings, self.settings)
         return settings
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:

@@ -15,6 +15,7 @@ import osqp
 from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
 from solvers.balanced import balanced
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.settings import chosen
 
 STATUS: dict[int, Status] = {
     int(osqp.SolverStatus.OSQP_SOLVED): "solved",
@@ -28,12 +29,14 @@ POLISH = {0: "not tried", 1: "accepted", 2: "nothing active", -1: "rejected", -2
 class Osqp(Solver):
     """polishing : solve again on the estimated active set. OSQP may accept a result outside the tolerance and
     still report solved (its issue 790); if its own residuals exceed the tolerance, the status is inaccurate.
+    settings : OSQP's own, as scaling = 0.
     """
 
     forms = FORMS
 
-    def __init__(self, *, polishing: bool = False) -> None:
+    def __init__(self, *, polishing: bool = False, **settings: object) -> None:
         choice("osqp", "polishing", polishing, (False, True))
+        self.settings = chosen("osqp", settings, osqp.OSQP().ext.OSQPSettings())
         self.polishing = polishing
 
     def convert(self, problem: Problem) -> Converted:
@@ -44,21 +47,18 @@ class Osqp(Solver):
         q, h = state.vectors(load)
         free = np.full(state.G.shape[0], np.inf)
         bounds = (np.zeros_like(free), free) if h is None else (-free, h)
+        settings = {
+            "eps_abs": tolerance,
+            "eps_rel": 0.0,
+            "check_dualgap": True,
+            "max_iter": 1_000_000,
+            "adaptive_rho": RHO_BY_ITERATIONS,
+            "adaptive_rho_interval": 50,
+            "polishing": self.polishing,
+            "verbose": False,
+        }
         library = osqp.OSQP()
-        library.setup(
-            state.P,
-            q,
-            state.G,
-            *bounds,
-            eps_abs=tolerance,
-            eps_rel=0.0,
-            check_dualgap=True,
-            max_iter=1_000_000,
-            adaptive_rho=RHO_BY_ITERATIONS,
-            adaptive_rho_interval=50,
-            polishing=self.polishing,
-            verbose=False,
-        )
+        library.setup(state.P, q, state.G, *bounds, **settings | self.settings)
         return state, library
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:

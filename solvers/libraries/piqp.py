@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from solvers.adapter import Converted, choice, dense, is_sparse, upper_triangle
 from solvers.balanced import balanced
 from solvers.base import DENSE_FORMS, FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.settings import apply, chosen
 
 STATUS: dict[Any, Status] = {
     piqp.PIQP_SOLVED: "solved",
@@ -26,12 +27,13 @@ STATUS: dict[Any, Status] = {
 class Piqp(Solver):
     """backend : "dense" or "sparse" Cholesky; None: as the blocks of P are. Where they are dense, dense is
     several times faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal
-    form.
+    form. settings : PIQP's own, as rho_init = 1e-8.
     """
 
-    def __init__(self, *, backend: str | None = None) -> None:
+    def __init__(self, *, backend: str | None = None, **settings: object) -> None:
         choice("piqp", "backend", backend, ("dense", "sparse", None))
         self.backend = backend
+        self.settings = chosen("piqp", settings, piqp.DenseSolver().settings)
         self.forms = DENSE_FORMS if backend == "dense" else FORMS  # type: ignore[misc]  # of this solver alone
 
     def convert(self, problem: Problem) -> Converted:
@@ -53,6 +55,7 @@ class Piqp(Solver):
         settings.compute_timings = True
         if state.units is not None:
             settings.kkt_solver = piqp.sparse_ldlt_ineq_cond
+        apply(settings, self.settings)
         q, h = state.vectors(load)
         limits = {"x_l": np.zeros_like(q)} if h is None else {"G": state.G, "h_u": h}
         library.setup(state.P, q, **limits)

@@ -15,6 +15,7 @@ from proxsuite import proxqp
 from solvers.adapter import Converted, choice, dense, is_sparse, upper_triangle
 from solvers.balanced import balanced
 from solvers.base import DENSE_FORMS, FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.settings import apply, chosen
 
 BACKENDS = {
     "automatic": proxqp.dense.DenseBackend.Automatic,
@@ -31,14 +32,15 @@ INFINITY = 1e20  # ProxQP's value for no bound
 
 class ProxQp(Solver):
     """backend : which matrix the dense backend factors; "automatic" decides by the sizes. Only "automatic"
-    takes the sparse form.
+    takes the sparse form. settings : ProxQP's own, as default_rho = 1e-7.
     """
 
     distribution = "proxsuite"
 
-    def __init__(self, *, backend: str = "automatic") -> None:
+    def __init__(self, *, backend: str = "automatic", **settings: object) -> None:
         choice("proxqp", "backend", backend, tuple(BACKENDS))
         self.backend = backend
+        self.settings = chosen("proxqp", settings, proxqp.dense.QP(1, 0, 0).settings)
         self.forms = FORMS if backend == "automatic" else DENSE_FORMS  # type: ignore[misc]  # of this solver alone
 
     def convert(self, problem: Problem) -> Converted:
@@ -64,6 +66,7 @@ class ProxQp(Solver):
         settings.max_iter = 100_000
         settings.max_iter_in = 100_000
         settings.compute_timings = True
+        apply(settings, self.settings)
         if h is None:
             library.init(H=state.P, g=q, l_box=np.zeros_like(q), u_box=np.full_like(q, INFINITY))
         else:

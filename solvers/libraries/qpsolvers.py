@@ -17,38 +17,60 @@ import qpsolvers
 import scipy.sparse as sp
 from qpsolvers.exceptions import QPError
 
-from problems.errors import InputError
-from solvers.adapter import Converted, dense, sorted_csc
+from problems.errors import Fault, InputError
+from solvers.adapter import Converted, dense, is_sparse, sorted_csc
 from solvers.balanced import balanced
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
 
-#: Options that set the absolute tolerance. Relative tolerances are 0, iteration limits too large to matter.
-#: DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes no tolerance below 1e-10; by default it
-#: adds 1e-7 to the diagonal of P, which with eigenvalues of Q near 1e-5 changed x by 1e-4 mm.
-TOLERANCE: dict[str, Callable[[float], dict[str, Any]]] = {
-    "daqp": lambda tol: {"primal_tol": tol, "dual_tol": min(tol, 1e-12), "iter_limit": 1_000_000},
-    "highs": lambda tol: {
+#: Options that set the absolute tolerance, and that of the duality gap. Relative tolerances are 0, iteration
+#: limits too large to matter. DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes none
+#: below 1e-10; by default it adds 1e-7 to the diagonal of P, which with eigenvalues of Q near 1e-5 changed x
+#: by 1e-4 mm. ECOS wants a relative tolerance above zero.
+TOLERANCE: dict[str, Callable[[float, float], dict[str, Any]]] = {
+    "cvxopt": lambda tol, gap: {"feastol": tol, "abstol": gap, "reltol": 0.0, "maxiters": 1_000},
+    "daqp": lambda tol, gap: {"primal_tol": tol, "dual_tol": min(tol, 1e-12), "iter_limit": 1_000_000},
+    "ecos": lambda tol, gap: {
+        "feastol": tol,
+        "abstol": gap,
+        "reltol": float(np.finfo(float).tiny),
+        "max_iters": 1_000,
+    },
+    "highs": lambda tol, gap: {
         "primal_feasibility_tolerance": max(tol, 1e-10),
         "dual_feasibility_tolerance": max(tol, 1e-10),
         "qp_regularization_value": 0.0,
     },
-    "qpalm": lambda tol: {"eps_abs": tol, "eps_rel": 0.0, "eps_rel_in": 0.0, "max_iter": 1_000_000},
-    "scs": lambda tol: {"eps_abs": tol, "eps_rel": 0.0, "max_iters": 10_000_000},
+    "kvxopt": lambda tol, gap: {"feastol": tol, "abstol": gap, "reltol": 0.0, "maxiters": 1_000},
+    "pyqpmad": lambda tol, gap: {"tolerance": tol, "max_iter": 1_000_000},
+    "qpalm": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "eps_rel_in": 0.0, "max_iter": 1_000_000},
+    "qtqp": lambda tol, gap: {"tol_feas": tol, "tol_gap_abs": gap, "tol_gap_rel": 0.0, "max_iter": 1_000},
+    "scs": lambda tol, gap: {"eps_abs": tol, "eps_rel": 0.0, "max_iters": 10_000_000},
 }
 
+
+NO_OPTIONS = "this solver takes no options"
+#: Those that overwrite P with its factor.
+OVERWRITE = ("pyqpmad",)
 
 #: Distributions that have another name than the solver.
 DISTRIBUTIONS = {"highs": "highspy"}
 
 
 class QpSolvers(Solver):
-    """name : the solver's name in qpsolvers.available_solvers."""
+    """name : the solver's name in qpsolvers.available_solvers. settings : its own, passed on; those that have
+    no tolerance take none.
+    """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, **settings: object) -> None:
         if name not in qpsolvers.available_solvers:
             found = ", ".join(qpsolvers.available_solvers)
             raise InputError.one("qpsolvers", "solver", name, f"one of those it finds: {found}")
-        self.name = name
+        if name not in TOLERANCE and settings:
+            faults = [
+                Fault(f"solver {name}", f"options.{key}", settings[key], NO_OPTIONS) for key in settings
+            ]
+            raise InputError(faults)
+        self.name, self.settings = name, settings
         if name in qpsolvers.sparse_solvers:
             self.forms = FORMS  # type: ignore[misc]  # of this solver alone
 
@@ -56,7 +78,7 @@ class QpSolvers(Solver):
         problem, units = balanced(problem)
         G = problem.G
         # Copies, because some of these solvers refuse read-only arrays.
-        if self.name in qpsolvers.dense_solvers:
+        if self.name in qpsolvers.dense_solvers and not is_sparse(problem.blocks):
             P = np.array(dense(problem.blocks), order="C")
             return Converted(problem, P, None if G is None else G.toarray(order="C"))
         P = sp.block_diag([sp.csc_matrix(block) for block in problem.blocks], format="csc")
@@ -65,15 +87,16 @@ class QpSolvers(Solver):
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         q, h = state.vectors(load)
         limits = {"lb": np.zeros_like(q)} if h is None else {"G": state.G, "h": np.array(h)}
-        return state, qpsolvers.Problem(state.P, q, **limits)
+        P = state.P.copy() if self.name in OVERWRITE else state.P
+        return state, qpsolvers.Problem(P, q, **limits)
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
         state, problem = ready
         options = TOLERANCE.get(self.name)
         details: dict[str, Any] = {} if options else {"tolerance": "not taken"}
-        settings = options(tolerance) if options else {}
+        settings = options(tolerance, state.gap_tolerance(tolerance, load)) if options else {}
         try:
-            solution = qpsolvers.solve_problem(problem, self.name, **settings)
+            solution = qpsolvers.solve_problem(problem, self.name, **settings | self.settings)
         except QPError as error:
             return state.failed(load, details={**details, "message": str(error)})
         if solution.x is None or (not state.problem.bounded and (solution.z is None or not solution.z.size)):

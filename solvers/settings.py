@@ -1,0 +1,48 @@
+"""Settings of a library that a user may choose beside the adapter's options, as OSQP's scaling."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from problems.errors import Fault, InputError
+from problems.input.validation import unknown
+
+#: Beginnings of what the adapters decide: accuracy, limits, output.
+STOPPING = ("eps", "tol", "reduced_tol", "max_iter", "check_du", "time", "compute_timings")
+DECIDED = (*STOPPING, "verbose", "max_threads", "num_threads", "warm_start", "initial_guess")
+
+
+def chosen(solver: str, given: Mapping[str, object], settings: object) -> dict[str, Any]:
+    """The settings given. settings : the library's own, at their defaults, on which they are tried.
+
+    Raises InputError, all faults at once.
+    """
+    known = {
+        name: value
+        for name in dir(settings)
+        if not name.startswith(("_", *DECIDED))
+        and isinstance(value := getattr(settings, name), bool | int | float | str)
+    }
+    faults = [fault for name, value in given.items() for fault in _faults(solver, name, value, known)]
+    if faults:
+        raise InputError(faults)
+    apply(settings, given)
+    return dict(given)
+
+
+def apply(settings: Any, given: Mapping[str, object]) -> None:
+    """Set them on the library's settings."""
+    for name, value in given.items():
+        setattr(settings, name, value)
+
+
+def _faults(solver: str, name: str, value: object, known: Mapping[str, object]) -> list[Fault]:
+    where, key = f"solver {solver}", f"options.{name}"
+    if name not in known:
+        return [Fault(where, key, value, unknown("option", name, sorted(known)))]
+    kind = type(known[name])
+    # bool is an int, and an int a float where one is meant.
+    if type(value) is kind or (kind is float and type(value) is int):
+        return []
+    return [Fault(where, key, value, f"must be of the type of its default {known[name]!r}")]
