@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from small import make_load, make_prepared
+from solving import TESTED
 
 from harness.measurement.solver_session import SolverSession
 from harness.verification.reference import reference
@@ -18,10 +19,10 @@ from problems.forms.sparse_prepared import SparsePrepared
 from problems.scene import read_scene
 from solvers.balanced import Units, balanced
 from solvers.base import Answer, Form, WarmStart
-from solvers.registry import in_house, make_solver, solver_names
+from solvers.registry import in_house, make_solver
 
 #: The libraries that take the sparse form.
-TAKEN = [name for name in solver_names() if not in_house(name) and "sparse" in make_solver(name, {}).forms]
+TAKEN = [name for name in TESTED if not in_house(name) and "sparse" in make_solver(name, {}).forms]
 
 
 @cache

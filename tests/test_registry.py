@@ -44,6 +44,9 @@ def test_versions_are_those_installed(name: str) -> None:
         ("clarabel", {"direct_solve_method": "mumps"}, ["'mumps'", "'faer', 'qdldl', 'auto'"]),
         ("proxqp", {"backend": "sparse"}, ["options.backend", "'automatic'"]),
         ("piqp", {"backend": "gpu"}, ["options.backend", "'dense', 'sparse'"]),
+        ("osqp", {"scaling": "ten"}, ["options.scaling", "of the type of its default 10"]),
+        ("osqp", {"eps_abs": 1e-3}, ["options.eps_abs", "no such option"]),
+        ("clarabel", {"equilibrate_enable": 1}, ["options.equilibrate_enable", "default True"]),
         ("quadprog", {"tol": 1}, ["options.tol", "no options"]),
     ],
 )

@@ -26,6 +26,13 @@ RHO_BY_ITERATIONS = 1  # OSQP_ADAPTIVE_RHO_UPDATE_ITERATIONS
 POLISH = {0: "not tried", 1: "accepted", 2: "nothing active", -1: "rejected", -2: "failed"}
 
 
+def _defaults() -> Any:
+    interface = osqp.OSQP().ext
+    settings = interface.OSQPSettings()
+    interface.osqp_set_default_settings(settings)
+    return settings
+
+
 class Osqp(Solver):
     """polishing : solve again on the estimated active set. OSQP may accept a result outside the tolerance and
     still report solved (its issue 790); if its own residuals exceed the tolerance, the status is inaccurate.
@@ -36,7 +43,7 @@ class Osqp(Solver):
 
     def __init__(self, *, polishing: bool = False, **settings: object) -> None:
         choice("osqp", "polishing", polishing, (False, True))
-        self.settings = chosen("osqp", settings, osqp.OSQP().ext.OSQPSettings())
+        self.settings = chosen("osqp", settings, _defaults())
         self.polishing = polishing
 
     def convert(self, problem: Problem) -> Converted:
