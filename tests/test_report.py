@@ -97,9 +97,19 @@ def test_lines_that_are_nearly_as_fast_are_named_as_such(tmp_path: Path) -> None
     rows = [row(LOW, solver, **times(solve_s=t)) for solver, t in (("a", 1.0), ("b", 1.1), ("c", 2.0))]
     text = write(write_rows(tmp_path, rows)).read_text("utf-8")
     assert "use **a (dual)**" in text
-    assert (
-        "As fast, to within 15%: b (dual) (1.10 s). Next is c (dual), which takes 2.0 times as long." in text
-    )
+    assert "As fast, to within 15% or what its repeats differ by: b (dual) (1.10 s). Next is c (dual)" in text
+    assert "which takes 2.0 times as long." in text
+
+
+def test_what_is_closer_than_its_own_repeats_counts_as_equal(tmp_path: Path) -> None:
+    seconds = {"a": (1.0, 1.0, 1.0), "b": (1.0, 1.3, 1.6), "c": (1.29, 1.3, 1.31)}
+    rows = [
+        row(LOW, solver, repeat=k, **times(solve_s=t))
+        for solver in seconds
+        for k, t in enumerate(seconds[solver])
+    ]
+    text = write(write_rows(tmp_path, rows)).read_text("utf-8")
+    assert "what its repeats differ by: b (dual) (1.30 s). Next is c (dual)" in text
 
 
 def test_no_solver_is_recommended_where_none_is_within_on_every_scene(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from harness.results import schema
 from problems.forms import names
 from report.analysis.roads import fastest, roads
 from report.results.reader import Results, read
-from report.sections import problems
+from report.sections import problems, speed
 from report.sections import roads as section_of
 from report.writers.markdown import write
 
@@ -55,6 +55,16 @@ def totals(line: pd.Series[Any]) -> list[float]:
 def test_the_reports_forms_are_those_of_the_problems() -> None:
     assert set(schema.FORMS) == set(names.FORMS)
     assert set(schema.DENSE_FORMS) == set(names.DENSE_FORMS)
+
+
+def test_speed_from_the_scene_on_is_relative_to_the_fastest_library_in_any_form(tmp_path: Path) -> None:
+    """newton 0.9 s on the sparse form and 11.9 s on the dual; Clarabel 1.8 s on the sparse form."""
+    rows = [sparse(), dense(cholesky_s=0.5, product_s=0.01), sparse(solver="clarabel", solve_s=1.1)]
+    section = speed.section(results(tmp_path, rows))
+    assert section is not None
+    ratios = section.blocks[0].data.set_index("method")["scene_to_library"]
+    expected = {"newton (sparse)": 0.5, "newton (dual)": 11.9 / 1.8, "clarabel (sparse)": 1.0}
+    assert ratios.to_dict() == pytest.approx(expected)
 
 
 def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from report.document.numbers import counted, listed, significant
 from report.results.labels import in_order
 from report.results.reader import Results
 
-from .standings import TIE, geometric_mean, preferred, seconds_within
+from .standings import TIE, geometric_mean, preferred, seconds_within, tie_of
 
 
 def advice(results: Results, n: int) -> str | None:
@@ -43,11 +43,11 @@ def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list
         f"use **{best}**: within {results.limit} on {every}, "
         f"{significant(time)} s per load case{mean}{prepared}."
     ]
-    ties = [str(label) for label in means.index[1:] if means[label] <= TIE * time]
+    ties = [str(each) for each in means.index[1:] if means[each] <= tie_of(cells, best, str(each)) * time]
     if ties:
         pairs = [f"{label} ({significant(means[label])} s)" for label in ties]
-        words.append(f"As fast, to within {TIE - 1:.0%}: {listed(pairs)}.")
-    behind = [str(label) for label in means.index if means[label] > TIE * time]
+        words.append(f"As fast, to within {TIE - 1:.0%} or what its repeats differ by: {listed(pairs)}.")
+    behind = [str(label) for label in means.index if str(label) not in (best, *ties)]
     if behind:
         words.append(
             f"Next is {behind[0]}, which takes {significant(means[behind[0]] / time, 2)} times as long."

@@ -16,8 +16,8 @@ import pandas as pd
 from report.results.labels import in_order
 from report.results.reader import Results
 
-#: Lines that take at most this many times as long as the fastest count as equally fast: single runs on
-#: a shared machine vary by as much.
+#: Lines that take at most this many times as long as the fastest count as equally fast, more if the repeats
+#: of one of them differ by more: single runs on a shared machine vary by as much.
 TIE = 1.15
 
 
@@ -55,6 +55,13 @@ def preferred(seconds: pd.Series[float], cells: pd.DataFrame) -> pd.DataFrame:
     as_fast = known["seconds"] <= TIE * known.groupby("method")["seconds"].transform("min")
     tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("method")
     return tightest.sort_values("seconds")
+
+
+def tie_of(cells: pd.DataFrame, *labels: str) -> float:
+    """TIE, or the ratio of slowest to fastest repeat of one of these lines, its mean over the scenes."""
+    ratios = cells[cells["label"].isin(labels)].assign(ratio=lambda line: line["most_s"] / line["least_s"])
+    ratios = ratios[ratios["least_s"] > 0]
+    return max([TIE, *ratios.groupby("label")["ratio"].agg(geometric_mean)])
 
 
 def compare(results: Results, n: int) -> Comparison:

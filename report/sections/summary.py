@@ -82,4 +82,5 @@ def _small_print(results: Results) -> str:
     runs = "Each time is one run" if repeats == 1 else f"Times are medians of up to {repeats} runs"
     unsupported = sorted(results.cells.loc[results.cells["status"] == "unsupported", "label"].unique())
     omitted = f" Form not taken by the solver: {listed(unsupported)}." if unsupported else ""
-    return f"{runs}; lines less than {TIE - 1:.0%} apart count as equally fast.{omitted}"
+    apart = f"less than {TIE - 1:.0%} apart, or than their own repeats differ by,"
+    return f"{runs}; lines {apart} count as equally fast.{omitted}"
