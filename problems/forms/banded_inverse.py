@@ -86,15 +86,18 @@ def of_windows(windows: Windows, Q_WW: Callable[[Contacts], Matrix]) -> BandedIn
     """
     m, across = len(windows.order), windows.across
     band = np.zeros((min((WINDOW_LINES + 1) * across, m) + 1, m), order="F")
-    entries = band.ravel(order="K")
+    down, right = band.strides
     for first, start, stop in windows.ranges():
-        L, info = lapack.dpotrf(Q_WW(windows.order[first:stop]), lower=1, overwrite_a=1)
+        L, info = lapack.dpotrf(Q_WW(windows.order[first:stop]), lower=1, clean=0, overwrite_a=1)
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} of Q_WW is not positive definite")
-        rows = lapack.dtrtri(L, lower=1)[0][start - first :]
-        added = rows.T @ rows
-        column, row = np.triu_indices(stop - first)  # of the lower triangle, column by column
-        entries[row - column + (first + column) * len(band)] += added[row, column]
+        own = np.eye(stop - first, stop - start, first - start, order="F")
+        rows = lapack.dtrtrs(L, own, lower=1, trans=1, overwrite_b=1)[0]
+        # Entry (i, j) of the window is band[i − j, first + j]: a view with a slanted stride, right for i ≥ j.
+        window = np.lib.stride_tricks.as_strided(
+            band[:, first:], shape=(stop - first, stop - first), strides=(down, right - down)
+        )
+        window += blas.dsyrk(1.0, rows, lower=1)  # zero above the diagonal
     return BandedInverse(windows.order, band)
 
 
@@ -127,8 +130,11 @@ def order_along_joint(nodes: Matrix | None, m: int) -> tuple[NDArray[np.intp], i
     extent = np.ptp(nodes, axis=0)
     longer, shorter = (0, 1) if extent[0] >= extent[1] else (1, 0)
     order = np.lexsort((nodes[:, shorter], nodes[:, longer]))
-    places = len(np.unique(nodes, axis=0))
-    spacing = np.sqrt(np.prod(extent) / places) if extent.all() else extent.max() / places
     x = nodes[order, longer]
-    line = np.arange(m) - np.searchsorted(x, x - spacing * (1 - 1e-9), side="right") + 1
+    places = 1 + np.diff(nodes[order], axis=0).any(axis=1).sum()
+    spacing = np.sqrt(np.prod(extent) / places) if extent.all() else extent.max() / places
+    between = extent[longer] / max(np.count_nonzero(np.diff(x) > 1e-9 * spacing), 1)
+    if spacing / 2 <= between <= spacing:  # the contacts stand in lines
+        spacing = between
+    line = np.arange(m) - np.searchsorted(x, x - spacing * (1 - 1e-9)) + 1
     return order, int(line.max())
