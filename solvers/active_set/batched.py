@@ -28,7 +28,7 @@ from solvers.base import Answer, LoadCase
 from solvers.kkt import kkt_status, rounding_of
 from solvers.linear_algebra.product import products
 
-from .block_pivoting import block_pivoting, wrong_signs
+from .block_pivoting import ROUNDING_FACTOR, block_pivoting, wrong_signs
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
@@ -36,6 +36,7 @@ MAX_SWEEPS = 20  # enough even if a sweep only halves the error
 SETS_PER_SWEEP = 3  # contact sets per sweep: M is too inaccurate for more to pay off
 SIGN_UNCERTAINTY = 1e-5  # of |y_C| before a sweep: smaller values have no reliable sign
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further sweep
+STALLED = 2  # sweeps that do not halve |y_C|: what is left may be rounding
 MIN_CLOSED = 1 / 16  # of the contacts: with fewer closed, solving case by case is faster
 
 #: (C, load with p, tolerance) → the answer of one case, from the contact set C, or from a guess of its own if
@@ -94,8 +95,10 @@ class BatchedSweeps:
 
     def cold(self, load: LoadCase, tolerance: float) -> Case:
         """The case of a load from nothing; it may be unsettled."""
-        zero = np.zeros(len(load.p))
-        return self.warm(Case(load, zero, zero > 0, TrialSolution(zero, zero, 0.0)), load, tolerance)
+        p = load.p[self.M.order]
+        start = TrialSolution(np.zeros(len(p)), -p, float(abs(p).max()))
+        (case,) = self._sweep([Case(load, p, p > 0, start)], tolerance)
+        return case
 
     def warm(self, solved: Case, load: LoadCase, tolerance: float) -> Case:
         """The same from a solved case."""
@@ -109,9 +112,12 @@ class BatchedSweeps:
 
     def enough(self, case: Case, tolerance: float, stagnating: bool) -> float:
         """The KKT residual, mm, that ends the sweeps of a case: −1 as long as |y_C| is neither far below the
-        tolerance nor within rounding.
+        tolerance nor within rounding, of which long sums leave several times as much.
         """
-        target = max(RESIDUAL_TARGET * tolerance, rounding_of(case.p, case.trial.y))
+        rounding = rounding_of(case.p, case.trial.y)
+        target = max(RESIDUAL_TARGET * tolerance, rounding)
+        if case.stalled >= STALLED:
+            target = max(target, min(tolerance, ROUNDING_FACTOR * rounding))
         return target if case.trial.rounding <= target else -1.0
 
     def pay(self, cases: Sequence[Case]) -> bool:

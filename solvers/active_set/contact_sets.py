@@ -8,6 +8,7 @@ So each factored matrix has at most half the order, and each set takes one produ
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,20 +84,23 @@ class _Open(_Principal):
 
 
 class ContactSets:
-    """inverse : Q⁻¹; if None, Q_CC is factored whatever the size of C."""
+    """inverse : returns Q⁻¹; if None, Q_CC is factored whatever the size of C."""
 
-    def __init__(self, Q: Matrix, p: Vector, inverse: Matrix | None = None) -> None:
-        self.Q, self.p = Q, p
+    def __init__(self, Q: Matrix, p: Vector, inverse: Callable[[], Matrix] | None = None) -> None:
+        self.Q, self.p, self.inverse = Q, p, inverse
         self.compliance = np.diag(Q).copy()
         self.closed = _Closed(Q, p)
-        self.open = None if inverse is None else _Open(inverse, p, self.compliance)
+        self.open: _Open | None = None
 
     @property
     def factorisations(self) -> int:
         return self.closed.factorisations + (self.open.factorisations if self.open else 0)
 
     def at(self, C: Set) -> TrialSolution:
-        self.system = self.open if self.open and 2 * int(C.sum()) > len(C) else self.closed
+        self.system: _Open | _Closed = self.closed
+        if self.inverse is not None and 2 * int(C.sum()) > len(C):
+            self.open = self.open or _Open(self.inverse(), self.p, self.compliance)
+            self.system = self.open
         return self.system.at(C)
 
     def refined(self, C: Set, trial: TrialSolution, target: float) -> TrialSolution:

@@ -27,5 +27,7 @@ def product(G: AnyQ, v: Vector) -> Vector:
 
 
 def products(G: AnyQ, V: Matrix) -> Matrix:
-    """G V for many columns V (m, k), column-major."""
-    return G @ V if isinstance(G, Compliance) else blas.dgemm(1.0, G, V)
+    """G V for columns V (m, k), column-major."""
+    if isinstance(G, Compliance):
+        return G @ V
+    return product(G, V[:, 0])[:, None] if V.shape[1] == 1 else blas.dgemm(1.0, G, V)

@@ -110,7 +110,7 @@ def _finished(
     """Block pivoting from the final set of the pivots, if rounding in Q⁻¹ made them inaccurate."""
     closed = np.ones(len(load.p), dtype=bool)
     closed[result.active] = False
-    sets = ContactSets(ready.problem.Q, load.p, ready.G)
+    sets = ContactSets(ready.problem.Q, load.p, lambda: ready.G)
     answer = solve_from(closed, sets, tolerance, FINISHING_SETS)
     details |= {"finishing_sets": answer.iterations, "kkt_residual_mm": answer.details["kkt_residual_mm"]}
     if answer.status == "solved":

@@ -101,7 +101,7 @@ class FastIpm(Solver):
             details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
             done = residual <= tolerance or stalled == STALLED
             if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
-                answer = solve_from(ratio > 1, ContactSets(Q, p, ready.inverse), tolerance, MAX_SETS)
+                answer = solve_from(ratio > 1, ContactSets(Q, p, lambda: ready.inverse), tolerance, MAX_SETS)
                 details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             if done:
