@@ -48,11 +48,15 @@ class BandedInverse:
         # Entry (i + d, i) of M_SS is entry (rows[i + d], rows[i]) of M, zero beyond the band.
         apart = np.lib.stride_tricks.sliding_window_view(far, deep)[: len(rows)] - rows[:, None]
         place = np.minimum(apart, width, out=apart) + rows[:, None] * len(self.band)
-        block = self.band.ravel(order="K").take(place).T
-        L, info = lapack.dpbtrf(block, lower=1, overwrite_ab=1) if rows.size else (block, 0)
-        if info:
-            raise np.linalg.LinAlgError(f"the leading minor {info} of M_SS is not positive definite")
-        return BandFactor(S, rows, L)
+        return BandFactor.of(S, rows, self.band.ravel(order="K").take(place).T)
+
+    def shifted_factor(self, s: Vector) -> BandFactor:
+        """The Cholesky factor of I + diag(s) M diag(s)."""
+        below = np.lib.stride_tricks.sliding_window_view(np.pad(s, (0, len(self.band) - 1)), len(self.band))
+        shifted = np.asfortranarray(self.band * below.T * s)
+        shifted[0] += 1.0
+        every = np.ones(len(s), dtype=bool)
+        return BandFactor.of(every, np.arange(len(s)), shifted)
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,14 @@ class BandFactor:
     S: NDArray[np.bool_]
     rows: NDArray[np.intp]
     L: Matrix
+
+    @classmethod
+    def of(cls, S: NDArray[np.bool_], rows: NDArray[np.intp], band: Matrix) -> BandFactor:
+        """band : of M_SS, column-major; overwritten. Raises LinAlgError if it is not positive definite."""
+        L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1) if rows.size else (band, 0)
+        if info:
+            raise np.linalg.LinAlgError(f"the leading minor {info} of M_SS is not positive definite")
+        return cls(S, rows, L)
 
     def solve(self, b: Vector) -> Vector:
         """u (m,) with M_SS u_S = b_S and zero elsewhere."""

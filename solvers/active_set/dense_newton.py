@@ -2,22 +2,22 @@
 
 A sweep is one product with Q (see `batched`). Few closed contacts have a small Q_CC, and block principal
 pivoting from the solutions on nested subsets is faster; it also solves what the sweeps do not settle, with
-Q⁻¹ made when it is first needed. Where Q does not decay along the joint, M is no approximation of Q⁻¹: this
-is noticed by a few steps e ← e − MQe, and every case is solved by pivoting.
+Q⁻¹ made when it is first needed, and every case where M is no approximation of Q⁻¹.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.banded_inverse import WINDOW_LINES, BandedInverse, Windows, banded_inverse
+from problems.forms.banded_inverse import BandedInverse, banded_inverse
 from problems.forms.problem import Problem
 from solvers.base import Answer, Batch, WarmStart
-from solvers.interior_point.identify import identified_set
+from solvers.linear_algebra.approximate_inverse import approximate_inverse
 from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
 
@@ -31,8 +31,6 @@ from .solve import solve_from
 WIDTHS = (4, 2)  # of the cells, in contacts
 COARSE_PASSES = 4  # on each subset, which only needs an approximate solution
 MAX_WARM_CHANGES = 1 / 8  # of the contacts: with more changes, a warm start is no better than the subsets
-WIDEST_WINDOW = 1 / 4  # of the contacts: a wider one costs as much as Q⁻¹
-STEPS, CONTRACTION = 3, 0.5  # of e ← e − MQe, and what the last one must achieve
 
 
 class DenseQ:
@@ -48,22 +46,29 @@ class DenseQ:
 
 @dataclass(frozen=True)
 class DenseState:
-    """A problem in the dual form, and what its load cases share. sweeps : None where M is no good."""
+    """A problem in the dual form, and what its load cases share.
+
+    identified : (Q, p) → a contact set, for cases in which pivoting makes no progress. sweeps : None where M
+    is no good.
+    """
 
     data: DenseQ
     nodes: Matrix | None
     cells: tuple[Cells, ...]
     max_sets: int
+    identified: Callable[[Matrix, Vector], Set]
     sweeps: BatchedSweeps | None = None
     start: WarmStart | None = None
 
     @classmethod
-    def of(cls, problem: Problem, nested: bool, max_sets: int) -> DenseState:
+    def of(
+        cls, problem: Problem, nested: bool, max_sets: int, identified: Callable[[Matrix, Vector], Set]
+    ) -> DenseState:
         """M, or else Q⁻¹. Raises LinAlgError if Q is not positive definite."""
         Q, nodes = problem.Q, problem.assembly.contact_nodes
         cells = tuple(cells_of(nodes, len(Q), width) for width in WIDTHS) if nested else ()
-        state = cls(DenseQ(Q), nodes, cells, max_sets)
-        M = useful_banded_inverse(Q, nodes)
+        state = cls(DenseQ(Q), nodes, cells, max_sets, identified)
+        M = approximate_inverse(Q, nodes)
         if M is None:
             _ = state.data.inverse
             return state
@@ -75,12 +80,24 @@ class DenseState:
     def solve(self, load: LoadCase, tolerance: float) -> Answer:
         C, coarse = self._first_guess(load.p, tolerance)
         if self.sweeps is None or C.mean() < MIN_CLOSED:
-            answer = self._by_sets(C, load, tolerance)
-            return replace(answer, inner_iterations=coarse)
+            return replace(self._by_sets(C, load, tolerance), inner_iterations=coarse)
         if self.start is None:
-            case = self.sweeps.cold(load, tolerance)
-        else:
-            case = self.sweeps.warm(self._solved(self.start), load, tolerance)
+            return self.sweeps.answer(self.sweeps.cold(load, tolerance), load, tolerance)
+        return self._warm(self.start, load, tolerance)
+
+    def solve_from(self, C: Set, lam: Vector, load: LoadCase, tolerance: float) -> Answer:
+        """From a contact set and the forces λ on it, (m,) N."""
+        if self.sweeps is None or C.mean() < MIN_CLOSED:
+            return self._by_sets(C, load, tolerance)
+        lam = np.where(C, lam, 0.0)
+        return self._warm(WarmStart(load, lam, product(self.data.Q, lam) - load.p), load, tolerance)
+
+    def _warm(self, start: WarmStart, load: LoadCase, tolerance: float) -> Answer:
+        assert self.sweeps is not None
+        order = self.sweeps.M.order
+        trial = TrialSolution(start.lam[order], start.gap[order], 0.0)
+        C = self.sweeps.diagonal[order] * trial.lam > trial.y
+        case = self.sweeps.warm(Case(start.load, start.load.p[order], C, trial), load, tolerance)
         return self.sweeps.answer(case, load, tolerance)
 
     def _sweeps(self, M: BandedInverse) -> BatchedSweeps:
@@ -92,23 +109,16 @@ class DenseState:
         return BatchedSweeps(self.data.Q, np.diag(self.data.Q), M, solve_one)
 
     def _by_sets(self, C: Set, load: LoadCase, tolerance: float) -> Answer:
-        """Block pivoting from C; without progress, from the set that an interior point identifies."""
+        """Block pivoting from C; without progress, from the set that `identified` gives."""
         sets = ContactSets(self.data.Q, load.p, lambda: self.data.inverse)
         answer = solve_from(C, sets, tolerance, self.max_sets)
         if answer.status == "solved" or answer.details["single_exchanges"] < MAX_SINGLE_EXCHANGES:
             return answer
-        again = solve_from(identified_set(sets.Q, sets.p), sets, tolerance, self.max_sets)
+        again = solve_from(self.identified(sets.Q, sets.p), sets, tolerance, self.max_sets)
         if again.details["kkt_residual_mm"] > answer.details["kkt_residual_mm"]:
             return answer
         tried = (answer.iterations or 0) + (again.iterations or 0)
         return replace(again, iterations=tried, details=again.details | {"interior_point": True})
-
-    def _solved(self, start: WarmStart) -> Case:
-        assert self.sweeps is not None
-        order = self.sweeps.M.order
-        trial = TrialSolution(start.lam[order], start.gap[order], 0.0)
-        C = self.sweeps.diagonal[order] * trial.lam > trial.y
-        return Case(start.load, start.load.p[order], C, trial)
 
     def _first_guess(self, p: Vector, tolerance: float) -> tuple[Set, int]:
         """The contact set of the warm start, else of the finest subset; the number of sets tried on subsets.
@@ -135,19 +145,3 @@ class DenseState:
         if tried and 2 * found.C.sum() > len(found.C):  # few open contacts: small factors of Q⁻¹
             C = p > 0
         return C, tried
-
-
-def useful_banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse | None:
-    """M if its sweeps converge fast; None if Q does not decay along the joint, or is small.
-
-    Raises LinAlgError if Q is not positive definite.
-    """
-    m = len(Q)
-    if (WINDOW_LINES + 1) * Windows.of(nodes, m).across > WIDEST_WINDOW * m:
-        return None
-    M = banded_inverse(Q, nodes)
-    e, sizes = np.random.default_rng(0).standard_normal(m), []
-    for _ in range(STEPS):
-        e[M.order] -= M.product(product(Q, e)[M.order])
-        sizes.append(float(np.linalg.norm(e)))
-    return M if sizes[-1] <= CONTRACTION * sizes[-2] else None

@@ -20,17 +20,22 @@ class CgResult:
 
 
 def conjugate_gradients(
-    multiply: Callable[[Vector], Vector], b: Vector, tolerance: float, max_iterations: int
+    multiply: Callable[[Vector], Vector],
+    b: Vector,
+    tolerance: float,
+    max_iterations: int,
+    precondition: Callable[[Vector], Vector] = lambda r: r,
 ) -> CgResult:
-    """Solve Hz = b from z = 0 until ‖r‖₂ ≤ tolerance·‖b‖₂.
+    """Solve Hz = b from z = 0 until ‖r‖ ≤ tolerance·‖b‖ with ‖r‖² = rᵀP⁻¹r, the 2-norm by default.
 
-    Stops unconverged after max_iterations, or at a direction without positive curvature, which for a
-    positive definite H means that rounding dominates.
+    precondition : r → P⁻¹r. Stops unconverged after max_iterations, or at a direction without positive
+    curvature, which for a positive definite H means that rounding dominates.
     """
     z = np.zeros_like(b)
     r = b.copy()
-    v = r.copy()
-    rho = float(r @ r)
+    s = precondition(r)
+    v = s.copy()
+    rho = float(r @ s)
     target = tolerance**2 * rho
     for k in range(max_iterations):
         if rho <= target:
@@ -42,6 +47,7 @@ def conjugate_gradients(
         alpha = rho / curvature
         z += alpha * v
         r -= alpha * Hv
-        rho, before = float(r @ r), rho
-        v = r + (rho / before) * v
+        s = precondition(r)
+        rho, before = float(r @ s), rho
+        v = s + (rho / before) * v
     return CgResult(z, max_iterations, rho <= target)

@@ -15,7 +15,9 @@ import numpy as np
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Vector
+from problems.forms.banded_inverse import banded_inverse
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, failed
+from solvers.interior_point.banded import Banded
 from solvers.interior_point.infeasible_start import mehrotra_start, stp1, stp2
 from solvers.interior_point.newton_system import SYSTEMS, NewtonSystem, OpenLast
 from solvers.interior_point.schemes import SCHEMES, CgExhausted, NewtonSteps, Point
@@ -61,7 +63,8 @@ class Ipm(Solver):
     start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra. If the first two find no
         feasible point, Mehrotra's start, which may be infeasible (details: start_instead).
     scheme : algorithm_3 as printed; algorithm_2, with a fixed σ; mehrotra, the textbook's.
-    preconditioner : V, U, none, splitting; direct is a Cholesky factorisation of every H instead.
+    preconditioner : V, U, none, splitting; band, with a banded M ≈ Q⁻¹ and no factorisation of Q; direct is
+        a Cholesky factorisation of every H instead.
     ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by increasing D.
     theta : fraction of the step to the boundary, in (0, 1).
     sigma : centring parameter of algorithm_2, in [0, 1].
@@ -91,7 +94,7 @@ class Ipm(Solver):
         choices: dict[str, Collection[str]] = {
             "start": get_args(StartName),
             "scheme": SCHEMES,
-            "preconditioner": SYSTEMS,
+            "preconditioner": (*SYSTEMS, "band"),
             "ordering": get_args(Ordering),
         }
         rules = [
@@ -117,11 +120,15 @@ class Ipm(Solver):
     def prepare(self, data: Problem) -> _Ready | Answer:
         """The factors of Q; a failed answer if Q is not positive definite."""
         units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
-        make_system = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
         try:
-            return _Ready(data, make_system(data.Q), units)
+            return _Ready(data, self._system(data), units)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
+
+    def _system(self, data: Problem) -> NewtonSystem:
+        if self.preconditioner == "band":
+            return Banded(data.Q, banded_inverse(data.Q, data.assembly.contact_nodes))
+        return (OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner])(data.Q)
 
     def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):

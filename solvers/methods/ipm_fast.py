@@ -1,8 +1,9 @@
 """A fast primal–dual interior-point method on the dual form; each ingredient can be switched off.
 
 Mehrotra's predictor–corrector (one matrix, two right-hand sides per iteration) from the start STP2; Newton
-systems factored in single precision and refined in double; and, once most closed contacts are separated
-from open ones, an exact finish on the active set it identified. The paper's method is `ipm`.
+systems by conjugate gradients with a banded M ≈ Q⁻¹, or, where Q does not decay along the joint, factored in
+single precision and refined in double; and, once most closed contacts are separated from open ones, an exact
+finish on the active set it identified. The paper's method is `ipm`.
 """
 
 from __future__ import annotations
@@ -13,16 +14,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from problems.errors import Fault, InputError
-from problems.forms.assembly import Matrix
-from solvers.active_set.contact_sets import ContactSets
-from solvers.active_set.solve import solve_from
+from solvers.active_set.dense_newton import DenseState
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, failed
+from solvers.interior_point.banded import Banded
+from solvers.interior_point.identify import identified_set
 from solvers.interior_point.infeasible_start import stp2
 from solvers.interior_point.newton_system import Direct, NewtonSystem
 from solvers.interior_point.schemes import NewtonSteps, Point, mehrotra
 from solvers.interior_point.single_precision import SinglePrecision
 from solvers.interior_point.start import NoStart, algorithm_5
-from solvers.linear_algebra.inverse import inverse_with_factor
 
 THETA = 0.995
 LEAST_GAP = 0.01  # mm, at the start
@@ -40,13 +40,13 @@ UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 class _Ready:
     problem: Problem
     system: NewtonSystem
-    inverse: Matrix | None
+    finish: DenseState
 
 
 class FastIpm(Solver):
     """Interior point with an exact finish on the active set it identified.
 
-    The finish, `active_set.solve_from` with C = {q_ii λ_i > y_i}, begins when μ = λᵀy/m has fallen to 1e-4
+    The finish, `newton` from C = {q_ii λ_i > y_i}, begins when μ = λᵀy/m has fallen to 1e-4
     of its initial value and at most m/4 contacts are undecided, or when the interior point ends; its status
     is the answer's. The interior point ends when the natural residual max|min(q_ii λ_i, (Qλ − p)_i)| is at
     most the tolerance, mm, or has not decreased for 10 iterations. Iterations are Newton matrices, inner
@@ -54,26 +54,31 @@ class FastIpm(Solver):
 
     Options
     -------
-    finish, single, start_at_gaps : false switches off the finish, single precision, or the start STP2, which
-        Algorithm 5's then replaces.
+    finish, single, start_at_gaps, band : false switches off the finish, single precision, the start STP2,
+        which Algorithm 5's then replaces, or the banded M in the Newton systems, which a factorisation of
+        each then replaces; only this uses single precision.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
 
-    def __init__(self, *, finish: bool = True, single: bool = True, start_at_gaps: bool = True) -> None:
-        given = {"finish": finish, "single": single, "start_at_gaps": start_at_gaps}
+    def __init__(
+        self, *, finish: bool = True, single: bool = True, start_at_gaps: bool = True, band: bool = True
+    ) -> None:
+        given = {"finish": finish, "single": single, "start_at_gaps": start_at_gaps, "band": band}
         wrong = {key: value for key, value in given.items() if value not in (True, False)}
         if wrong:
             raise InputError([Fault("ipm-fast", k, v, "must be true or false") for k, v in wrong.items()])
-        self.finish, self.single, self.start_at_gaps = finish, single, start_at_gaps
+        self.finish, self.single, self.start_at_gaps, self.band = finish, single, start_at_gaps, band
 
     def prepare(self, data: Problem) -> _Ready | Answer:
-        """Q in single precision, and Q⁻¹ for the finish; a failed answer if Q is not positive definite."""
-        system: NewtonSystem = SinglePrecision(data.Q) if self.single else Direct(data.Q)
+        """M, or else Q⁻¹ and Q in single precision; a failed answer if Q is not positive definite."""
         try:
-            return _Ready(data, system, inverse_with_factor(data.Q)[0] if self.finish else None)
+            finish = DenseState.of(data, False, MAX_SETS, identified_set)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
+        if self.band and finish.sweeps:
+            return _Ready(data, Banded(data.Q, finish.sweeps.M), finish)
+        return _Ready(data, SinglePrecision(data.Q) if self.single else Direct(data.Q), finish)
 
     def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
@@ -101,7 +106,7 @@ class FastIpm(Solver):
             details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
             done = residual <= tolerance or stalled == STALLED
             if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
-                answer = solve_from(ratio > 1, ContactSets(Q, p, lambda: ready.inverse), tolerance, MAX_SETS)
+                answer = ready.finish.solve_from(ratio > 1, point.lam, load, tolerance)
                 details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             if done:

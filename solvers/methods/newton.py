@@ -19,6 +19,7 @@ import numpy as np
 from problems.errors import InputError
 from solvers.active_set.dense_newton import DenseState
 from solvers.base import Answer, Batch, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.interior_point.identify import identified_set
 
 if TYPE_CHECKING:
     from solvers.active_set.sparse_newton import SparseState
@@ -56,7 +57,7 @@ class ActiveSetNewton(Solver):
 
             return SparseState.of(data, self.max_sets)
         try:
-            return DenseState.of(data, self.nested, self.max_sets)
+            return DenseState.of(data, self.nested, self.max_sets, identified_set)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 

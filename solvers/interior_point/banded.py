@@ -1,0 +1,50 @@
+"""Newton systems (Q + D) v = b by conjugate gradients with a banded M ≈ Q⁻¹; nothing of order m³.
+
+The preconditioner is P = M⁻¹ + D, and with S = √D
+
+    P⁻¹ = S⁻¹ (I + SMS)⁻¹ S M,
+
+one band factorisation per D. P ≈ H for any D: late in the iteration, D is huge at open gaps and tiny at
+closed ones, and the spectrum of P⁻¹H stays within that of MQ and 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from problems.forms.assembly import Matrix, Vector
+from problems.forms.banded_inverse import BandedInverse, BandFactor
+from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
+from solvers.linear_algebra.product import product
+
+from .newton_system import CG_LIMIT, Solved
+
+
+class Banded:
+    """Conjugate gradients until rᵀP⁻¹r ≤ tolerance² bᵀP⁻¹b with r = b − (Q + D) v."""
+
+    def __init__(self, Q: Matrix, M: BandedInverse) -> None:
+        self.Q, self.M = Q, M
+        self.begin()
+
+    def begin(self) -> None:
+        """Start a new load case."""
+        self.D = np.full(len(self.Q), np.nan)
+        self.factorisations = 0
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        if not np.array_equal(D, self.D):
+            self.D, self.S = D, np.sqrt(D[self.M.order])
+            self.factor: BandFactor = self.M.shifted_factor(self.S)
+            self.factorisations += 1
+        limit = min(limit, CG_LIMIT * len(b))
+        cg = conjugate_gradients(self._multiply, b, tolerance, limit, self._precondition)
+        return Solved(cg.z, cg.iterations, cg.converged)
+
+    def _multiply(self, v: Vector) -> Vector:
+        return product(self.Q, v) + self.D * v
+
+    def _precondition(self, r: Vector) -> Vector:
+        z = np.empty_like(r)
+        z[self.M.order] = self.factor.solve(self.S * self.M.product(r[self.M.order])) / self.S
+        return z
