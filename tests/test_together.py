@@ -79,6 +79,14 @@ def test_contacts_stand_in_lines_across_the_joint(nx: int, ny: int) -> None:
     assert sorted(both) == list(range(2 * len(nodes)))
 
 
+@pytest.mark.parametrize(("dx", "across"), [(0.6, 5), (1.0, 5), (0.15, 15)])
+def test_lines_a_little_closer_than_wide_are_lines_still(dx: float, across: int) -> None:
+    x, y = np.meshgrid(dx * np.arange(40), np.arange(5.0))
+    nodes = np.column_stack([x.ravel(), y.ravel()])
+    assert order_along_joint(nodes, 200)[1] == across
+    assert order_along_joint(np.zeros((7, 2)), 7)[1] == 7  # all in one place
+
+
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
 def test_a_band_factor_solves_with_the_principal_submatrix(share: float, tmp_path: Path) -> None:
     data = prepared(read_scene(str(write_strip(tmp_path))))
