@@ -88,7 +88,8 @@ def banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse:
 
     Raises LinAlgError if Q is not positive definite.
     """
-    return of_windows(Windows.of(nodes, len(Q)), lambda window: Q.T[np.ix_(window, window)].T)
+    rows = np.asarray(Q).T  # no memory map, whose views cost more than their copies
+    return of_windows(Windows.of(nodes, len(Q)), lambda window: rows[np.ix_(window, window)].T)
 
 
 def of_windows(windows: Windows, Q_WW: Callable[[Contacts], Matrix]) -> BandedInverse:
