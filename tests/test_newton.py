@@ -184,7 +184,7 @@ def test_sets_that_make_no_progress_give_way_to_an_interior_point(
     """With no stale pass allowed, Fathi's problem in random order is beyond the sets alone."""
     for name, value in (("block_pivoting.MAX_STALE_PASSES", 0), ("block_pivoting.MAX_SINGLE_EXCHANGES", 0)):
         monkeypatch.setattr(f"solvers.active_set.{name}", value)
-    monkeypatch.setattr("solvers.active_set.dense_newton.MAX_SINGLE_EXCHANGES", 0)
+    monkeypatch.setattr("solvers.active_set.solve.MAX_SINGLE_EXCHANGES", 0)
     made = make_rung("hard/pivoting/fathi-064").made
     assert made is not None
     order = np.random.default_rng(5).permutation(64)

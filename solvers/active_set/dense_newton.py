@@ -7,7 +7,6 @@ Q⁻¹ made when it is first needed, and every case where M is no approximation 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,11 +21,11 @@ from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
 
 from .batched import MIN_CLOSED, BatchedSweeps, Case
-from .block_pivoting import MAX_SINGLE_EXCHANGES, block_pivoting
+from .block_pivoting import block_pivoting
 from .bordered_factor import Set
 from .contact_sets import ContactSets, TrialSolution
 from .nested import Cells, cells_of, representatives
-from .solve import solve_from
+from .solve import Identified, solve_or_identify
 
 WIDTHS = (4, 2)  # of the cells, in contacts
 COARSE_PASSES = 4  # on each subset, which only needs an approximate solution
@@ -48,22 +47,19 @@ class DenseQ:
 class DenseState:
     """A problem in the dual form, and what its load cases share.
 
-    identified : (Q, p) → a contact set, for cases in which pivoting makes no progress. sweeps : None where M
-    is no good.
+    identified : for cases in which pivoting makes no progress. sweeps : None where M is no good.
     """
 
     data: DenseQ
     nodes: Matrix | None
     cells: tuple[Cells, ...]
     max_sets: int
-    identified: Callable[[Matrix, Vector], Set]
+    identified: Identified
     sweeps: BatchedSweeps | None = None
     start: WarmStart | None = None
 
     @classmethod
-    def of(
-        cls, problem: Problem, nested: bool, max_sets: int, identified: Callable[[Matrix, Vector], Set]
-    ) -> DenseState:
+    def of(cls, problem: Problem, nested: bool, max_sets: int, identified: Identified) -> DenseState:
         """M, or else Q⁻¹. Raises LinAlgError if Q is not positive definite."""
         Q, nodes = problem.Q, problem.assembly.contact_nodes
         cells = tuple(cells_of(nodes, len(Q), width) for width in WIDTHS) if nested else ()
@@ -109,16 +105,8 @@ class DenseState:
         return BatchedSweeps(self.data.Q, np.diag(self.data.Q), M, solve_one)
 
     def _by_sets(self, C: Set, load: LoadCase, tolerance: float) -> Answer:
-        """Block pivoting from C; without progress, from the set that `identified` gives."""
         sets = ContactSets(self.data.Q, load.p, lambda: self.data.inverse)
-        answer = solve_from(C, sets, tolerance, self.max_sets)
-        if answer.status == "solved" or answer.details["single_exchanges"] < MAX_SINGLE_EXCHANGES:
-            return answer
-        again = solve_from(self.identified(sets.Q, sets.p), sets, tolerance, self.max_sets)
-        if again.details["kkt_residual_mm"] > answer.details["kkt_residual_mm"]:
-            return answer
-        tried = (answer.iterations or 0) + (again.iterations or 0)
-        return replace(again, iterations=tried, details=again.details | {"interior_point": True})
+        return solve_or_identify(C, sets, tolerance, self.max_sets, self.identified)
 
     def _first_guess(self, p: Vector, tolerance: float) -> tuple[Set, int]:
         """The contact set of the warm start, else of the finest subset; the number of sets tried on subsets.

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Matrix, Vector
 from problems.forms.compliance import AnyQ
 from solvers.base import Answer
 from solvers.kkt import kkt_residual, kkt_status, rounding_of
 from solvers.linear_algebra.product import product
 
-from .block_pivoting import block_pivoting, wrong_signs
+from .block_pivoting import MAX_SINGLE_EXCHANGES, block_pivoting, wrong_signs
 from .bordered_factor import Set
-from .contact_sets import TrialSolution
+from .contact_sets import ContactSets, TrialSolution
 
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further refinement
 MAX_FINER_SETS = 30  # tried for signs that are wrong by less than the tolerance
+
+
+#: (Q, p) → a contact set.
+Identified = Callable[[Matrix, Vector], Set]
 
 
 class Sets(Protocol):
@@ -73,6 +78,20 @@ def solve_from(C: Set, sets: Sets, tolerance: float, max_sets: int) -> Answer:
         tried = "rounding" if best.converged else f"{passes} contact sets"
         details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
     return Answer(status, lam, iterations=passes, details=details)
+
+
+def solve_or_identify(
+    C: Set, sets: ContactSets, tolerance: float, max_sets: int, identified: Identified
+) -> Answer:
+    """`solve_from` C; if its sets made no progress, from the set that is identified otherwise."""
+    answer = solve_from(C, sets, tolerance, max_sets)
+    if answer.status == "solved" or answer.details["single_exchanges"] < MAX_SINGLE_EXCHANGES:
+        return answer
+    again = solve_from(identified(sets.Q, sets.p), sets, tolerance, max_sets)
+    if again.details["kkt_residual_mm"] > answer.details["kkt_residual_mm"]:
+        return answer
+    tried = (answer.iterations or 0) + (again.iterations or 0)
+    return replace(again, iterations=tried, details=again.details | {"interior_point": True})
 
 
 def _point(sets: Sets, found: _Settled) -> tuple[Vector, Vector]:

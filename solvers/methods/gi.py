@@ -24,8 +24,9 @@ from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
 from solvers.active_set.growing_factor import GrowingFactor
-from solvers.active_set.solve import solve_from
+from solvers.active_set.solve import solve_from, solve_or_identify
 from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, Solver, failed
+from solvers.interior_point.identify import identified_set
 from solvers.kkt import kkt_status
 from solvers.linear_algebra.inverse import inverse_with_factor
 
@@ -111,7 +112,7 @@ def _finished(
     closed = np.ones(len(load.p), dtype=bool)
     closed[result.active] = False
     sets = ContactSets(ready.problem.Q, load.p, lambda: ready.G)
-    answer = solve_from(closed, sets, tolerance, FINISHING_SETS)
+    answer = solve_or_identify(closed, sets, tolerance, FINISHING_SETS, identified_set)
     details |= {"finishing_sets": answer.iterations, "kkt_residual_mm": answer.details["kkt_residual_mm"]}
     if answer.status == "solved":
         details.pop("cause", None)
