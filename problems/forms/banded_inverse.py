@@ -23,6 +23,7 @@ Contacts = NDArray[np.intp]
 
 WINDOW_LINES = 4  # lines of contacts across the joint in a window, before the current one
 DEFAULT_LINE = 16  # contacts per line if coordinates are unknown
+COLUMNS_AT_A_TIME = 256  # their indices stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,14 @@ class BandedInverse:
         rows, width = np.flatnonzero(S), len(self.band) - 1
         nearer = np.arange(len(rows)) - np.searchsorted(rows, rows - width)
         deep = int(nearer.max(initial=0)) + 1
-        far = np.concatenate([rows, np.full(deep, 2 * len(S))])
+        block, entries = np.empty((deep, len(rows)), order="F"), self.band.ravel(order="K")
         # Entry (i + d, i) of M_SS is entry (rows[i + d], rows[i]) of M, zero beyond the band.
-        apart = np.lib.stride_tricks.sliding_window_view(far, deep)[: len(rows)] - rows[:, None]
-        place = np.minimum(apart, width, out=apart) + rows[:, None] * len(self.band)
-        return BandFactor.of(S, rows, self.band.ravel(order="K").take(place).T)
+        below = np.lib.stride_tricks.sliding_window_view(np.append(rows, np.full(deep, 2 * len(S))), deep)
+        for start in range(0, len(rows), COLUMNS_AT_A_TIME):
+            column = rows[start : start + COLUMNS_AT_A_TIME, None]
+            apart = np.minimum(below[start : start + len(column)] - column, width)
+            block.T[start : start + len(column)] = entries.take(apart + column * len(self.band))
+        return BandFactor.of(S, rows, block)
 
     def shifted_factor(self, s: Vector) -> BandFactor:
         """The Cholesky factor of I + diag(s) M diag(s)."""
