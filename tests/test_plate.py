@@ -259,7 +259,7 @@ def bare_beam(torque: bool) -> NDArray[np.float64]:
     The rate of twist w_xy stays free at y = 0, as in a shaft without warping restraint.
     """
     plate = Plate(np.array([0.0, 50.0, 90.0]), np.linspace(0, 400, 5), 1e-3, 70e3, 0.33)
-    K = plate.stiffness() + plate.beam_along_y(50.0, EI=70e3 * 2e4, GJ=26e3 * 3e3, start=0.0, stop=400.0)
+    K = plate.stiffness() + plate.beams_along_y([50.0], EI=70e3 * 2e4, GJ=26e3 * 3e3, start=0.0, stop=400.0)
     held = [dof(3, ix, 0, dx, dy) for ix in range(3) for dx, dy in [(0, 0), (1, 0), (0, 1)]]
     free = np.setdiff1d(np.arange(plate.size), held)
     f = np.zeros(plate.size)

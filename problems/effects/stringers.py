@@ -39,5 +39,4 @@ class Stringers(StiffnessEffect):
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J
         positions = np.arange(0.0, plate.x[-1] + 1e-9 * self.pitch, self.pitch)
-        beams = (plate.beam_along_y(min(x, plate.x[-1]), EI, GJ, self.start, self.stop) for x in positions)
-        return sum(beams, start=sp.csr_array((plate.size, plate.size)))
+        return plate.beams_along_y(np.minimum(positions, plate.x[-1]).tolist(), EI, GJ, self.start, self.stop)

@@ -62,7 +62,7 @@ def line_matrices(grid: Vector, start: float = -np.inf, stop: float = np.inf) ->
         phi, slope, curvature = (shape(t, h, d).T for d in range(3))
         w = (weight * length / 2)[:, None, None]
         for k, (u, v) in enumerate([(phi, phi), (slope, slope), (curvature, curvature), (curvature, phi)]):
-            entries[k] += w * u[:, :, None] * v[:, None, :]
+            entries[k] += w * (u[:, :, None] * v[:, None, :])  # symmetric to the last bit if u is v
 
     def assemble(values: Matrix) -> sp.csr_array:
         return sp.coo_array((values.ravel(), (rows, columns)), shape=(size, size)).tocsr()

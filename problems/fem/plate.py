@@ -10,6 +10,7 @@ Source: Bogner, Fox, Schmit, Proc. Conf. Matrix Methods in Struct. Mech., 1965.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,32 +54,41 @@ class Plate:
         """(size, size), N/mm and N: the bending stiffness of the free plate.
 
         All terms have the same nonzero entries, those of nodes of a common element, so that their sum is
-        formed on the values alone.
+        formed on the values alone, an entry of a one-dimensional matrix along y at a time; it is symmetric to
+        the last bit.
         """
         X, Y = line_matrices(self.x), line_matrices(self.y)
-        nu, outer = self.poisson, np.outer
+        D, nu = self.rigidity, self.poisson
         x_B, y_B = X.B.data, Y.B.data
         x_Bt, y_Bt = (sp.csr_array(B.T).data for B in (X.B, Y.B))
-        values = self.rigidity * (
-            outer(Y.M.data, X.H.data)
-            + outer(Y.H.data, X.M.data)
-            + nu * (outer(y_B, x_Bt) + outer(y_Bt, x_B))
-            + 2 * (1 - nu) * outer(Y.G.data, X.G.data)
-        )
-        width = X.M.shape[0]
-        columns = Y.M.indices[:, None] * width + X.M.indices
-        rows = _row_numbers(Y.M)[:, None] * width + _row_numbers(X.M)
-        entries = (values.ravel(), (rows.ravel(), columns.ravel()))
-        return sp.csr_array(sp.coo_array(entries, shape=(self.size, self.size)))
+        x_counts, y_counts = np.diff(X.M.indptr), np.diff(Y.M.indptr)
+        indptr = np.cumsum(np.append(0, np.outer(y_counts, x_counts)), dtype=np.int32)
+        values, columns = np.empty(indptr[-1]), np.empty(indptr[-1], dtype=np.int32)
+        # Of the entries of a row (y, x), those of an entry of row y are consecutive, as many as row x has.
+        x_row, x_first = _row_numbers(X.M), np.arange(X.M.nnz) - X.M.indptr[_row_numbers(X.M)]
+        y_row, y_first = _row_numbers(Y.M), np.arange(Y.M.nnz) - Y.M.indptr[_row_numbers(Y.M)]
+        width, counts = X.M.shape[0], x_counts[x_row]
+        for k, (row, first) in enumerate(zip(y_row, y_first, strict=True)):
+            place = indptr[row * width + x_row] + first * counts + x_first
+            values[place] = D * (
+                Y.M.data[k] * X.H.data
+                + Y.H.data[k] * X.M.data
+                + nu * (y_B[k] * x_Bt + y_Bt[k] * x_B)
+                + 2 * (1 - nu) * Y.G.data[k] * X.G.data
+            )
+            columns[place] = Y.M.indices[k] * width + X.M.indices
+        return sp.csr_array((values, columns, indptr), shape=(self.size, self.size))
 
     def evaluate(self, x: float, y: float, dx: int = 0, dy: int = 0) -> sp.csr_array:
         """Row vector (1, size) that gives the deflection, or a derivative of it, at a point."""
         return sp.kron(evaluate(self.y, y, dy), evaluate(self.x, x, dx)).tocsr()
 
-    def beam_along_y(self, x: float, EI: float, GJ: float, start: float, stop: float) -> sp.csr_array:
-        """Stiffness of a beam at x between y = start and stop: EI ∫w_yy² + GJ ∫w_xy², N·mm²."""
+    def beams_along_y(
+        self, x: Sequence[float], EI: float, GJ: float, start: float, stop: float
+    ) -> sp.csr_array:
+        """Stiffness of a beam at each x between y = start and stop: Σ EI ∫w_yy² + GJ ∫w_xy², N·mm²."""
         line = line_matrices(self.y, start, stop)
-        e, slope = evaluate(self.x, x), evaluate(self.x, x, 1)
+        e, slope = (sp.vstack([evaluate(self.x, each, d) for each in x]) for d in (0, 1))
         return (EI * sp.kron(line.H, e.T @ e) + GJ * sp.kron(line.G, slope.T @ slope)).tocsr()
 
     def beam_along_x(self, y: float, EI: float, GJ: float) -> sp.csr_array:

@@ -34,12 +34,15 @@ class Prepared:
         self, assembly: Assembly, factors: tuple[Matrix, ...] | None = None, Q: Matrix | None = None
     ) -> None:
         self.assembly = assembly
-        #: The key of the matrices in the cache; None if they are in memory only.
-        self.key: str | None = None
         if factors is not None:
             self.__dict__["factors"] = factors  # overrides the cached property
         if Q is not None:
             self.__dict__["Q"] = Q
+
+    @property
+    def key(self) -> str | None:
+        """The key of the matrices in the cache; None if they are in memory only."""
+        return None
 
     @property
     def facts(self) -> dict[str, object]:

@@ -24,6 +24,7 @@ Order = NDArray[np.intp]
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 WITH_INDICES = 1.5  # numbers of eight bytes per entry of a sparse matrix
+COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
 LOST = 2.0**-50  # of an unknown's stiffness: a smaller pivot is but the rounding of a zero
 SOFT = 2.0**-30  # of an unknown's stiffness: springs that hold a mechanism
 
@@ -49,7 +50,7 @@ class Factor(Protocol):
 
 def factored(K: sp.csc_array, nodes: Matrix | None = None) -> Factor:
     """The factor of K (N, N). nodes : (N, 2) of the unknowns, if known. Raises NotPositiveDefinite."""
-    widest = BAND_TO_ROW * K.nnz / max(K.shape[0], 1)
+    widest = _widest(K)
     if half_bandwidth(K) < widest:
         return BandFactor(lower_band(K))
     for order in _orders(K, nodes):
@@ -66,7 +67,7 @@ def expected_numbers(K: sp.csc_array, nodes: Matrix | None = None) -> int:
     half-bandwidth, for each body (George, SIAM J. Numer. Anal. 10:345–363, 1973). L and U are kept, and their
     indices.
     """
-    size, widest = K.shape[0], BAND_TO_ROW * K.nnz / max(K.shape[0], 1)
+    size, widest = K.shape[0], _widest(K)
     numbered = (sp.csc_array(K[order][:, order]) for order in _orders(K, nodes))
     width = size
     for each in itertools.chain([K], numbered):
@@ -75,6 +76,11 @@ def expected_numbers(K: sp.csc_array, nodes: Matrix | None = None) -> int:
             return size * (width + 1)
     bodies = connected_components(K, directed=False)[0]
     return int(WITH_INDICES * 2 * min(size * width, bodies * width**2 * np.log2(size / bodies)))
+
+
+def _widest(K: sp.csc_array) -> float:
+    """The half-bandwidth below which a band is narrow enough."""
+    return BAND_TO_ROW * K.nnz / max(K.shape[0], 1)
 
 
 def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Order]:
@@ -86,18 +92,25 @@ def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Order]:
 
 def half_bandwidth(K: sp.csc_array) -> int:
     """max |i − j| over the entries of K."""
-    columns = np.repeat(np.arange(K.shape[1], dtype=K.indices.dtype), np.diff(K.indptr))
-    return int((K.indices - columns).max(initial=0))
+    K.sum_duplicates()  # and sorts
+    filled = np.flatnonzero(np.diff(K.indptr))
+    return int((K.indices[K.indptr[filled + 1] - 1] - filled).max(initial=0))
 
 
 def lower_band(K: sp.csc_array) -> Matrix:
     """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth."""
-    lower = sp.csc_array(sp.tril(K, format="csc"))
-    width = half_bandwidth(lower)
-    band = np.empty((width + 1, K.shape[0]), order="F")
-    band.fill(0.0)  # in large pages, where zeros() would be given small ones: ten times faster
-    columns = np.repeat(np.arange(K.shape[1], dtype=np.int64), np.diff(lower.indptr))
-    band.ravel(order="K")[columns * width + lower.indices] = lower.data  # row − column + column (width + 1)
+    size, width = K.shape[0], half_bandwidth(K)
+    band = np.empty((width + 1, size), order="F")  # in large pages, where zeros() would be given small ones
+    entries = band.ravel(order="K")
+    for start in range(0, size, COLUMNS_AT_A_TIME):
+        stop = min(start + COLUMNS_AT_A_TIME, size)
+        band[:, start:stop] = 0.0
+        stored = slice(K.indptr[start], K.indptr[stop])
+        columns = np.repeat(np.arange(start, stop), np.diff(K.indptr[start : stop + 1]))
+        rows, values = K.indices[stored], K.data[stored]
+        lower = rows >= columns
+        # row − column + column (width + 1)
+        entries[columns[lower] * width + rows[lower]] = values[lower]
     return band
 
 

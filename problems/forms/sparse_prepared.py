@@ -37,7 +37,6 @@ class ApproximateInverse:
 class SparsePrepared(Prepared):
     """K's blocks are sparse; each is factored when K⁻¹ is first needed.
 
-    key : of K and A, under which references are stored; None if they are not.
     coarser : makes an assembly of similar Q whose factors are cheaper; None if there is none.
 
     `sparse_factors` raises NotPositiveDefinite, with the number of an unknown that moves.
@@ -46,12 +45,10 @@ class SparsePrepared(Prepared):
     def __init__(
         self,
         assembly: Assembly,
-        key: str | None = None,
         seconds: dict[str, float] | None = None,
         coarser: Callable[[], Assembly] | None = None,
     ) -> None:
         super().__init__(assembly)
-        self.key = key
         self.seconds = seconds or {}
         self.coarser = coarser
 

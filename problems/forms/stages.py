@@ -50,9 +50,12 @@ class Stored(Prepared):
         self.factors_key = cache.digest("factors", key, code)
         parts = (A.data, A.indices, A.indptr)
         self.Q_key = cache.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
-        self.key = self.Q_key
         self.seconds = seconds
         self.source_of, self.check_A, self.progress = source_of, check_A, progress
+
+    @property
+    def key(self) -> str:
+        return self.Q_key
 
     @property
     def built(self) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -48,10 +49,14 @@ class PartModel:
 
     def stiffness(self) -> sp.csr_array:
         """(plate.size, plate.size), N/mm and N: the plate and the terms of its effects, nothing clamped."""
-        K = self.plate.stiffness()
-        for effect in self.effects:
-            K = K + effect.stiffness(self.plate)
-        return sp.csr_array(K)
+        return sp.csr_array(self.plate.stiffness() + self.added) if self.effects else self.plate.stiffness()
+
+    @cached_property
+    def added(self) -> sp.csr_array:
+        """The terms of the effects, symmetric to the last bit."""
+        terms = (effect.stiffness(self.plate) for effect in self.effects)
+        K = sum(terms, start=sp.csr_array((self.plate.size, self.plate.size)))
+        return sp.csr_array((K + K.T) / 2)
 
     @property
     def free_lines(self) -> list[int]:

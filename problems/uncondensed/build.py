@@ -51,17 +51,23 @@ def prepared(scene: Scene) -> SparsePrepared:
         case _:
             raise TypeError(type(scene).__name__)
     seconds = {"model": time.perf_counter() - start}
-    code = fingerprint([Path(__file__)], within=folders)
-    key = digest("uncondensed", scene.assembly_key, code)
-    return _OfScene(scene, assembly, key, seconds, coarser)
+    return _OfScene(scene, folders, assembly, seconds, coarser)
 
 
 class _OfScene(SparsePrepared):
-    """Says of a mechanism where it moves, as an error of the scene, and refuses a nearly singular own K."""
+    """Says of a mechanism where it moves, as an error of the scene, and refuses a nearly singular own K.
 
-    def __init__(self, scene: Scene, *given: Any) -> None:
+    folders : of the code that made K.
+    """
+
+    def __init__(self, scene: Scene, folders: tuple[str, ...], *given: Any) -> None:
         super().__init__(*given)
-        self.scene = scene
+        self.scene, self.folders = scene, folders
+
+    @cached_property
+    def key(self) -> str:
+        code = fingerprint([Path(__file__)], within=self.folders)
+        return digest("uncondensed", self.scene.assembly_key, code)
 
     @cached_property
     def sparse_factors(self) -> tuple[Factor, ...]:

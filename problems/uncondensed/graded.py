@@ -15,7 +15,7 @@ import numpy as np
 from problems.model.part import PartModel
 
 GROWTH = 1.2  # of the distance between lines, away from the junction
-PEAK = 2.0  # times the median: the stiffness that effects add to a line that is kept
+PEAK = 2.0  # times the median beyond the junction: the stiffness that effects add to a line that is kept
 
 
 def graded(model: PartModel) -> PartModel:
@@ -41,8 +41,6 @@ def _graded(count: int) -> list[int]:
 
 def _stiff_lines(model: PartModel) -> set[int]:
     """The lines to which effects add far more stiffness than to others: beams along them, and supports."""
-    added = np.zeros(model.plate.size)
-    for effect in model.effects:
-        added += effect.stiffness(model.plate).diagonal()
-    deflections = added.reshape(len(model.plate.y), 2, -1, 2)[:, 0, :, 0].sum(axis=1)
-    return set(np.flatnonzero(deflections > PEAK * np.median(deflections)).tolist())
+    added = model.added.diagonal().reshape(len(model.plate.y), 2, -1, 2)[:, 0, :, 0].sum(axis=1)
+    beyond = np.delete(added, model.junction)
+    return set(np.flatnonzero(added > PEAK * np.median(beyond)).tolist()) if beyond.size else set()

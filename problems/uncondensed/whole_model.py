@@ -64,8 +64,9 @@ class WholeModel:
             K = self._block(parts, int(start), int(stop - start))
             for T, k in springs:
                 T_here = self._at_junction(T)[start:stop]
-                K = K + T_here @ sp.diags_array(k) @ T_here.T
-            blocks.append(sp.csc_array((K + K.T) / 2))  # the order of sums is another in K_ji: proofs see it
+                added = T_here @ sp.diags_array(k) @ T_here.T
+                K = K + (added + added.T) / 2  # the order of products is another in K_ji: proofs see it
+            blocks.append(sp.csc_array(K))
             names.append(" + ".join(self.scene.joint.part[part].name for part in parts))
         B = self._at_junction(self.scene.joint.contact_matrix())
         return Assembly(tuple(blocks), B, self._nodes(), tuple(names), junction=self.junction)
@@ -74,12 +75,20 @@ class WholeModel:
         """The stiffness of some parts, (size, size), on the unknowns from `start` on."""
         own = [self.models[part].stiffness() for part in parts]
         K = own[0] if len(own) == 1 else sp.csr_array(sp.block_diag(own, format="csr"))
-        place = np.concatenate([self.numbering.places[part] for part in parts])
+        place = np.concatenate([self.numbering.places[part] for part in parts]).astype(np.int32) - start
+        free = np.flatnonzero(place >= 0)
         order = np.empty(size, dtype=np.int32)
-        order[place[place >= 0] - start] = np.flatnonzero(place >= 0)
-        K = K[order][:, order]
-        K.sort_indices()
-        return sp.csc_array((K.data, K.indices, K.indptr), shape=K.shape)  # symmetric
+        order[place[free]] = free
+        K = K[order]
+        column, ends = place[K.indices], K.indptr
+        if size < len(place):
+            kept = column >= 0
+            column, data, ends = column[kept], K.data[kept], np.append(0, np.cumsum(kept))[ends]
+        else:
+            data = K.data
+        found = sp.csc_array((data, column, ends), shape=(size, size))  # symmetric
+        found.sort_indices()
+        return found
 
     def _at_junction(self, M: sp.csc_array) -> sp.csc_array:
         """(N, k): the rows of M (n, k) at the junction's deflections, the others zero."""
