@@ -101,7 +101,7 @@ def test_cold_warm_and_batched_are_the_answer_of_nnls(dense: Prepared) -> None:
             check(answer, *known)
 
 
-def test_a_warm_start_saves_sweeps() -> None:
+def test_a_warm_start_saves_contact_sets() -> None:
     dense = make_strips(150)
     first, second = cases(dense, 8, 2)
     cold = session_of(dense).next(second, None)
@@ -111,7 +111,10 @@ def test_a_warm_start_saves_sweeps() -> None:
     check(warm, *solve_by_nnls(dense, second))
     assert warm.iterations is not None
     assert cold.iterations is not None
-    assert 1 <= warm.iterations < cold.iterations
+    assert 1 <= warm.iterations <= cold.iterations
+    assert warm.inner_iterations is not None
+    assert cold.inner_iterations is not None
+    assert warm.inner_iterations < cold.inner_iterations
 
 
 @pytest.mark.parametrize("forced", ["one sweep", "no band"])

@@ -33,7 +33,7 @@ from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
 MAX_SWEEPS = 20  # enough even if a sweep only halves the error
-SETS_PER_SWEEP = 3  # contact sets per sweep: M is too inaccurate for more to pay off
+SETS_PER_SWEEP = 3  # contact sets per sweep: where a product with Q is cheap, more do not pay off
 SIGN_UNCERTAINTY = 1e-5  # of |y_C| before a sweep: smaller values have no reliable sign
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further sweep
 STALLED = 2  # sweeps that do not halve |y_C|: what is left may be rounding
@@ -78,6 +78,7 @@ class BatchedSweeps:
     M: BandedInverse
     solve_one: SolveOne
     max_sweeps: int = MAX_SWEEPS
+    sets_per_sweep: int = SETS_PER_SWEEP
     last: list[Case] = field(default_factory=list)
     use_sweeps: bool = True
 
@@ -135,7 +136,7 @@ class BatchedSweeps:
         for _ in range(self.max_sweeps):
             lam = np.empty((len(order), len(unsettled)), order="F")
             for column, case in enumerate(unsettled):
-                lam[order, column] = _banded_step(case, self.M, compliance, tolerance)
+                lam[order, column] = self._banded_step(case, compliance, tolerance)
             y = self.gaps(lam, [case.load for case in unsettled])
             for column, case in enumerate(unsettled):
                 self._update(case, lam[order, column], y[order, column], compliance, tolerance)
@@ -143,6 +144,13 @@ class BatchedSweeps:
             if not unsettled:
                 break
         return cases
+
+    def _banded_step(self, case: Case, compliance: Vector, tolerance: float) -> Vector:
+        """λ (m,) of the case with Q replaced by M⁻¹."""
+        banded = _BandedSets(self.M, case.trial, case.factor)
+        found = block_pivoting(banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, self.sets_per_sweep)
+        case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
+        return found.trial.lam
 
     def _update(self, case: Case, lam: Vector, y: Vector, compliance: Vector, tolerance: float) -> None:
         """Take λ and y, and decide whether the case is settled."""
@@ -198,14 +206,6 @@ def _warm_started(solved: Case, load: LoadCase, p: Vector) -> Case:
     """A case that starts from the solution of another one."""
     y = solved.trial.y + solved.p - p
     return Case(load, p, solved.C, TrialSolution(solved.trial.lam, y, float(abs(y).max())), solved.factor)
-
-
-def _banded_step(case: Case, M: BandedInverse, compliance: Vector, tolerance: float) -> Vector:
-    """λ (m,) of the case with Q replaced by M⁻¹."""
-    banded = _BandedSets(M, case.trial, case.factor)
-    found = block_pivoting(banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, SETS_PER_SWEEP)
-    case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
-    return found.trial.lam
 
 
 def _cut_off(lam: Vector, compliance: Vector) -> float:

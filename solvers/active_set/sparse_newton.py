@@ -28,15 +28,15 @@ from .contact_sets import TrialSolution
 from .solve import solve_from
 
 MAX_SWEEPS = 100
+SETS_PER_SWEEP = 12  # contact sets tried with M before the next product with Q; a front moves a row a set
 TARGET = 0.01  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
 STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve |y_C|, at an |y_C| that can be rounding
 
 
 @dataclass(frozen=True)
 class SparseState:
-    """A problem in the sparse form, and what its load cases share. diagonal : of Q, mm/N."""
+    """A K in the sparse form, and what its load cases share. diagonal : of Q, mm/N."""
 
-    problem: Problem
     prepared: SparsePrepared
     diagonal: Vector
     sweeps: BatchedSweeps | None
@@ -55,11 +55,11 @@ class SparseState:
             return failed(f"K is not positive definite: {error}")
         approximate = prepared.approximate_inverse
         if approximate is None:
-            return cls(problem, prepared, np.ones(assembly.m), None, max_sets)
+            return cls(prepared, np.ones(assembly.m), None, max_sets)
         M, diagonal = approximate.M, approximate.diagonal
-        state = cls(problem, prepared, diagonal, None, max_sets)
+        state = cls(prepared, diagonal, None, max_sets)
         Q = prepared.compliance
-        sweeps = SparseSweeps(Q, diagonal, M, state.by_sets, MAX_SWEEPS, prepared=prepared)
+        sweeps = SparseSweeps(Q, diagonal, M, state.by_sets, MAX_SWEEPS, SETS_PER_SWEEP, prepared=prepared)
         return replace(state, sweeps=sweeps)
 
     def by_sets(self, C: Set | None, load: LoadCase, tolerance: float) -> Answer:
@@ -136,14 +136,13 @@ class SparseState:
         return found
 
 
-@dataclass
+@dataclass(kw_only=True)
 class SparseSweeps(BatchedSweeps):
     """Sweeps with y = g − AᵀK⁻¹(f − Aλ): Qλ and p alone can be large, and cancel."""
 
-    prepared: SparsePrepared | None = None
+    prepared: SparsePrepared
 
     def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
-        assert self.prepared is not None
         return gaps(self.prepared, lam, loads)
 
     def enough(self, case: Case, tolerance: float, stagnating: bool) -> float:
