@@ -9,8 +9,9 @@ replaced by M⁻¹ and y exact at the current λ: y⁺ = y + M⁻¹(λ⁺ − λ
 
 by block principal pivoting with band factorisations, whose cost is negligible. Then y = Qλ⁺ − p for all
 cases in one product. Each sweep reduces the error by a factor max|1 − eig(MQ)|, about 0.1 on a joint of
-plates. A case starts from a solved one and its change in p, since p itself is large if a load presses on
-soft parts.
+plates, and by less on a set that no longer changes, where the sweeps are steps of the conjugate gradient
+method with M as preconditioner. A case starts from a solved one and its change in p, since p itself is
+large if a load presses on soft parts.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ SETS_PER_SWEEP = 3  # contact sets per sweep: where a product with Q is cheap, m
 SIGN_UNCERTAINTY = 1e-5  # of |y_C| before a sweep: smaller values have no reliable sign
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further sweep
 STALLED = 2  # sweeps that do not halve |y_C|: what is left may be rounding
+STEP_RANGE = 0.5, 2.0  # beyond it, a step is rounding
 MIN_CLOSED = 1 / 16  # of the contacts: with fewer closed, solving case by case is faster
 
 #: (C, load with p, tolerance) → the answer of one case, from the contact set C, or from a guess of its own if
@@ -49,8 +51,9 @@ class Case:
     """A load case during the sweeps, its vectors in the order of the banded inverse.
 
     load : the case as it was given. p : (m,) mm. C : its contact set. trial : λ (m,) N and y = Qλ − p (m,)
-    mm. factor : of M on the open set. settled : no sign is wrong, and |y_C| is far below the tolerance or
-    within rounding. stalled : the last sweeps that did not halve |y_C|.
+    mm. factor : of M on the open set. unchanged : its set in the last sweep. before : the step of the last
+    sweep and Q times it, if the set was unchanged. settled : no sign is wrong, and |y_C| is far below the
+    tolerance or within rounding. stalled : the last sweeps that did not halve |y_C|.
     """
 
     load: LoadCase
@@ -58,6 +61,8 @@ class Case:
     C: Set
     trial: TrialSolution
     factor: BandFactor | None = None
+    unchanged: bool = False
+    before: tuple[Vector, Vector] | None = None
     settled: bool = False
     stalled: int = 0
     sweeps: int = 0
@@ -146,14 +151,26 @@ class BatchedSweeps:
         return cases
 
     def _banded_step(self, case: Case, compliance: Vector, tolerance: float) -> Vector:
-        """λ (m,) of the case with Q replaced by M⁻¹."""
+        """λ (m,) of the case with Q replaced by M⁻¹; conjugate to the step before on an unchanged set."""
         banded = _BandedSets(self.M, case.trial, case.factor)
         found = block_pivoting(banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, self.sets_per_sweep)
+        case.unchanged = not (case.C ^ found.C).any()
         case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
-        return found.trial.lam
+        if not case.unchanged or case.before is None:
+            return found.trial.lam
+        step, change = case.before
+        return found.trial.lam - ((found.trial.lam - case.trial.lam) @ change / (step @ change)) * step
 
     def _update(self, case: Case, lam: Vector, y: Vector, compliance: Vector, tolerance: float) -> None:
-        """Take λ and y, and decide whether the case is settled."""
+        """Take λ and y, on an unchanged set at the minimum along the step, and decide whether the case is
+        settled.
+        """
+        step, change = lam - case.trial.lam, y - case.trial.y
+        case.before = None
+        if case.unchanged and step @ change > 0:
+            share = float(np.clip(-(step @ case.trial.y) / (step @ change), *STEP_RANGE))
+            lam, y = case.trial.lam + share * step, case.trial.y + share * change
+            case.before = step, change
         rounding = float(abs(y[case.C]).max(initial=0.0))
         stagnating = rounding > case.trial.rounding / 2
         case.stalled = case.stalled + 1 if stagnating else 0
