@@ -57,6 +57,21 @@ def test_residual_the_uncertainty_of_its_terms_counts() -> None:
     assert total.enclosed().error[0] >= 3.0
 
 
+def test_residual_the_terms_of_a_sparse_product_are_counted() -> None:
+    """Rows of n ones of alternating signs in each of two blocks, behind one of A: all sums are zero."""
+    n = 64
+    sign = (-1.0) ** np.arange(n)
+    K = sp.csc_array(np.outer(sign, sign))
+    A = sp.csc_array(np.ones((2 * n, 2)) * [1.0, -1.0])
+    made = Assembly((K, K), A)
+    for low, parts in ((0.0, 1), (2.0**-60, 2)):
+        at = DoubleDouble(np.ones(2 * n), np.full(2 * n, low))
+        found = forces(made, np.zeros(2 * n), at, doubled(np.ones(2)))
+        assert not found.value.any()
+        assert (found.error >= gamma(2 * (parts * n + 2)) ** 2 * (n + 2)).all()
+        assert (found.error <= 4 * gamma(2 * (2 * parts * n + 2)) ** 2 * (n + 2)).all()
+
+
 def exactly(made: Assembly, f: np.ndarray, x: DoubleDouble, lam: np.ndarray) -> list[Fraction]:
     K, A = made.blocks[0], made.A.toarray()
     whole = [Fraction(float(a)) + Fraction(float(b)) for a, b in zip(x.hi, x.lo, strict=True)]

@@ -28,7 +28,7 @@ def state(
     data: SparsePrepared, load: LoadCase, x: list[float], lam: float, lo: list[float] | None = None
 ) -> _State:
     """x and λ as they are, without a refinement."""
-    made = _State(data, load, np.array([lam]))
+    made = _State(bound_of(data), load, np.array([lam]))
     made.x = DoubleDouble(np.array(x), np.zeros(len(x)) if lo is None else np.array(lo))
     made.lam = DoubleDouble(np.array([lam]), np.zeros(1))
     made.r = forces(data.assembly, load.f, made.x, made.lam)
@@ -95,7 +95,7 @@ def test_steps_carry_the_rounding_of_what_they_move() -> None:
     random = np.random.default_rng(0)
     data = prepared(4.0, 0.7, 3e5)
     load = LoadCase(random.normal(size=3), np.array([-0.3]))
-    made = _State(data, load, np.array([1.0 / 3]))
+    made = _State(bound_of(data), load, np.array([1.0 / 3]))
     for _ in range(5):
         made._move(random.normal(size=3), np.array([random.random()]))
         exact = forces(data.assembly, load.f, made.x, made.lam)

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from harness.measurement.solver_session import SolverSession
 from harness.results.provenance import provenance
 from harness.results.records import Row
-from harness.verification.batched import sparse
 from harness.verification.batched.assess import Assessment, assess
 from harness.verification.batched.bound import Bound
+from harness.verification.batched.sparse import SparseAssessor
 from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
 from problems.build import prepared
@@ -78,7 +78,7 @@ Assess = Callable[[Sequence[LoadCase], Sequence[Vector], Sequence[Vector | None]
 def assessor(data: Prepared) -> Assess:
     """What judges a block of answers."""
     if isinstance(data, SparsePrepared):
-        return partial(sparse.assess, data)
+        return SparseAssessor(data)
     return partial(assess, Bound.of(data))
 
 

@@ -23,6 +23,7 @@ from problems.forms.assembly import Assembly, Matrix, Vector
 U = 2.0**-53
 ETA = 2.0**-1074  # the smallest positive number
 SMALLEST_SCALE = 2.0**-960  # bounds are multiplied by no factor below it, lest they underflow to nothing
+SPARSE_ROWS_AT_A_TIME = 4096
 ROWS_AT_A_TIME = 16  # they and what is computed from them stay in the processor's cache
 K_SLICES, X_SLICES = 2, 3
 
@@ -75,10 +76,10 @@ class ErrorFreeSum:
         self.size, self.error = np.zeros(size), np.zeros(size)
         self.terms = 0
 
-    def add(self, term: Vector) -> None:
-        self.hi, rounding = two_sum(self.hi, term)
-        self.lo += rounding
-        self.size += abs(term)
+    def add(self, term: Vector, rows: slice = slice(None)) -> None:
+        self.hi[rows], rounding = two_sum(self.hi[rows], term)
+        self.lo[rows] += rounding
+        self.size[rows] += abs(term)
         self.terms += 1
 
     def enclosed(self) -> Enclosure:
@@ -123,19 +124,24 @@ def _size(v: DoubleDouble) -> Vector:
 
 
 def _subtract_sparse(total: ErrorFreeSum, rows: slice, A: sp.csr_array, v: DoubleDouble) -> None:
-    """total[rows] −= Av, one entry of every row at a time."""
-    counts, size = np.diff(A.indptr), len(total.hi)
-    first = rows.start or 0
-    for k in range(int(counts.max(initial=0))):
-        those = np.flatnonzero(counts > k)
-        entry = A.indptr[those] + k
-        for part in (v.hi, v.lo):
-            term, rounding = np.zeros((2, size))
-            factor = part[A.indices[entry]]
-            term[first + those], rounding[first + those] = two_product(-A.data[entry], factor)
-            total.error[first + those] += 5 * ETA * (factor != 0)
-            total.add(term)
-            total.add(rounding)
+    """total[rows] −= Av, one entry of each of some rows at a time; the terms are counted row by row."""
+    counts, first = np.diff(A.indptr), rows.start or 0
+    parts = [part for part in (v.hi, v.lo) if part.any()]
+    terms = total.terms
+    for start in range(0, A.shape[0], SPARSE_ROWS_AT_A_TIME):
+        chunk = slice(start, min(start + SPARSE_ROWS_AT_A_TIME, A.shape[0]))
+        place, begin, count = slice(first + start, first + chunk.stop), A.indptr[:-1][chunk], counts[chunk]
+        for k in range(int(count.max())):
+            there = count > k
+            entry = np.where(there, begin + k, 0)
+            data, indices = np.where(there, -A.data[entry], 0.0), A.indices[entry]
+            for part in parts:
+                factor = np.where(there, part[indices], 0.0)
+                term, rounding = two_product(data, factor)
+                total.error[place] += 5 * ETA * (factor != 0)
+                total.add(term, place)
+                total.add(rounding, place)
+    total.terms = terms + 2 * len(parts) * int(counts.max(initial=0))
 
 
 def _subtract_dense(total: ErrorFreeSum, rows: slice, K: Matrix, x: DoubleDouble) -> None:

@@ -110,6 +110,11 @@ def reference(
     return Reference(x, lam, active, facts["bound_mm"], facts["route"])
 
 
+def sparse_bound(prepared: SparsePrepared) -> SparseBound | None:
+    """What load cases of an assembly share of their proofs; None where nothing can be proven so."""
+    return SparseBound.of(prepared, proven_lambda_min(prepared))
+
+
 def proven_lambda_min(prepared: Prepared) -> float:
     """κ ≤ λmin(DKD), from the cache if it was proven before for this assembly."""
     if prepared.key is None:
@@ -154,14 +159,16 @@ def refined_active_set(
     load: LoadCase,
     limit_s: float | None = None,
     guess: Vector | None = None,
+    bound: SparseBound | None = None,
 ) -> Reference:
     """The active set, refined and certified.
 
     guess : λ (m,) N of an answer, from whose set the search starts; with a sparse K the answer itself is
         refined, if that proves enough. The proof does not depend on where it came from.
+    bound : of this assembly with a sparse K; made unless given.
     """
     if guess is not None and isinstance(prepared, SparsePrepared):
-        bound = SparseBound.of(prepared, proven_lambda_min(prepared))
+        bound = bound or sparse_bound(prepared)
         refined = None if bound is None else bound.proven(load, guess)
         if refined is not None and refined.bound_mm <= PROVEN_ENOUGH_MM:
             return Reference(refined.x.hi, refined.lam.hi, refined.active, refined.bound_mm, "proven")

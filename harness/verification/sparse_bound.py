@@ -49,10 +49,12 @@ class Proven:
 
 @dataclass(frozen=True)
 class SparseBound:
-    """κ, ‖DKD‖_∞, σ² of an assembly, and its M."""
+    """κ, ‖DKD‖_∞, σ² of an assembly, its M, and |K|, |A| for the rounding of products with them."""
 
     prepared: SparsePrepared
     M: BandedInverse
+    sizes: tuple[sp.csc_array, ...]
+    A_size: sp.csc_array
     D: Vector
     kappa: float
     stiffest: float
@@ -65,18 +67,19 @@ class SparseBound:
         if approximate is None or assembly.altered or not kappa > 0:
             return None
         D = balanced_units(assembly)
-        rows = zip(assembly.blocks, assembly.slices, strict=True)
-        stiffest = SAFE * max(float((abs(K) @ D[s] * D[s]).max()) for K, s in rows)
+        sizes, A_size = tuple(map(_size, assembly.blocks)), _size(assembly.A)
+        rows = zip(sizes, assembly.slices, strict=True)
+        stiffest = SAFE * max(float((K @ D[s] * D[s]).max()) for K, s in rows)
         sigma2 = independence(Assembly((), sp.csc_array(sp.diags_array(D) @ assembly.A)))
         if not sigma2 > 0:
             return None
-        return cls(prepared, approximate.M, D, kappa, stiffest, sigma2)
+        return cls(prepared, approximate.M, sizes, A_size, D, kappa, stiffest, sigma2)
 
     @np.errstate(over="ignore", invalid="ignore")
     def proven(self, load: LoadCase, lam: Vector) -> Proven:
         """From forces λ (m,) N."""
         lam = np.maximum(lam, 0.0)
-        state = _State(self.prepared, load, lam)
+        state = _State(self, load, lam)
         C, best, worse, renewed = lam > 0, None, 0, False
         for _ in range(MAX_STEPS):
             y = state.s.value
@@ -113,13 +116,12 @@ class SparseBound:
 class _State:
     """x and λ with enclosures of r = f − Kx − Aλ and s = g − Aᵀx."""
 
-    def __init__(self, prepared: SparsePrepared, load: LoadCase, lam: Vector) -> None:
+    def __init__(self, bound: SparseBound, load: LoadCase, lam: Vector) -> None:
+        prepared, self.sizes, self.A_size = bound.prepared, bound.sizes, bound.A_size
         self.prepared, self.load = prepared, load
-        blocks, A = prepared.assembly.blocks, prepared.assembly.A
-        self.sizes, self.A_size = [abs(K) for K in blocks], abs(A)
         # The most terms in a row of Kx + Aλ; K is symmetric.
-        self.depth = 4 + int(np.bincount(A.indices, minlength=1).max())
-        self.depth += max(int(np.diff(sp.csc_array(K).indptr).max(initial=0)) for K in blocks)
+        self.depth = 4 + int(np.bincount(self.A_size.indices, minlength=1).max())
+        self.depth += max(int(np.diff(K.indptr).max(initial=0)) for K in self.sizes)
         self.lam = DoubleDouble(lam, np.zeros_like(lam))
         x = prepared.solve_K(load.f - prepared.assembly.A @ lam)
         self.x = DoubleDouble(x, np.zeros_like(x))
@@ -147,6 +149,12 @@ class _State:
         error = self.r.error + rounding + gamma(depth) * abs(self.r.value) + depth * ETA
         self.r = Enclosure(value, SAFE * error)
         self.s: Enclosure = gaps(assembly, self.load.g, self.x)
+
+
+def _size(M: sp.csc_array) -> sp.csc_array:
+    """|M|, which shares its indices."""
+    M = sp.csc_array(M)
+    return sp.csc_array((abs(M.data), M.indices, M.indptr), shape=M.shape)
 
 
 def _correction(M: BandedInverse, C: NDArray[np.bool_], y: Vector, lam: Vector) -> Vector:

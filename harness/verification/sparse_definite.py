@@ -29,7 +29,9 @@ def smallest_eigenvalue(prepared: SparsePrepared, D: Vector) -> float:
     assembly, least = prepared.assembly, np.inf
     for k, (K, rows) in enumerate(zip(assembly.blocks, assembly.slices, strict=True)):
         d = D[rows]
-        scaled = sp.csc_array(sp.diags_array(d) @ K @ sp.diags_array(d))
+        K = sp.csc_array(K)
+        values = K.data * d[K.indices] * np.repeat(d, np.diff(K.indptr))  # exact
+        scaled = sp.csc_array((values, K.indices, K.indptr), shape=K.shape, copy=True)
         factor = prepared.sparse_factors[k]
         estimate = least_eigenvalue(factor.solve, d)
         if isinstance(factor, GeneralFactor):

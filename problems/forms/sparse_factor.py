@@ -92,13 +92,15 @@ def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Order]:
 
 def half_bandwidth(K: sp.csc_array) -> int:
     """max |i − j| over the entries of K."""
-    K.sum_duplicates()  # and sorts
-    filled = np.flatnonzero(np.diff(K.indptr))
-    return int((K.indices[K.indptr[filled + 1] - 1] - filled).max(initial=0))
+    columns = np.repeat(np.arange(K.shape[1], dtype=K.indices.dtype), np.diff(K.indptr))
+    return int((K.indices - columns).max(initial=0))
 
 
 def lower_band(K: sp.csc_array) -> Matrix:
     """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth."""
+    if not K.has_canonical_format:
+        K = K.copy()
+        K.sum_duplicates()
     size, width = K.shape[0], half_bandwidth(K)
     band = np.empty((width + 1, size), order="F")  # in large pages, where zeros() would be given small ones
     entries = band.ravel(order="K")
