@@ -6,8 +6,9 @@ U_i = L_{i+1,i} L_ii⁻¹ the blocks of Z = K⁻¹ follow from the last to the f
 
     Z_ii = (L_ii L_iiᵀ)⁻¹ + U_iᵀ Z_{i+1,i+1} U_i,        Z_ij = −U_iᵀ Z_{i+1,j},   j > i.
 
-Beyond the diagonal only the columns asked for are formed. About 5 b³ operations per block, matrix–matrix, in
-single precision where that suffices: what is built from them is a preconditioner.
+L_ii and L_{i+1,i} are triangular, and so are all products: about 4⅓ b³ operations per block, in single
+precision where that suffices: what is built from them is a preconditioner. Beyond the diagonal only the
+columns asked for are formed.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
 from .sparse_factor import BandFactor
+
+UNBLOCKED = 64  # LAPACK's inverse of a triangle is slower than products beyond that
 
 Rows = NDArray[np.intp]
 Entries = NDArray[np.floating[Any]]
@@ -55,29 +58,31 @@ class NearInverse:
 def near_inverse(factor: BandFactor, rows: Rows, reach: int, single: bool = True) -> NearInverse:
     """K⁻¹ at pairs of `rows`, ascending, that are at most `reach` unknowns apart. single : the precision."""
     L, dtype = factor.L, np.dtype(np.float32 if single else np.float64)
-    potri = lapack.spotri if single else lapack.dpotri
-    trsm, symm, gemm = (getattr(blas, ("s" if single else "d") + name) for name in ("trsm", "symm", "gemm"))
+    trmm = blas.strmm if single else blas.dtrmm
     size = L.shape[1]
     width = max(L.shape[0] - 1, 1)
     edges = np.arange(0, size + width, width).clip(max=size)
     count, further = len(edges) - 1, -(-reach // width)
     starts = np.searchsorted(rows, edges)
-    own = [rows[starts[i] : starts[i + 1]] - edges[i] for i in range(count)]
     panels: list[Entries] = [np.zeros((0, 0), dtype)] * count
-    Z = np.zeros((0, 0), dtype, order="F")
-    columns: list[Entries] = []  # of the following blocks: Z_{i+1,j} at the columns asked for
+    Z = np.zeros((width, width), dtype, order="F")
+    columns = np.zeros((width, 0), dtype, order="F")  # Z_{i+1,j} at the columns asked for, j = i + 1, …
     for i in reversed(range(count)):
-        diagonal, below = band_blocks(L, int(edges[i]), int(edges[i + 1]), width, dtype)
-        inverse = potri(diagonal, lower=1)[0]
-        Z_ii = np.tril(inverse) + np.tril(inverse, -1).T
-        if i + 1 < count:
-            U = trsm(1.0, diagonal, below, side=1, lower=1)
-            ZU = symm(1.0, Z, U)
-            Z_ii = gemm(1.0, U, ZU, beta=1.0, c=np.asfortranarray(Z_ii), trans_a=1, overwrite_c=1)
-            columns = [gemm(-1.0, U, each, trans_a=1) for each in columns[:further]]
-        Z = np.asfortranarray(Z_ii)
-        columns = [np.asfortranarray(Z[:, own[i]]), *columns]
-        panels[i] = np.hstack([each[own[i]] for each in columns])
+        diagonal, B = band_blocks(L, int(edges[i]), int(edges[i + 1]), width, dtype)
+        if len(B) < width:
+            diagonal, B = _continued(diagonal, B, width)
+        inverse = _inverse(diagonal, single)
+        # Z_ii = L_ii⁻ᵀ (I + BᵀZB) L_ii⁻¹, B = L_{i+1,i}, in place
+        Z = trmm(1.0, B, trmm(1.0, B, Z, side=1, overwrite_b=1), trans_a=1, overwrite_b=1)
+        Z[np.diag_indices(width)] += 1
+        Z = trmm(1.0, inverse, Z, side=1, lower=1, overwrite_b=1)
+        Z = trmm(1.0, inverse, Z, lower=1, trans_a=1, overwrite_b=1)
+        after = columns[:, : starts[min(i + 1 + further, count)] - starts[min(i + 1, count)]]
+        if after.size:
+            after = trmm(-1.0, inverse, trmm(1.0, B, after, trans_a=1), lower=1, trans_a=1, overwrite_b=1)
+        own = rows[starts[i] : starts[i + 1]] - edges[i]
+        columns = np.asfortranarray(np.hstack([Z[:, own], after]))
+        panels[i] = columns[own]
     return NearInverse(rows, starts, tuple(panels))
 
 
@@ -85,16 +90,31 @@ def band_blocks(
     L: NDArray[np.float64], start: int, stop: int, width: int, dtype: np.dtype[Any]
 ) -> tuple[Entries, Entries]:
     """L_ii, lower triangular, and L_{i+1,i} (upper triangular, as many rows as there are)."""
-    size = L.shape[1]
-    after = min(stop + width, size) - stop
-    tall = stop - start + after
-    # Entry (r, c) of these columns is L[r − c, start + c]: a view with a slanted stride.
-    row, column = L.strides
-    slanted = np.lib.stride_tricks.as_strided(
-        L[:, start:], shape=(tall, stop - start), strides=(row, column - row), writeable=False
-    )
-    whole = np.array(slanted, dtype, order="F")
-    diagonal = np.asfortranarray(np.tril(whole[: stop - start]))
-    # Its entries are those at most len(L) − 1 from the diagonal: none, where K is diagonal and `width` is 1.
-    below = np.asfortranarray(np.triu(whole[stop - start :], k=stop - start - (len(L) - 1)))
-    return diagonal, below
+    wide, after = stop - start, min(stop + width, L.shape[1]) - stop
+    whole = np.zeros((wide + len(L), wide), dtype, order="F")
+    row, column = whole.strides
+    # Entry L[d, start + c] is entry (c + d, c) of these columns: a view with a slanted stride.
+    slanted = np.lib.stride_tricks.as_strided(whole, shape=(len(L), wide), strides=(row, row + column))
+    slanted[...] = L[:, start:stop]
+    return np.asfortranarray(whole[:wide]), np.asfortranarray(whole[wide : wide + after])
+
+
+def _continued(diagonal: Entries, below: Entries, width: int) -> tuple[Entries, Entries]:
+    """The same, (width, width), as if K continued as the identity."""
+    size, dtype = len(diagonal), diagonal.dtype
+    D, B = np.eye(width, dtype=dtype, order="F"), np.zeros((width, width), dtype, order="F")
+    D[:size, :size], B[: len(below), :size] = diagonal, below
+    return D, B
+
+
+def _inverse(L: Entries, single: bool) -> Entries:
+    """L⁻¹ by halves: (P 0; R S)⁻¹ = (P⁻¹ 0; −S⁻¹RP⁻¹ S⁻¹)."""
+    if len(L) <= UNBLOCKED:
+        inverse: Entries = (lapack.strtri if single else lapack.dtrtri)(L, lower=1)[0]
+        return inverse
+    half, trmm = len(L) // 2, blas.strmm if single else blas.dtrmm
+    inverse = np.zeros_like(L, order="F")
+    P, S = _inverse(L[:half, :half], single), _inverse(L[half:, half:], single)
+    inverse[:half, :half], inverse[half:, half:] = P, S
+    inverse[half:, :half] = trmm(-1.0, S, trmm(1.0, P, L[half:, :half], side=1, lower=1), lower=1)
+    return inverse

@@ -153,7 +153,9 @@ class BatchedSweeps:
     def _banded_step(self, case: Case, compliance: Vector, tolerance: float) -> Vector:
         """λ (m,) of the case with Q replaced by M⁻¹; conjugate to the step before on an unchanged set."""
         banded = _BandedSets(self.M, case.trial, case.factor)
-        found = block_pivoting(banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, self.sets_per_sweep)
+        found = block_pivoting(
+            banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, self.sets_per_sweep
+        )
         case.unchanged = not (case.C ^ found.C).any()
         case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
         if not case.unchanged or case.before is None:
