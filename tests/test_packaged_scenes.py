@@ -14,6 +14,7 @@ from problems.scene import SCENES, Scene, read_scene, scene_names
 
 COMPARED = [name for name in scene_names() if not name.startswith("gallery/")]
 SCALING = [name for name in COMPARED if name.startswith("scaling/")]
+LONGEST = "scaling/401408"
 
 
 def size(scene: Scene) -> int:
@@ -68,15 +69,17 @@ def test_a_scene_by_name_and_by_path_are_the_same(monkeypatch: pytest.MonkeyPatc
 def test_scenes_of_one_size_share_their_matrices() -> None:
     scenes = [read_scene(name) for name in COMPARED]
     keys = {(size(scene), scene.assembly_key) for scene in scenes}
-    assert len(keys) == len({n for n, _ in keys}) == len({key for _, key in keys}) == 8
+    assert len(keys) == len({n for n, _ in keys}) == len({key for _, key in keys}) == 9
+
+
+def file(folder: str, name: str) -> dict[str, Any]:
+    return tomllib.loads((SCENES.parent / folder / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def test_scaling_scenes_differ_in_nothing_but_the_grid() -> None:
-    def file(folder: str, name: str) -> dict[str, Any]:
-        return tomllib.loads((SCENES.parent / folder / f"{name}.toml").read_text(encoding="utf-8"))
-
-    tables = [file("scenes", name) for name in SCALING]
-    assert [size(read_scene(name)) for name in SCALING] == [1170, 2522, 4386, 6762, 11308, 24080, 100352]
+    names = [name for name in SCALING if name != LONGEST]
+    tables = [file("scenes", name) for name in names]
+    assert [size(read_scene(name)) for name in names] == [1170, 2522, 4386, 6762, 11308, 24080, 100352]
     joints = [file("assemblies", table.pop("assembly")) for table in tables]
     for table, joint in zip(tables, joints, strict=True):
         del table["title"]
@@ -86,6 +89,19 @@ def test_scaling_scenes_differ_in_nothing_but_the_grid() -> None:
                 del part[side]["elements"]
     assert all(table == tables[0] for table in tables)
     assert all(joint == joints[0] for joint in joints)
+
+
+def test_the_largest_is_four_times_as_long_on_the_same_grid() -> None:
+    quarter, whole = file("scenes", "scaling/100352"), file("scenes", LONGEST)
+    one, four = (file("assemblies", table.pop("assembly")) for table in (quarter, whole))
+    del quarter["title"], whole["title"]
+    quarter["effect"][1]["pattern"]["columns"] *= 4
+    assert whole == quarter
+    length = one["junction"]["length"]
+    one["junction"] |= {"length": 4 * length, "nodes": [4 * one["junction"]["nodes"][0], 49]}
+    supports = one["effect"][0]
+    supports["points"] = [[x + k * length, y] for k in range(4) for x, y in supports["points"]]
+    assert four == one
 
 
 @pytest.mark.parametrize("name", SCALING)
