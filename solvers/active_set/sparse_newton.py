@@ -29,7 +29,7 @@ from .solve import solve_from
 
 MAX_SWEEPS = 100
 SETS_PER_SWEEP = 12  # contact sets tried with M before the next product with Q; a front moves a row a set
-TARGET = 0.01  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
+TARGET = 0.02  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
 STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve |y_C|, at an |y_C| that can be rounding
 
 
