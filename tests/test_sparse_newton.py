@@ -126,7 +126,7 @@ def test_what_sweeps_do_not_settle_is_settled_by_sets(
         monkeypatch.setattr(sparse_newton, "MAX_SWEEPS", 1)
     else:
         monkeypatch.setattr(SparsePrepared, "near_compliance", lambda *_: None)
-        monkeypatch.setattr(sparse_prepared, "FEW", -1)
+    monkeypatch.setattr(sparse_prepared, "FEW", -1)  # else M is exact, and one sweep enough
     by_sets = 0
     for load in cases(dense, 6, 3):
         session = session_of(dense)
