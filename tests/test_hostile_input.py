@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -225,3 +226,21 @@ def test_a_loop_of_links_is_no_file(tmp_path: Path) -> None:
         done = CliRunner().invoke(app, given)
         assert done.exit_code == 2, (words, done.exception)
         assert done.output.strip()
+
+
+def test_a_name_with_a_nul_is_an_error_of_the_file(tmp_path: Path) -> None:
+    suite = tmp_path / "suite.toml"
+    suite.write_text('scenes = ["a\\u0000b.toml"]\n[[solver]]\nname = "gi"\n')
+    with pytest.raises(InputError, match="without NUL"):
+        read_suite(str(suite))
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+def test_loads_whose_displacements_overflow_are_refused(form: str, tmp_path: Path) -> None:
+    K = np.diag([1e-3, 1.0, 1.0])
+    np.savez(tmp_path / "own.npz", K=K, A=np.eye(3)[:, :2], g=np.ones(2), f=np.array([1.7e308, 0.0, 0.0]))
+    given = ["solve", str(tmp_path / "own.npz"), "--form", form, "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, given)
+    assert done.exit_code == 2, done.output
+    assert "finite displacements" in done.output.replace("\n", " ")
+    assert not (tmp_path / "out").exists()

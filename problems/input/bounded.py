@@ -25,8 +25,14 @@ Name = Annotated[str, StringConstraints(min_length=1, max_length=60, pattern=ONE
 
 
 def resolved(path: Path) -> Path:
-    """The absolute path without symbolic links; whoever opens it finds out if these have no end."""
-    return Path(os.path.realpath(path))
+    """The absolute path without symbolic links; whoever opens it finds out if these have no end.
+
+    Raises InputError.
+    """
+    try:
+        return Path(os.path.realpath(path))
+    except ValueError as error:
+        raise InputError.one("path", "name", str(path), "a name without NUL") from error
 
 
 def regular_file(path: Path, key: str, mib: float) -> Path:
