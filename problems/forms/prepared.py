@@ -39,7 +39,7 @@ class Prepared:
         if Q is not None:
             self.__dict__["Q"] = Q
 
-    @property
+    @cached_property
     def key(self) -> str | None:
         """The key of the matrices in the cache; None if they are in memory only."""
         return None

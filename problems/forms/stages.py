@@ -53,7 +53,7 @@ class Stored(Prepared):
         self.seconds = seconds
         self.source_of, self.check_A, self.progress = source_of, check_A, progress
 
-    @property
+    @cached_property
     def key(self) -> str:
         return self.Q_key
 

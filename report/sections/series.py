@@ -75,7 +75,7 @@ def _line(group: pd.DataFrame) -> dict[str, Any]:
     answered = group[group["verdict"].isin(ANSWERED)]
     first, later = answered["warm"] == 0, answered["warm"] == 1
     case_s = float(group["later_s"].median())
-    line: dict[str, Any] = {name: group[name].iloc[0] for name in (*CELL, "n")}
+    line: dict[str, Any] = {name: group[name].iloc[0] for name in (*CELL, "n", "searched")}
     line |= {"cases": len(group), "within": int((group["verdict"] == "within").sum())}
     line |= {"case_s": case_s, "rate": 1 / case_s if case_s > 0 else None}
     line |= {
