@@ -277,11 +277,13 @@ def test_a_report_without_a_library_and_with_cases_that_failed(together: Path) -
     assert re.search(r"faulty \(dual\) batched +\| +0 of 4 \| +– \|", text)
 
 
-def test_ratios_are_to_the_fastest_librarys_next_case() -> None:
-    """By hand: with one thread PIQP's median is 4 s, with two ProxQP's is 2 s; Clarabel is never within."""
+def test_ratios_are_to_the_fastest_librarys_next_case_warm_or_cold() -> None:
+    """By hand: with one thread PIQP's median is 4 s, but ProxQP is faster from the start, in 2 s; with two
+    threads ProxQP's update takes 2 s. Clarabel is never within.
+    """
     seconds = {
         ("piqp", 1): [9, 3, 4, 5],
-        ("proxqp", 1): [1, 6, 6, 6],  # a first case is no next one
+        ("proxqp", 1): [2, 6, 6, 6],
         ("clarabel", 1): [1, 1, 1, 1],
         ("newton", 1): [9, 0.5, 1, 3],
         ("piqp", 2): [9, 3, 3, 3],
@@ -300,7 +302,7 @@ def test_ratios_are_to_the_fastest_librarys_next_case() -> None:
         for k in range(4)
     ]
     found = compared(pd.DataFrame(lines)).set_index(["solver", "threads"])["to_library"]
-    np.testing.assert_allclose(found["newton", 1], [np.nan, 0.125, 0.25, 0.75])
+    np.testing.assert_allclose(found["newton", 1], [np.nan, 0.25, 0.5, 1.5])
     np.testing.assert_allclose(found["newton", 2], [np.nan, 0.25, 0.25, 0.25])
     np.testing.assert_allclose(found["proxqp", 2], [np.nan, 0.5, 1.0, 4.5])
     assert found["clarabel", 1].isna().all()
