@@ -35,7 +35,8 @@ def check(job: Job, directory: Path, allowed_mm: float, console: Console) -> int
             style="red",
         )
         table = Table("contact", "x, mm", "y, mm", "cases", "largest, mm", title="Most often exceeded")
-        for k in np.argsort(-found.shares, kind="stable")[:SHOWN]:
+        most_often = np.argsort(-found.shares, kind="stable")[:SHOWN]
+        for k in most_often[found.shares[most_often] > 0]:
             place = ["–", "–"] if series.nodes is None else [f"{value:.4g}" for value in series.nodes[k]]
             table.add_row(str(k), *place, f"{found.shares[k]:.1%}", f"{found.largest[k]:.4g}")
         console.print(table)
