@@ -14,16 +14,17 @@ from solvers.plugin import load_plugin
 from solvers.registry import in_house, make_solver, modules, solver_names, solver_version
 
 NAMES = solver_names()
-LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")
+IN_HOUSE = ["gi", "ipm", "ipm-fast", "mprgp", "newton", "projected-newton"]
+LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp", "l-bfgs-b", "nnls")
 
 
 def test_solvers_are_found_by_their_files() -> None:
     """In-house ones first, then the libraries, then what qpsolvers finds."""
-    assert list(modules()) == ["gi", "ipm", "ipm-fast", "newton", *sorted(LIBRARIES)]
+    assert list(modules()) == [*IN_HOUSE, *sorted(LIBRARIES)]
     assert NAMES[: len(modules())] == list(modules())
     assert {"quadprog", "daqp", "qpalm"} <= set(NAMES)
     assert len(NAMES) == len(set(NAMES))
-    assert [name for name in NAMES if in_house(name)] == ["gi", "ipm", "ipm-fast", "newton"]
+    assert [name for name in NAMES if in_house(name)] == IN_HOUSE
 
 
 def test_what_the_report_takes_for_in_house_in_older_rows_still_is() -> None:
@@ -48,6 +49,9 @@ def test_versions_are_those_installed(name: str) -> None:
         ("osqp", {"eps_abs": 1e-3}, ["options.eps_abs", "no such option"]),
         ("clarabel", {"equilibrate_enable": 1}, ["options.equilibrate_enable", "default True"]),
         ("quadprog", {"tol": 1}, ["options.tol", "no options"]),
+        ("l-bfgs-b", {"maxcor": 0}, ["options.maxcor = 0", "whole number from 1"]),
+        ("mprgp", {"preconditioner": "U", "max_products": 0}, ["'band', 'face', 'none'", "at least 1"]),
+        ("projected-newton", {"max_iterations": 0}, ["max_iterations = 0", "at least 1"]),
     ],
 )
 def test_bad_names_and_options_are_input_errors(name: str, options: dict[str, Any], words: list[str]) -> None:

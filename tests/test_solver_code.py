@@ -71,9 +71,9 @@ def test_words_and_layout_do_not_count(package: Path) -> None:
 
 def test_a_constant_two_imports_down_counts_for_those_who_use_it(package: Path) -> None:
     before = hashes(package)
-    # newton → active_set → kkt; gi and ipm-fast end on the same way; ipm and the libraries do not
+    # newton → active_set → kkt, and so all in-house methods but ipm; the libraries do not
     change(package / "kkt.py", "EPS = float(np.finfo(float).eps)", "EPS = 2 * float(np.finfo(float).eps)")
-    assert changed(package, before) == {"newton", "gi", "ipm-fast"}
+    assert changed(package, before) == {"newton", "gi", "ipm-fast", "mprgp", "projected-newton"}
 
 
 def test_what_all_are_made_of_counts_for_all(package: Path) -> None:

@@ -29,13 +29,13 @@ from solvers.base import Answer, LoadCase
 from solvers.kkt import kkt_status, rounding_of
 from solvers.linear_algebra.product import products
 
+from .banded_sets import BandedSets
 from .block_pivoting import ROUNDING_FACTOR, block_pivoting, wrong_signs
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
 MAX_SWEEPS = 20  # enough even if a sweep only halves the error
 SETS_PER_SWEEP = 3  # contact sets per sweep: where a product with Q is cheap, more do not pay off
-SIGN_UNCERTAINTY = 1e-5  # of |y_C| before a sweep: smaller values have no reliable sign
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further sweep
 STALLED = 2  # sweeps that do not halve |y_C|: what is left may be rounding
 STEP_RANGE = 0.5, 2.0  # beyond it, a step is rounding
@@ -152,7 +152,7 @@ class BatchedSweeps:
 
     def _banded_step(self, case: Case, compliance: Vector, tolerance: float) -> Vector:
         """λ (m,) of the case with Q replaced by M⁻¹; conjugate to the step before on an unchanged set."""
-        banded = _BandedSets(self.M, case.trial, case.factor)
+        banded = BandedSets(self.M, case.trial, case.factor)
         found = block_pivoting(
             banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, self.sets_per_sweep
         )
@@ -199,21 +199,6 @@ class BatchedSweeps:
         if status != "solved":
             details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
         return Answer(status, lam, iterations=case.sweeps, inner_iterations=case.sets, details=details)
-
-
-class _BandedSets:
-    """λ and y of one contact set after another, with M in place of Q⁻¹."""
-
-    def __init__(self, M: BandedInverse, start: TrialSolution, factor: BandFactor | None) -> None:
-        self.M, self.b, self.factor = M, start.lam - M.product(start.y), factor
-        self.uncertainty = SIGN_UNCERTAINTY * start.rounding
-
-    def at(self, C: Set) -> TrialSolution:
-        N = ~C
-        if self.factor is None or (self.factor.S ^ N).any():
-            self.factor = self.M.factor(N)
-        y = -self.factor.solve(self.b)
-        return TrialSolution(np.where(C, self.b + self.M.product(y), 0.0), y, self.uncertainty)
 
 
 def nearest(cases: Sequence[Case], p: Vector) -> Case:

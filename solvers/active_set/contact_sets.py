@@ -31,7 +31,7 @@ class TrialSolution:
     rounding: float
 
 
-class _Principal:
+class Principal:
     """G_SS u_S = b_S for a sequence of sets S, refactored when S differs too much from the base."""
 
     def __init__(self, G: Matrix) -> None:
@@ -47,7 +47,7 @@ class _Principal:
             self.factorisations += 1
 
 
-class _Closed(_Principal):
+class _Closed(Principal):
     """The unknowns are λ_C, G = Q."""
 
     def __init__(self, Q: Matrix, p: Vector) -> None:
@@ -63,7 +63,7 @@ class _Closed(_Principal):
         return self.factor.solve(r)
 
 
-class _Open(_Principal):
+class _Open(Principal):
     """The unknowns are y_N, G = Q⁻¹."""
 
     def __init__(self, inverse: Matrix, p: Vector, compliance: Vector) -> None:

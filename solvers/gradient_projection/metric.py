@@ -1,0 +1,117 @@
+"""B ≈ Q, by which faces are preconditioned and gradients projected: the diagonal of Q, or a banded M⁻¹.
+
+A step from (λ, y), y = Qλ − p, minimises yᵀd + ½dᵀBd over λ + d ≥ 0, with
+
+    B = diag(Q)/ᾱ    d = max(λ − ᾱ y/diag(Q), 0) − λ, of Dostál only on the face, or only off it
+    B = M⁻¹          by block principal pivoting with band factorisations, on all contacts
+
+The preconditioner on a face F, N the other contacts, is B_FF⁻¹: for B = M⁻¹
+
+    (M⁻¹)_FF⁻¹ = M_FF − M_FN M_NN⁻¹ M_NF,
+
+two band products and a band solution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from problems.forms.assembly import Vector
+from problems.forms.banded_inverse import BandedInverse, BandFactor
+from problems.forms.compliance import AnyQ
+from solvers.active_set.banded_sets import BandedSets
+from solvers.active_set.block_pivoting import block_pivoting
+from solvers.active_set.bordered_factor import Set
+from solvers.active_set.contact_sets import TrialSolution
+from solvers.linear_algebra.product import product
+
+STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
+POWER_STEPS = 30  # products for λmax, once per assembly
+MAX_SETS = 200  # contact sets per projection with M
+
+
+class Metric(Protocol):
+    """alpha : ᾱ. sets : contact sets tried in this load case."""
+
+    alpha: float
+    sets: int
+
+    def precondition(self, F: Set, r: Vector) -> Vector:
+        """B_FF⁻¹ r_F, zero off F."""
+
+    def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
+        """d with λ + d ≥ 0. expanding : whether the face is to shrink, or else to grow."""
+
+
+class Diagonal:
+    """B = diag(Q)/ᾱ, ᾱ = 1.9/λmax(diag(Q)⁻¹Q)."""
+
+    def __init__(self, diagonal: Vector, alpha: float) -> None:
+        self.diagonal, self.alpha, self.sets = diagonal, alpha, 0
+
+    def precondition(self, F: Set, r: Vector) -> Vector:
+        return np.where(F, r, 0.0) / self.diagonal
+
+    def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
+        part = np.where(lam > 0, y if expanding else 0.0, 0.0 if expanding else np.minimum(y, 0.0))
+        step: Vector = np.maximum(lam - self.alpha * part / self.diagonal, 0.0) - lam
+        return step
+
+
+class Face(Diagonal):
+    """The same, but for the preconditioner, which is that of Band."""
+
+    def __init__(self, M: BandedInverse, diagonal: Vector, alpha: float) -> None:
+        super().__init__(diagonal, alpha)
+        self.band = Band(M, diagonal)
+
+    def precondition(self, F: Set, r: Vector) -> Vector:
+        return self.band.precondition(F, r)
+
+
+@dataclass
+class Band:
+    """B = M⁻¹. diagonal : of Q."""
+
+    M: BandedInverse
+    diagonal: Vector
+    alpha: float = 1.0
+    sets: int = 0
+    factor: BandFactor | None = None
+
+    def precondition(self, F: Set, r: Vector) -> Vector:
+        order = self.M.order
+        N = ~F[order]
+        if self.factor is None or (self.factor.S ^ N).any():
+            self.factor = self.M.factor(N)
+        v = self.M.product(np.where(F, r, 0.0)[order])
+        z = np.empty_like(r)
+        z[order] = v - self.M.product(self.factor.solve(v))
+        z[~F] = 0.0
+        return z
+
+    def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
+        order = self.M.order
+        own, gap, compliance = lam[order], y[order], self.diagonal[order]
+        C = np.where(own > 0, compliance * own > gap, gap < 0)
+        start = TrialSolution(own, gap, float(abs(gap[own > 0]).max(initial=0.0)))
+        banded = BandedSets(self.M, start, self.factor)
+        found = block_pivoting(banded.at, C, compliance, 0.0, MAX_SETS)
+        self.factor, self.sets = banded.factor, self.sets + found.passes
+        d = np.empty_like(lam)
+        d[order] = np.maximum(found.trial.lam, 0.0) - own
+        return d
+
+
+def step_length(Q: AnyQ, diagonal: Vector) -> float:
+    """ᾱ of `Diagonal`, with λmax by the power method, in `POWER_STEPS` products."""
+    root = np.sqrt(diagonal)
+    v, largest = np.random.default_rng(0).uniform(0.5, 1.5, len(root)), 1.0
+    for _ in range(POWER_STEPS):
+        v /= np.linalg.norm(v)
+        v = product(Q, v / root) / root
+        largest = float(np.linalg.norm(v))
+    return STEP_LENGTH / largest

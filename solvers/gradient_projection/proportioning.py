@@ -1,0 +1,127 @@
+"""Modified proportioning with reduced gradient projections (MPRGP) for min ½λᵀQλ − pᵀλ, λ ≥ 0.
+
+Z. Dostál and J. Schöberl, Comput. Optim. Appl. 30:23–43, 2005. With the face F = {λ > 0}, y = Qλ − p, the
+diagonal D of Q and the B ≈ Q of metric.py, the gradient is split into
+
+    φ = y on F        φ̃ = min(φ, Dλ/ᾱ)        β = min(y, 0) off F
+
+A point with βᵀD⁻¹β ≤ φ̃ᵀD⁻¹φ is proportional: F is then explored by conjugate gradients, preconditioned with
+B_FF⁻¹; where their step leaves λ ≥ 0, it ends at the boundary and an expansion follows, the projection of the
+free gradient. At any other point the step is a proportioning, which frees contacts with y < 0.
+
+A projection d is taken in full if that decreases the objective, −yᵀd/dᵀQd > ½, else up to the minimum along
+it, as is one that only frees contacts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from problems.forms.assembly import Vector
+from problems.forms.compliance import AnyQ
+from solvers.active_set.bordered_factor import Set
+from solvers.kkt import kkt_residual, rounding_of
+from solvers.linear_algebra.product import product
+
+from .metric import Metric
+
+RESIDUAL_TARGET = 0.1  # of the tolerance
+RECOMPUTED = 50  # steps after which y is computed anew
+STALLED = 5  # computations anew that have not halved the KKT residual: what is left is rounding
+
+
+@dataclass
+class Proportioning:
+    """A load case: λ (m,) N and y = Qλ − p (m,) mm.
+
+    products : with Q. before : the last conjugate direction, Q times it, and its face.
+    """
+
+    Q: AnyQ
+    p: Vector
+    diagonal: Vector
+    metric: Metric
+    lam: Vector
+    y: Vector
+    products: int = 0
+    steps: dict[str, int] = field(default_factory=lambda: {"cg": 0, "expansion": 0, "proportioning": 0})
+    before: tuple[Vector, Vector, Set] | None = None
+
+    def times_Q(self, v: Vector) -> Vector:
+        self.products += 1
+        return product(self.Q, v)
+
+    def solve(self, tolerance: float, max_products: int) -> bool:
+        """Until the KKT residual is at most max(tolerance/10, rounding) mm, or rounding leaves no more; False
+        if the products were not enough. λ and y then are those of the smallest residual computed anew.
+        """
+        best, since, stalled = (np.inf, self.lam, self.y), 0, 0
+        while True:
+            target = max(RESIDUAL_TARGET * tolerance, rounding_of(self.p, self.y))
+            enough = self.products >= max_products
+            moved = not enough and kkt_residual(self.lam, self.y) > target and self._step()
+            since += 1
+            if moved and since < RECOMPUTED:
+                continue
+            self.y, self.before, since = self._times_Q(self.lam) - self.p, None, 0
+            residual = kkt_residual(self.lam, self.y)
+            stalled = 0 if moved or residual < best[0] / 2 else stalled + 1
+            best = min(best, (residual, self.lam, self.y), key=lambda each: each[0])
+            done = residual <= target or stalled == STALLED or (stalled and residual <= tolerance)
+            if enough or done:
+                _, self.lam, self.y = best
+                return bool(done)
+
+    def _step(self) -> bool:
+        """False if no direction decreases the objective, as rounding makes it."""
+        F = self.lam > 0
+        proportional = self._is_proportional(F)
+        if proportional and self._conjugate_gradients(F):
+            self.steps["cg"] += 1
+            return True
+        self.before = None
+        self.steps["expansion" if proportional else "proportioning"] += 1
+        return self._project(self.metric.projection(self.lam, self.y, proportional))
+
+    def _is_proportional(self, F: Set) -> bool:
+        free, chopped = self.y[F], np.minimum(self.y[~F], 0.0)
+        reduced = np.minimum(free, self.diagonal[F] * self.lam[F] / self.metric.alpha)
+        return bool(chopped @ (chopped / self.diagonal[~F]) <= reduced @ (free / self.diagonal[F]))
+
+    def _conjugate_gradients(self, F: Set) -> bool:
+        """A step on the face; False if it had to end at the boundary."""
+        d = -self.metric.precondition(F, self.y)
+        if self.before is not None and not (self.before[2] ^ F).any():
+            last, change, _ = self.before
+            d -= (d @ change) / (last @ change) * last
+        change = self._times_Q(d)
+        slope, curvature = float(self.y @ d), float(d @ change)
+        if not (slope < 0 < curvature):
+            return False
+        shrinking = np.flatnonzero(d < 0)
+        ratios = self.lam[shrinking] / -d[shrinking]
+        length = min(-slope / curvature, float(ratios.min(initial=np.inf)))
+        inside = length == -slope / curvature
+        lam = np.maximum(self.lam + length * d, 0.0)
+        if not inside:
+            lam[shrinking[ratios.argmin()]] = 0.0
+        self.lam, self.y = lam, self.y + length * change
+        self.before = d, change, F
+        return inside
+
+    def _project(self, d: Vector) -> bool:
+        slope = float(self.y @ d)
+        if not slope < 0:
+            return False
+        change = self._times_Q(d)
+        length = -slope / float(d @ change)
+        if length > 1 / 2 and (d < 0).any():
+            length = 1.0
+        self.lam, self.y = np.maximum(self.lam + length * d, 0.0), self.y + length * change
+        return True
+
+    def _times_Q(self, v: Vector) -> Vector:
+        self.products += 1
+        return product(self.Q, v)

@@ -1,0 +1,112 @@
+"""Modified proportioning with reduced gradient projections for min ½λᵀQλ − pᵀλ, λ ≥ 0.
+
+Z. Dostál and J. Schöberl, Comput. Optim. Appl. 30:23–43, 2005: conjugate gradients on the face λ > 0, as long
+as the other contacts' share of the gradient is small; projected gradient steps and proportioning change the
+face (solvers/gradient_projection/proportioning.py). The only operation with Q is a product.
+
+With a banded M ≈ Q⁻¹, the face is preconditioned, and gradients are projected in the norm of M⁻¹. To
+precondition the face alone is not enough: Q is a compliance, so a gradient step of length 1/λmax(Q) moves
+smooth fields only, and the face changes contact by contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from problems.errors import Fault, InputError
+from problems.forms.assembly import Matrix, Vector
+from problems.forms.banded_inverse import banded_inverse
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
+from solvers.gradient_projection.proportioning import Proportioning
+from solvers.kkt import kkt_status
+
+PRECONDITIONERS = ("band", "face", "none")
+
+
+@dataclass(frozen=True)
+class _Ready:
+    Q: Matrix
+    diagonal: Vector
+    metric: Callable[[], Metric]
+    start: WarmStart | None = None
+
+
+class Mprgp(Solver):
+    """MPRGP with Γ = 1, from λ = 0 or a warm start.
+
+    Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with y = Qλ − p
+    computed anew, or when such a computation has not halved what is below the tolerance, or five what is
+    above. "solved" if it then is at most max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations
+    are steps, inner iterations contact sets tried with M; details count the products with Q per load case.
+
+    Options
+    -------
+    preconditioner : "band", M on the face and in the projections; "face", M on the face and diag(Q) in the
+        projections; "none", diag(Q) in both.
+    max_products : limit on the products with Q.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+
+    def __init__(self, *, preconditioner: str = "band", max_products: int = 100_000) -> None:
+        faults = []
+        if preconditioner not in PRECONDITIONERS:
+            faults.append(
+                Fault("mprgp", "preconditioner", preconditioner, f"must be one of {PRECONDITIONERS}")
+            )
+        if max_products < 1:
+            faults.append(Fault("mprgp", "max_products", max_products, "must be at least 1"))
+        if faults:
+            raise InputError(faults)
+        self.preconditioner, self.max_products = preconditioner, max_products
+
+    def prepare(self, data: Problem) -> _Ready | Answer:
+        """M and ᾱ, by 30 products, as the option needs them; a failed answer if M finds Q indefinite."""
+        Q, nodes = data.Q, data.assembly.contact_nodes
+        diagonal = np.diag(Q).copy()
+        if self.preconditioner == "none":
+            return _Ready(Q, diagonal, partial(Diagonal, diagonal, step_length(Q, diagonal)))
+        try:
+            M = banded_inverse(Q, nodes)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+        if self.preconditioner == "band":
+            return _Ready(Q, diagonal, partial(Band, M, diagonal))
+        return _Ready(Q, diagonal, partial(Face, M, diagonal, step_length(Q, diagonal)))
+
+    def update(
+        self, state: _Ready | Answer, ready: object, load: LoadCase, tolerance: float, start: WarmStart
+    ) -> _Ready | Answer:
+        """From the forces of the warm start."""
+        return state if isinstance(state, Answer) else replace(state, start=start)
+
+    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
+        try:
+            return self._solved(ready, load, tolerance)
+        except np.linalg.LinAlgError as error:
+            return failed(str(error))
+
+    def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+        lam, y = np.zeros_like(load.p), -load.p
+        if ready.start is not None:
+            lam, y = np.maximum(ready.start.lam, 0.0), ready.start.gap + ready.start.load.p - load.p
+        metric = ready.metric()
+        case = Proportioning(ready.Q, load.p, ready.diagonal, metric, lam, y)
+        enough = case.solve(tolerance, self.max_products)
+        status, residual = kkt_status(ready.Q, load.p, case.lam, case.y, tolerance)
+        details: dict[str, Any] = {"products": case.products, "kkt_residual_mm": residual}
+        details |= {"steps": case.steps}
+        if status == "inaccurate":
+            status = "inaccurate" if enough else "iteration_limit"
+            tried = "rounding" if enough else f"max_products = {self.max_products}"
+            details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
+        steps = sum(case.steps.values())
+        return Answer(status, case.lam, iterations=steps, inner_iterations=metric.sets, details=details)

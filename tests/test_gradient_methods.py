@@ -1,0 +1,143 @@
+"""MPRGP and projected Newton: their steps, what they count, and where they start."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from small import make_load, make_prepared, make_strips, solve_by_nnls
+
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.banded_inverse import banded_inverse
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.base import Answer, WarmStart
+from solvers.gradient_projection import metric, proportioning
+from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
+from solvers.gradient_projection.proportioning import Proportioning
+from solvers.methods import projected_newton
+from solvers.registry import make_solver
+
+TOLERANCE = 1e-10
+VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    *(("mprgp", {"preconditioner": kind}) for kind in ("band", "face", "none")),
+    ("projected-newton", {}),
+]
+
+
+def strips(contacts: int) -> tuple[Prepared, LoadCase]:
+    """Contacts in a row, five windows of M long and more, with nearly as many open as closed."""
+    prepared = make_strips(contacts)
+    return prepared, make_load(3, prepared)[1]
+
+
+def solved(name: str, options: dict[str, Any], prepared: Prepared, load: LoadCase) -> Answer:
+    solver = make_solver(name, options)
+    state = solver.prepare(solver.convert(in_form(prepared, "dual")))
+    return solver.solve(solver.setup(state, load, TOLERANCE), load, TOLERANCE)
+
+
+@pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
+@pytest.mark.parametrize("kind", ["parts", "strips"])
+def test_each_variant_agrees_with_nnls(name: str, options: dict[str, Any], kind: str) -> None:
+    if kind == "parts":
+        prepared = make_prepared(2, 20, 5)
+        load = make_load(3, prepared)[1]
+    else:
+        prepared, load = strips(400)
+    x, lam = solve_by_nnls(prepared, load)
+    assert 0 < np.count_nonzero(lam) < len(lam)
+    answer = solved(name, options, prepared, load)
+    assert answer.status == "solved"
+    assert answer.lam is not None
+    np.testing.assert_allclose(prepared.recover(answer.lam, load), x, rtol=0, atol=1e-8)
+
+
+def metrics(prepared: Prepared) -> dict[str, Metric]:
+    Q = prepared.Q
+    M, d = banded_inverse(Q, None), np.diag(Q).copy()
+    alpha = step_length(Q, d)
+    return {"band": Band(M, d), "face": Face(M, d, alpha), "none": Diagonal(d, alpha)}
+
+
+@pytest.mark.parametrize("kind", ["band", "face", "none"])
+def test_no_step_increases_the_objective(kind: str) -> None:
+    prepared, load = strips(400)
+    Q, p = prepared.Q, load.p
+    case = Proportioning(Q, p, np.diag(Q).copy(), metrics(prepared)[kind], np.zeros_like(p), -p)
+    before = 0.0
+    for _ in range(200):
+        if not case._step():
+            break
+        assert case.lam.min() >= 0
+        np.testing.assert_allclose(case.y, Q @ case.lam - p, rtol=0, atol=1e-9 * abs(p).max())
+        objective = float(case.lam @ (Q @ case.lam / 2 - p))
+        assert objective <= before + 1e-13 * abs(before)
+        before = objective
+    assert set(case.steps) == {"cg", "expansion", "proportioning"}
+    assert case.steps["cg"] * case.steps["proportioning"] > 0
+
+
+def test_the_preconditioner_of_a_face_is_the_inverse_of_that_block() -> None:
+    prepared, load = strips(300)
+    M = banded_inverse(prepared.Q, None)
+    whole = np.column_stack([M.product(unit) for unit in np.eye(300)])
+    F = np.random.default_rng(0).random(300) < 0.6
+    expected = np.zeros(300)
+    expected[F] = np.linalg.solve(np.linalg.inv(whole)[np.ix_(F, F)], load.p[F])
+    found = Band(M, np.diag(prepared.Q).copy()).precondition(F, load.p)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * abs(expected).max())
+
+
+def test_the_step_length_is_below_two_over_the_largest_eigenvalue() -> None:
+    Q = make_strips(200).Q
+    root = np.sqrt(np.diag(Q))
+    largest = np.linalg.eigvalsh(Q / root / root[:, None])[-1]
+    assert 1.5 < step_length(Q, np.diag(Q).copy()) * largest < 2
+
+
+@pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
+def test_the_products_that_are_told_are_those_made(
+    name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    for module in (metric, proportioning, projected_newton):
+        original = module.product  # type: ignore[attr-defined]
+
+        def counted(Q: Any, v: Vector, original: Any = original) -> Vector:
+            made.append(1)
+            found: Vector = original(Q, v)
+            return found
+
+        monkeypatch.setattr(module, "product", counted)
+    prepared, load = strips(120)
+    solver = make_solver(name, options)
+    state = solver.prepare(solver.convert(in_form(prepared, "dual")))
+    made.clear()
+    answer = solver.solve(solver.setup(state, load, TOLERANCE), load, TOLERANCE)
+    assert answer.details["products"] == len(made) > 0
+
+
+@pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
+def test_from_its_own_answer_little_is_left_to_do(name: str, options: dict[str, Any]) -> None:
+    prepared, load = strips(120)
+    cold = solved(name, options, prepared, load)
+    assert cold.lam is not None
+    solver = make_solver(name, options)
+    state = solver.prepare(solver.convert(in_form(prepared, "dual")))
+    start = WarmStart(load, cold.lam, prepared.Q @ cold.lam - load.p)
+    warm = solver.solve(solver.update(state, state, load, TOLERANCE, start), load, TOLERANCE)
+    assert warm.status == "solved"
+    assert warm.details["products"] <= min(5, cold.details["products"])
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("mprgp", {"max_products": 3, "preconditioner": "none"}), ("projected-newton", {"max_iterations": 2})],
+    ids=str,
+)
+def test_a_limit_that_was_reached_is_said(name: str, options: dict[str, Any]) -> None:
+    answer = solved(name, options, *strips(400))
+    assert answer.status == "iteration_limit"
+    assert next(iter(options)) in answer.details["cause"]

@@ -1,0 +1,54 @@
+"""SciPy's optimisers: what they say of their answers, and how far off these are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small import make_load, make_prepared, make_strips, solve_by_nnls
+
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.base import Answer
+from solvers.libraries import l_bfgs_b
+from solvers.registry import make_solver
+
+EPS = float(np.finfo(float).eps)
+
+
+def solved(name: str, prepared: Prepared, load: LoadCase, tolerance: float = 1e-9) -> Answer:
+    solver = make_solver(name, {})
+    state = solver.prepare(solver.convert(in_form(prepared, "dual")))
+    return solver.solve(solver.setup(state, load, tolerance), load, tolerance)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"), [*(("parts", seed) for seed in range(5)), ("strips", 1), ("strips", 3)]
+)
+def test_l_bfgs_b_ends_where_its_objective_is_rounded(kind: str, seed: int) -> None:
+    """½‖x − x*‖²_K = ½‖λ − λ*‖²_Q ≤ f(λ) − f(λ*), and rounding leaves a few ε|f|."""
+    prepared = make_prepared(seed, 20, 5) if kind == "parts" else make_strips(40)
+    case, load = make_load(seed, prepared)
+    x, lam = solve_by_nnls(prepared, case)
+    answer = solved("l-bfgs-b", prepared, load)
+    assert answer.lam is not None
+    assert answer.status == "inaccurate"
+    objective = load.p @ lam / 2
+    compliance = np.diag(prepared.solve_K(np.eye(prepared.assembly.n))).max()
+    off = abs(prepared.recover(answer.lam, case) - x).max()
+    assert off <= np.sqrt(2 * 10 * EPS * objective * compliance)
+
+
+def test_l_bfgs_b_that_met_no_tolerance_does_not_say_solved() -> None:
+    prepared = make_strips(40)
+    _, load = make_load(3, prepared)
+    answer = solved("l-bfgs-b", prepared, load, 1e-300)
+    assert answer.status == "inaccurate"
+    assert answer.details["products"] > 10
+
+
+def test_a_limit_that_was_reached_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(l_bfgs_b, "LIMIT", 3)
+    prepared = make_strips(40)
+    _, load = make_load(3, prepared)
+    assert solved("l-bfgs-b", prepared, load).status == "iteration_limit"
