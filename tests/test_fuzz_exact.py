@@ -18,7 +18,7 @@ from fuzz_log import Log, contained, max_error
 from long import draws
 from numpy.typing import NDArray
 from promises import promised, promises
-from solving import TOLERANCES
+from solving import SLOW, TOLERANCES
 
 from harness import InputError, own_matrices, solve_dual
 from harness.measurement.solver_session import SolverSession
@@ -40,7 +40,10 @@ LARGEST_CONDITION = 1e13  # the commands refuse 1e14
 
 Variant = tuple[str, Form, dict[str, Any]]
 USUAL: list[Variant] = [
-    (name, form, {}) for name in modules() if in_house(name) for form in make_solver(name, {}).forms
+    (name, form, {})
+    for name in modules()
+    if in_house(name) and name not in SLOW
+    for form in make_solver(name, {}).forms
 ]
 OTHERS: list[Variant] = [
     ("newton", "dual", {"nested": False}),

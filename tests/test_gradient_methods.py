@@ -1,4 +1,4 @@
-"""MPRGP and projected Newton: their steps, what they count, and where they start."""
+"""MPRGP, projected Newton, Lemke and Gauss–Seidel: steps, what they count, and where they start."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
+from harness.verification.judge import conditioned_limit
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.banded_inverse import banded_inverse
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.manufactured.ladder import make_rung
+from solvers.active_set import parametric_path
+from solvers.active_set.parametric_path import ParametricPath
 from solvers.base import Answer, WarmStart
 from solvers.gradient_projection import metric, proportioning
 from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
@@ -23,6 +27,7 @@ TOLERANCE = 1e-10
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     *(("mprgp", {"preconditioner": kind}) for kind in ("band", "face", "none")),
     ("projected-newton", {}),
+    ("lemke", {}),
 ]
 
 
@@ -102,7 +107,7 @@ def test_the_products_that_are_told_are_those_made(
     name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = []
-    for module in (metric, proportioning, projected_newton):
+    for module in (metric, proportioning, parametric_path, projected_newton):
         original = module.product  # type: ignore[attr-defined]
 
         def counted(Q: Any, v: Vector, original: Any = original) -> Vector:
@@ -134,10 +139,70 @@ def test_from_its_own_answer_little_is_left_to_do(name: str, options: dict[str, 
 
 @pytest.mark.parametrize(
     ("name", "options"),
-    [("mprgp", {"max_products": 3, "preconditioner": "none"}), ("projected-newton", {"max_iterations": 2})],
+    [
+        ("mprgp", {"max_products": 3, "preconditioner": "none"}),
+        ("projected-newton", {"max_iterations": 2}),
+        ("lemke", {"max_pivots": 0.01}),
+        ("projected-gauss-seidel", {"max_sweeps": 3}),
+    ],
     ids=str,
 )
 def test_a_limit_that_was_reached_is_said(name: str, options: dict[str, Any]) -> None:
     answer = solved(name, options, *strips(400))
     assert answer.status == "iteration_limit"
     assert next(iter(options)) in answer.details["cause"]
+
+
+def test_a_path_solves_the_problem_at_each_of_its_points() -> None:
+    """λ and y are those of p − td, and of the contacts of C and of the others none has the wrong sign."""
+    prepared, load = strips(60)
+    Q, p, d = prepared.Q, load.p, np.full(60, 1.0)
+    path = ParametricPath(Q, p, d, float(p.max()), np.empty(0, dtype=np.intp))
+    while path.t > 0:
+        before = path.t
+        path._pivot()
+        assert path.t <= before
+        np.testing.assert_allclose(path.y, Q @ path.lam - p + path.t * d, rtol=0, atol=1e-12 * abs(p).max())
+        assert path.lam.min() >= -1e-9
+        assert path.y.min() >= -1e-12
+        assert abs(path.y[path.lam > 0]).max(initial=0.0) <= 1e-12 * abs(p).max()
+    _, lam = solve_by_nnls(prepared, load)
+    np.testing.assert_allclose(path.lam, lam, rtol=0, atol=1e-6)
+
+
+def test_contacts_that_reach_zero_together_do_not_stop_a_path() -> None:
+    """A uniform load on equal strips: p is symmetric, and d = 1 leaves every tie as it is."""
+    prepared = make_strips(41)
+    f = np.r_[np.full(41, 1e3), np.full(41, -1e3)]
+    case = LoadCase(f, np.full(41, 0.1))
+    p = prepared.dual_load(case)
+    np.testing.assert_allclose(p, p[::-1], rtol=1e-12)
+    path = ParametricPath(prepared.Q, p, np.ones(41), float(p.max()), np.empty(0, dtype=np.intp))
+    assert path.follow(1000)
+    np.testing.assert_allclose(path.lam, solve_by_nnls(prepared, case)[1], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("relaxation", [0.5, 1.0, 1.5, 1.9])
+def test_gauss_seidel_converges_for_any_relaxation_below_two(relaxation: float) -> None:
+    prepared, load = strips(40)
+    x, _ = solve_by_nnls(prepared, load)
+    answer = solved("projected-gauss-seidel", {"relaxation": relaxation}, prepared, load)
+    assert answer.status == "solved"
+    assert answer.lam is not None
+    np.testing.assert_allclose(prepared.recover(answer.lam, load), x, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("rung", ["1e+06", "1e+08", "1e+10"])
+def test_gauss_seidel_gives_up_rather_than_be_wrong(rung: str) -> None:
+    made = make_rung(f"hard/conditioning/{rung}").made
+    assert made is not None
+    assert made.x is not None
+    prepared = Prepared(made.assembly)
+    load = LoadCase(made.load.f, made.load.g, prepared.dual_load(made.load))
+    answer = solved("projected-gauss-seidel", {}, prepared, load)
+    assert answer.lam is not None
+    if answer.status == "solved":
+        off = abs(prepared.recover(answer.lam, load) - made.x).max()
+        assert off <= conditioned_limit(1e-7, float(rung), abs(made.x).max())
+    else:
+        assert "did not halve" in answer.details["cause"]

@@ -35,6 +35,7 @@ IN_HOUSE: list[tuple[str, Form, float]] = [
     ("gi", "primal", 1e-10),
     ("newton", "dual", 1e-10),
     ("ipm-fast", "dual", 1e-10),
+    ("lemke", "dual", 1e-10),
     ("mprgp", "dual", 1e-10),
     ("projected-newton", "dual", 1e-10),
 ]

@@ -14,7 +14,7 @@ from solvers.plugin import load_plugin
 from solvers.registry import in_house, make_solver, modules, solver_names, solver_version
 
 NAMES = solver_names()
-IN_HOUSE = ["gi", "ipm", "ipm-fast", "mprgp", "newton", "projected-newton"]
+IN_HOUSE = ["gi", "ipm", "ipm-fast", "lemke", "mprgp", "newton", "projected-gauss-seidel", "projected-newton"]
 LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp", "l-bfgs-b", "nnls")
 
 
@@ -51,6 +51,8 @@ def test_versions_are_those_installed(name: str) -> None:
         ("quadprog", {"tol": 1}, ["options.tol", "no options"]),
         ("l-bfgs-b", {"maxcor": 0}, ["options.maxcor = 0", "whole number from 1"]),
         ("mprgp", {"preconditioner": "U", "max_products": 0}, ["'band', 'face', 'none'", "at least 1"]),
+        ("lemke", {"max_pivots": 0}, ["max_pivots = 0", "positive"]),
+        ("projected-gauss-seidel", {"relaxation": 2}, ["relaxation = 2", "between 0 and 2"]),
         ("projected-newton", {"max_iterations": 0}, ["max_iterations = 0", "at least 1"]),
     ],
 )

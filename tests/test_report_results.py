@@ -40,7 +40,17 @@ def test_the_sections_stand_in_their_order() -> None:
     names = [module.__name__.removeprefix("report.sections.") for module in sections()]  # type: ignore[attr-defined]
     assert names == [
         *("ladders", "rungs"),
-        *("summary", "recommendation", "roads", "speed", "same_method", "ingredients", "scaling", "series"),
+        *(
+            "summary",
+            "recommendation",
+            "roads",
+            "speed",
+            "same_method",
+            "methods",
+            "ingredients",
+            "scaling",
+            "series",
+        ),
         *("paper.claims", "paper.table1", "paper.table2", "paper.table3", "paper.table4"),
         *("paper.figures3_4", "paper.figures5_7"),
         *("problems", "times", "accuracy", "price_list", "asked_achieved", "residual_error", "profiles"),

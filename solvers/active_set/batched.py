@@ -191,11 +191,13 @@ class BatchedSweeps:
             return self.solve_one(C, load, tolerance)
         lam, y = np.empty(len(order)), np.empty(len(order))
         lam[order], y[order] = np.maximum(case.trial.lam, 0.0), case.trial.y
-        if (case.trial.lam < 0).any():
+        cut_off = bool((case.trial.lam < 0).any())
+        if cut_off:
             y = self.gaps(lam[:, None], [load])[:, 0]
         # `kkt_status` bounds the same rounding by |Q|λ, which is slow to compute.
         status, residual = kkt_status(self.Q, load.p, lam, y, max(tolerance, rounding_of(load.p, y)))
         details: dict[str, Any] = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
+        details["products"] = case.sweeps + cut_off
         if status != "solved":
             details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
         return Answer(status, lam, iterations=case.sweeps, inner_iterations=case.sets, details=details)

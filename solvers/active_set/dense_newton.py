@@ -74,12 +74,15 @@ class DenseState:
         return self.sweeps or self._sweeps(banded_inverse(self.data.Q, self.nodes))
 
     def solve(self, load: LoadCase, tolerance: float) -> Answer:
-        C, coarse = self._first_guess(load.p, tolerance)
+        C, coarse, products = self._first_guess(load.p, tolerance)
         if self.sweeps is None or C.mean() < MIN_CLOSED:
             return replace(self._by_sets(C, load, tolerance), inner_iterations=coarse)
-        if self.start is None:
-            return self.sweeps.answer(self.sweeps.cold(load, tolerance), load, tolerance)
-        return self._warm(self.start, load, tolerance)
+        if self.start is not None:
+            return self._warm(self.start, load, tolerance)
+        answer = self.sweeps.answer(self.sweeps.cold(load, tolerance), load, tolerance)
+        if "products" in answer.details:
+            answer.details["products"] += products
+        return answer
 
     def solve_from(self, C: Set, lam: Vector, load: LoadCase, tolerance: float) -> Answer:
         """From a contact set and the forces λ on it, (m,) N."""
@@ -99,7 +102,7 @@ class DenseState:
     def _sweeps(self, M: BandedInverse) -> BatchedSweeps:
         def solve_one(C: Set | None, load: LoadCase, tolerance: float) -> Answer:
             if C is None:
-                C, _ = self._first_guess(load.p, tolerance)
+                C, _, _ = self._first_guess(load.p, tolerance)
             return self._by_sets(C, load, tolerance)
 
         return BatchedSweeps(self.data.Q, np.diag(self.data.Q), M, solve_one)
@@ -108,17 +111,18 @@ class DenseState:
         sets = ContactSets(self.data.Q, load.p, lambda: self.data.inverse)
         return solve_or_identify(C, sets, tolerance, self.max_sets, self.identified)
 
-    def _first_guess(self, p: Vector, tolerance: float) -> tuple[Set, int]:
-        """The contact set of the warm start, else of the finest subset; the number of sets tried on subsets.
+    def _first_guess(self, p: Vector, tolerance: float) -> tuple[Set, int, int]:
+        """The contact set of the warm start, else of the finest subset; the number of sets tried on subsets,
+        and of products with Q.
 
         Without a warm start and if sweeps follow, the first subset on which not few are closed is enough.
         """
-        Q, tried = self.data.Q, 0
+        Q, tried, products = self.data.Q, 0, 0
         if self.start is not None:
             lam, y = self.start.lam, self.start.gap + self.start.load.p - p  # Qλ − p
             C = np.diag(Q) * lam > y
             if (C ^ (lam > 0)).sum() <= MAX_WARM_CHANGES * len(p):
-                return C, tried
+                return C, tried, products
         C = p > 0
         for cells in self.cells:
             rows = representatives(cells, p)
@@ -128,8 +132,9 @@ class DenseState:
             lam = np.zeros(len(p))
             lam[rows] = np.where(found.C, np.maximum(found.trial.lam, 0.0), 0.0)
             C = (lam > 0) | (product(Q, lam) < p)
+            products += 1
             if self.sweeps is not None and C.mean() >= MIN_CLOSED:
                 break
         if tried and 2 * found.C.sum() > len(found.C):  # few open contacts: small factors of Q⁻¹
             C = p > 0
-        return C, tried
+        return C, tried, products

@@ -107,7 +107,7 @@ class FastIpm(Solver):
             done = residual <= tolerance or stalled == STALLED
             if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
                 answer = ready.finish.solve_from(ratio > 1, point.lam, load, tolerance)
-                details |= answer.details
+                details |= {key: value for key, value in answer.details.items() if key != "products"}
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             if done:
                 return self._ended(point, k, residual <= tolerance, details)

@@ -1,0 +1,95 @@
+"""Methods for contact problems: seconds per load case and products with Q, scene by scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pandas as pd
+
+from report.analysis.seconds import seconds_text
+from report.document.blocks import Block, Column, Place, Section, Table, Text, records, word
+from report.document.numbers import counted, listed, significant, span, whole
+from report.results.labels import in_order
+from report.results.reader import Results
+
+PLACE = Place(145)
+
+CAPTION = (
+    "*Time and products with Q*: seconds per load case, in brackets the products with Q, once per load case, "
+    "of methods that count them. A lower bound where a method ran out of time."
+)
+
+
+def section(results: Results) -> Section | None:
+    """For results in which at least two methods count their products with Q."""
+    cells = results.cells[results.cells["status"] != "unsupported"]
+    cells = cells.assign(products=[_products(cell.get("details")) for cell in records(cells)])
+    if cells.loc[cells["products"].notna(), "solver"].nunique() < 2:
+        return None
+    scenes = list(cells.sort_values(["n", "active"])["scene"].unique())
+    lines = [_line(cells[cells["method"] == method]) for method in in_order(cells, "method")]
+    columns = [word("method", "method"), *(Column(scene, _shown(scene)) for scene in scenes)]
+    blocks: list[Block] = [
+        Text(_advice(cells, scenes)),
+        Table("methods", CAPTION, pd.DataFrame(lines), columns),
+    ]
+    return Section("Methods for contact problems", blocks)
+
+
+def _products(details: object) -> float:
+    found = details.get("products") if isinstance(details, Mapping) else None
+    return float("nan") if found is None else float(found)
+
+
+def _line(cells: pd.DataFrame) -> dict[str, Any]:
+    line: dict[str, Any] = {"method": cells["method"].iloc[0]}
+    for cell in records(cells):
+        line[cell["scene"]] = seconds_text(cell)
+        line[f"{cell['scene']} products"] = cell["products"]
+    return line
+
+
+def _shown(scene: str) -> Callable[[Mapping[str, Any]], str]:
+    def text(line: Mapping[str, Any]) -> str:
+        seconds, products = line[scene], line[f"{scene} products"]
+        if not isinstance(seconds, str):
+            return ""
+        return seconds + (f" ({whole(products)})" if products == products else "")
+
+    return text
+
+
+def _advice(cells: pd.DataFrame, scenes: list[str]) -> str:
+    """Which method is the fastest, and which makes the fewest products; which are not accurate enough."""
+    within = cells[cells["verdict"] == "within"]
+    on_all = within.groupby("method")["scene"].nunique() == len(scenes)
+    complete = within[within["method"].map(on_all)]
+    words = []
+    if len(complete):
+        fastest = complete.loc[complete.groupby("scene")["load_case_s"].idxmin(), "method"].value_counts()
+        wins = [
+            f"**{name}** on {count} of {counted(len(scenes), 'scene')}" for name, count in fastest.items()
+        ]
+        words.append(
+            f"Of the methods within the limit on every scene, the fastest per load case: {listed(wins)}."
+        )
+        least = complete.dropna(subset="products").groupby("method")["products"].agg(["min", "max"])
+        least = least.sort_values("max")
+        if len(least):
+            few, many = whole(least["min"].iloc[0]), whole(least["max"].iloc[0])
+            words.append(
+                f"Where a product with Q is what costs, as in the sparse form, the fewest: "
+                f"**{least.index[0]}**, {span(few, many)} per load case."
+            )
+    missed = cells[cells["verdict"] != "within"].groupby("method", sort=False)
+    if len(missed):
+        named = [f"{name} ({_worst(group)})" for name, group in missed]
+        words.append(f"Not within the limit on every scene they were tried on: {listed(named)}.")
+    return " ".join(words)
+
+
+def _worst(cells: pd.DataFrame) -> str:
+    """How far off, or that there was no answer."""
+    error = cells["displacement_error_mm"].max()
+    return "no answer" if pd.isna(error) else f"off by up to {significant(error, 2)} mm"

@@ -1,0 +1,99 @@
+"""Lemke's method for the linear complementarity problem y = Qλ − p, λ ≥ 0, y ≥ 0, λᵀy = 0.
+
+C. E. Lemke, Management Sci. 11:681–689, 1965. The artificial variable t with a covering vector d > 0,
+y = Qλ − p + td, starts at max p_i/d_i, where λ = 0 is a solution, and for positive definite Q falls at every
+pivot: the pivots follow the solutions for p − td down to t = 0 (solvers/active_set/parametric_path.py). The
+d_i are random between 1 and 2, so that contacts with equal p_i do not reach zero at the same t. In a series,
+d is the change of p from the load case whose answer is the start, and t goes from 1 to 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from problems.errors import InputError
+from problems.forms.assembly import Matrix, Vector
+from solvers.active_set.contact_sets import ContactSets
+from solvers.active_set.parametric_path import ParametricPath
+from solvers.active_set.solve import solve_from
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.kkt import kkt_status
+
+FINISHING_SETS = 1000
+
+
+@dataclass(frozen=True)
+class _Ready:
+    Q: Matrix
+    start: WarmStart | None = None
+
+
+class Lemke(Solver):
+    """Lemke's pivots, with a factor of Q_CC that grows and shrinks.
+
+    Ends at t = 0 with λ_C refined: "solved" if max(max(−y), max_{λ>0} |y|) ≤ max(tolerance,
+    4ε max(|p| + |Q|λ)) mm. Where rounding has left a wrong sign, block principal pivoting continues from its
+    set (details: finishing_sets), and its status is the answer's. Iterations are pivots; details count the
+    products with Q unless it continues.
+
+    Options
+    -------
+    max_pivots : limit on the pivots, in units of m.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+
+    def __init__(self, *, max_pivots: float = 10.0) -> None:
+        if not max_pivots > 0:
+            raise InputError.one("lemke", "max_pivots", max_pivots, "must be positive")
+        self.max_pivots = max_pivots
+
+    def prepare(self, data: Problem) -> _Ready:
+        return _Ready(data.Q)
+
+    def update(
+        self, state: _Ready, ready: object, load: LoadCase, tolerance: float, start: WarmStart
+    ) -> _Ready:
+        """Along the change of p."""
+        return replace(state, start=start)
+
+    def solve(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+        try:
+            return self._solved(ready, load, tolerance)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+
+    def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+        Q, p = ready.Q, load.p
+        path = _cold(Q, p) if ready.start is None else _warm(Q, p, ready.start)
+        arrived = path.follow(int(self.max_pivots * len(p)) + 10)
+        if not arrived:
+            path.t = 0.0
+            path.refresh()
+        details: dict[str, Any] = {"products": path.products}
+        lam = np.maximum(path.lam, 0.0)
+        y = path.y if (path.lam >= 0).all() else Q @ lam - p
+        status, residual = kkt_status(Q, p, lam, y, tolerance)
+        if arrived and (status != "solved" or (path.lam < 0).any()):
+            closed = np.zeros(len(p), dtype=bool)
+            closed[path.C] = True
+            answer = solve_from(closed, ContactSets(Q, p), tolerance, FINISHING_SETS)
+            details = {**answer.details, "finishing_sets": answer.iterations}
+            return replace(answer, iterations=path.pivots, details=details)
+        details["kkt_residual_mm"] = residual
+        if status != "solved":
+            status = "iteration_limit"
+            details["cause"] = f"max_pivots = {self.max_pivots:g}: optimal only to {residual:.1e} mm"
+        return Answer(status, lam, iterations=path.pivots, details=details)
+
+
+def _cold(Q: Matrix, p: Vector) -> ParametricPath:
+    d = np.random.default_rng(0).uniform(1.0, 2.0, len(p))
+    return ParametricPath(Q, p, d, max(float((p / d).max(initial=0.0)), 0.0), np.empty(0, dtype=np.intp))
+
+
+def _warm(Q: Matrix, p: Vector, start: WarmStart) -> ParametricPath:
+    return ParametricPath(Q, p, p - start.load.p, 1.0, np.flatnonzero(start.lam > 0))

@@ -1,0 +1,105 @@
+"""Projected Gauss–Seidel with over-relaxation for the dual problem min ½λᵀQλ − pᵀλ, λ ≥ 0.
+
+What physics engines solve their contacts with (C. W. Cryer, SIAM J. Control 9:385–392, 1971).
+One contact after another,
+
+    λ_i ← max(0, λ_i − ω y_i/q_ii),    y ← y + Q e_i Δλ_i,    y = Qλ − p,
+
+which converges for 0 < ω < 2, by a factor of about 1 − 1/cond(Q) per sweep: a few digits soon, many never.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.linalg import blas
+
+from problems.errors import Fault, InputError
+from problems.forms.assembly import Matrix, Vector
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart
+from solvers.kkt import kkt_residual, kkt_status, rounding_of
+from solvers.linear_algebra.product import product
+
+CHECKED = 10  # sweeps after which y is computed anew
+SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slower is as good as never
+
+
+@dataclass(frozen=True)
+class _Ready:
+    Q: Matrix
+    start: WarmStart | None = None
+
+
+class ProjectedGaussSeidel(Solver):
+    """Projected Gauss–Seidel, from λ = 0 or a warm start.
+
+    Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Qλ|)) mm, looked at after every
+    ten sweeps: "solved"; or when a thousand sweeps have not halved it: "inaccurate". Iterations are sweeps;
+    one counts as a product with Q in the details.
+
+    Options
+    -------
+    relaxation : ω.
+    max_sweeps : limit on the sweeps.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+
+    def __init__(self, *, relaxation: float = 1.5, max_sweeps: int = 1_000_000) -> None:
+        where, faults = "projected-gauss-seidel", []
+        if not 0 < relaxation < 2:
+            faults.append(Fault(where, "relaxation", relaxation, "must be between 0 and 2"))
+        if max_sweeps < 1:
+            faults.append(Fault(where, "max_sweeps", max_sweeps, "must be at least 1"))
+        if faults:
+            raise InputError(faults)
+        self.relaxation, self.max_sweeps = relaxation, max_sweeps
+
+    def prepare(self, data: Problem) -> _Ready:
+        return _Ready(data.Q)
+
+    def update(
+        self, state: _Ready, ready: object, load: LoadCase, tolerance: float, start: WarmStart
+    ) -> _Ready:
+        """From the forces of the warm start."""
+        return replace(state, start=start)
+
+    def solve(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+        Q, p = ready.Q, load.p
+        lam = np.zeros_like(p) if ready.start is None else np.maximum(ready.start.lam, 0.0)
+        y, products, sweeps = product(Q, lam) - p, 1, 0
+        reached: list[float] = []  # the residual at each check
+        cause = ""
+        while True:
+            reached.append(kkt_residual(lam, y))
+            if reached[-1] <= max(tolerance, rounding_of(p, y)):
+                break
+            if sweeps >= self.max_sweeps:
+                cause = f"max_sweeps = {self.max_sweeps}"
+                break
+            if len(reached) > PATIENCE and not reached[-1] <= SLOWEST * reached[-1 - PATIENCE]:
+                cause = f"{PATIENCE * CHECKED} sweeps did not halve the KKT residual"
+                break
+            for _ in range(min(CHECKED, self.max_sweeps - sweeps)):
+                lam = _sweep(Q, lam, y, self.relaxation)
+                sweeps += 1
+            y, products = product(Q, lam) - p, products + 1
+        status, residual = kkt_status(Q, p, lam, y, tolerance)
+        details: dict[str, Any] = {"products": products + sweeps, "kkt_residual_mm": residual}
+        if status == "inaccurate":
+            status = "iteration_limit" if cause.startswith("max_sweeps") else "inaccurate"
+            details["cause"] = f"{cause}: optimal only to {residual:.1e} mm"
+        return Answer(status, lam, iterations=sweeps, details=details)
+
+
+def _sweep(Q: Matrix, lam: Vector, y: Vector, relaxation: float) -> Vector:
+    """λ after all contacts in turn; y is changed in place."""
+    columns, scale, forces = Q.T, (relaxation / np.diag(Q)).tolist(), lam.tolist()
+    for i, force in enumerate(forces):
+        step = max(-scale[i] * float(y[i]), -force)
+        if step:
+            forces[i] = force + step
+            blas.daxpy(columns[i], y, a=step)
+    return np.array(forces)
