@@ -16,8 +16,8 @@ from report.results.reader import Results
 PLACE = Place(145)
 
 CAPTION = (
-    "*Time and products with Q*: seconds per load case, in brackets the products with Q, once per load case, "
-    "of methods that count them. A lower bound where a method ran out of time."
+    "*Time and products with Q*: seconds per load case, and in brackets the products with Q per load case, "
+    "where a method counts them. A lower bound where it ran out of time."
 )
 
 
