@@ -2,11 +2,13 @@
 
 What a results directory holds is quoted when it is read: characters that mean something in Markdown, HTML,
 CSV or mathematical text become private ones (U+E000 …), which pass through sentences, labels and tables.
-Whoever writes a file spells them out for it: `markdown`, `csv_cell`, `picture`, `file_name`.
+Whoever writes a file spells them out for it: `markdown`, `script_json`, `csv_cell`, `picture`, `file_name`.
 """
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from hashlib import sha256
 from typing import Any
@@ -77,6 +79,28 @@ def markdown(page: str) -> str:
 def wrapped(text: str) -> str:
     """Quoted text that keeps its line breaks where the next line begins with a letter."""
     return re.sub(LINE_BREAK + r"(?=[^\W\d_])", "\n", text)
+
+
+def script_json(value: Any) -> str:
+    """JSON for a script element of an HTML page: texts as they were, and nothing that could end the element.
+
+    Non-finite numbers become null.
+    """
+    text = json.dumps(_unquoted(value), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.translate({ord(character): f"\\u{ord(character):04x}" for character in "<>&\u2028\u2029"})
+
+
+def _unquoted(value: Any) -> Any:
+    match value:
+        case str():
+            return plain(value)
+        case float():
+            return value if math.isfinite(value) else None
+        case dict():
+            return {plain(str(name)): _unquoted(item) for name, item in value.items()}
+        case list() | tuple():
+            return [_unquoted(item) for item in value]
+    return value
 
 
 def csv_cell(value: Any) -> Any:

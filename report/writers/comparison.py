@@ -1,4 +1,4 @@
-"""Writes what changed between runs: comparison.md, and comparison.csv with every measurement."""
+"""Writes what changed between runs: comparison.md, comparison.csv with every measurement, and index.html."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from report.analysis.solver_changes import by_solver
 from report.document.blocks import Block, Column, Section, Table, Text, number, word
 from report.document.escape import csv_frame
 from report.document.numbers import MISSING, as_number, counted, power, significant, whole
+from report.page.comparison import comparison_data
+from report.page.write import write as write_page
 
 from .markdown import save_block
 from .pages import rendered
@@ -110,6 +112,8 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
     path = out / "comparison.md"
     title = f"Compared with {comparisons[0].old}"
     path.write_text(rendered("sections.md.j2", title=title, sections=sections, csv=False), "utf-8")
+    pairs = [(each.old, each.new, each.summary, each.table) for each in comparisons]
+    write_page(out / "index.html", title, comparison_data(pairs))
     return path
 
 

@@ -1,4 +1,4 @@
-"""Writes the report of a results directory: Markdown, a PNG per figure, a CSV per table."""
+"""Writes the report of a results directory: Markdown, a PNG per figure, a CSV per table, a page in HTML."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from report.analysis.checks import warnings
 from report.document.blocks import Block, Figure, Section, Table
 from report.document.escape import csv_frame, picture
 from report.figures import style
+from report.page.run import run_data
+from report.page.write import write as write_page
 from report.results.reader import Results, read
 
 from .discovery import sections
@@ -16,7 +18,9 @@ from .pages import rendered
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md from the results in DIRECTORY and return its path.
+    """Write DIRECTORY/report/report.md from the results in DIRECTORY, and index.html beside it.
+
+    Returns the path of the former.
 
     Raises FileNotFoundError if DIRECTORY has no measurements.jsonl.
     """
@@ -32,6 +36,8 @@ def write(directory: Path) -> Path:
     path = target / "report.md"
     page = rendered("report.md.j2", results=results, parts=parts, warnings=warnings(results))
     path.write_text(page, "utf-8")
+    title = str(results.suite.get("title") or "Results")
+    write_page(target / "index.html", title, run_data(results), directory)
     return path
 
 

@@ -1,4 +1,6 @@
-"""Writes the report of a series: report.md, a PNG per figure, a CSV per figure and table."""
+"""Writes the report of a series: report.md, a PNG per figure, a CSV per figure and table,
+and a page in HTML with the maps.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +17,8 @@ from report.document.escape import csv_frame, file_name
 from report.document.numbers import counted, listed, significant, tidy_power
 from report.figures import style
 from report.figures.maps import draw
+from report.page.series import series_data
+from report.page.write import write as write_page
 from report.results.series import Series, read
 
 from .markdown import save_block
@@ -26,7 +30,10 @@ STEPS = {"setup_s": "update or set-up", "solve_s": "solve", "form_s": "x, gaps, 
 
 
 def write(directory: Path) -> Path:
-    """Write DIRECTORY/report/report.md from the series in DIRECTORY and return its path."""
+    """Write DIRECTORY/report/report.md from the series in DIRECTORY, and index.html beside it.
+
+    Returns the path of the former.
+    """
     series = read(directory)
     target = directory / "report"
     target.mkdir(exist_ok=True)
@@ -43,6 +50,9 @@ def write(directory: Path) -> Path:
     path = target / "report.md"
     title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
     path.write_text(rendered("sections.md.j2", title=title, sections=saved, csv=True), "utf-8")
+    if len(series.cases):
+        maps, names = quantile_maps(series), [*(f"{100 * q:g} % quantile" for q in QUANTILES), "mean"]
+        write_page(target / "index.html", title, series_data(series, maps, names, exceedance(series)))
     return path
 
 

@@ -1,4 +1,5 @@
-"""Writes the answer of one scene: a page in Markdown, a PNG per field, CSV files of the nodal results, VTU.
+"""Writes the answer of one scene: a page in Markdown, a PNG per field, CSV files of the nodal results, VTU,
+and a page in HTML with the maps.
 
 Reads solution.json and solution.npz of a directory, nothing else.
 """
@@ -16,6 +17,8 @@ from report.document.escape import csv_cell, picture, quoted
 from report.figures import style
 from report.figures.answer import answer_figures, pair_name
 from report.figures.maps import Array
+from report.page.answer import answer_data
+from report.page.write import write as write_page
 
 from .pages import rendered
 from .vtu import write_vtu
@@ -25,7 +28,7 @@ Rows = list[dict[str, Any]]
 
 
 def write(directory: Path) -> Path:
-    """Write answer.md and its files into DIRECTORY and return its path."""
+    """Write answer.md, index.html and their files into DIRECTORY and return the path of answer.md."""
     record = quoted(json.loads((directory / "solution.json").read_text("utf-8")))
     with np.load(directory / "solution.npz") as saved:
         arrays = {name: saved[name] for name in saved.files}
@@ -49,6 +52,7 @@ def write(directory: Path) -> Path:
     parts, pairs = _summary(record, arrays)
     page = rendered("solution.md.j2", record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu)
     path.write_text(page, "utf-8")
+    write_page(directory / "index.html", str(record["title"]), answer_data(record, arrays))
     return path
 
 

@@ -1,0 +1,40 @@
+"""The answer of one scene for the page."""
+
+from __future__ import annotations
+
+from report.document.numbers import significant
+from report.results.series import Array
+
+from .maps import answer_maps
+from .packed import Data
+
+
+def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
+    """What the page of one answer shows. record, arrays : of solution.json and solution.npz."""
+    facts = {
+        "solved by": record["method"],
+        "unknowns n": record["n"],
+        "contacts m": record["m"],
+        "verdict at 1e-7 mm": record.get("verdict"),
+        "solver's report": record.get("status"),
+        "judged error, mm": _known(record.get("judged_error_mm")),
+        "error bound, mm": _known(record.get("error_bound_mm")),
+        "memory, MiB": _known(record.get("peak_rss_mib")),
+        **{f"{step}, s": significant(seconds) for step, seconds in record.get("steps", {}).items()},
+    }
+    return {
+        "kind": "answer",
+        "banner": banner([str(record["method"])]),
+        "facts": [[name, str(value)] for name, value in facts.items() if value is not None],
+        "maps": answer_maps(record, arrays),
+    }
+
+
+def banner(lines: list[str], **more: object) -> Data:
+    """A banner without warnings; lines : what is known of machine and solver."""
+    empty = {"commits": "", "measured": "", "versions": [], "counts": "", "warnings": []}
+    return {"machines": lines} | empty | more
+
+
+def _known(value: object) -> str | None:
+    return None if value is None else significant(value)

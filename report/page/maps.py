@@ -1,0 +1,142 @@
+"""Gap maps for the page: places, gaps and forces of the contacts of scenes, answers and series.
+
+A map has `nodes` (one per group of maps on the same contacts), `fields` by name with their unit, and
+`contacts`, how many there are if only every k-th is in the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from report.figures.answer import pair_name
+from report.results.reader import Results
+from report.results.series import Array, Series
+
+from .packed import Data, exact, packed
+
+BUDGET = 1_100_000  # characters of all maps of a page
+MOST = 20_000  # contacts of a map; of more, every k-th is shown
+CASES = 60  # of a series, at most
+SHARES = (1.0, 0.99, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.0)
+
+
+def scene_maps(results: Results) -> Data:
+    """The maps of a run's scenes as far as they fit, and the names of those left out."""
+    maps: list[Data] = []
+    left_out: list[str] = []
+    shared: dict[str, int] = {}
+    groups: list[str] = []
+    spent = 0
+    for scene in results.cells.sort_values(["n", "active", "scene"])["scene"].unique():
+        arrays = results.scene_arrays(scene)
+        if not arrays or "contact_nodes" not in arrays:
+            continue
+        made = _map(scene, arrays["contact_nodes"], arrays, arrays.get("fasteners"))
+        place, fields = made.pop("nodes"), made["fields"]
+        new = 0 if place in shared else len(place)
+        size = new + sum(len(field["values"]) for field in fields)
+        if spent + size > BUDGET:
+            left_out.append(scene)
+            continue
+        spent += size
+        if place not in shared:
+            shared[place] = len(groups)
+            groups.append(place)
+        maps.append(made | {"group": shared[place]})
+    return {"groups": groups, "maps": maps, "left_out": left_out}
+
+
+def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
+    """The maps of one answer, one per pair of parts in contact."""
+    if "contact_nodes" not in arrays or not record["m"]:
+        return {"groups": [], "maps": [], "left_out": []}
+    groups, maps = [], []
+    for pair in record["pairs"]:
+        own = slice(pair["start"], pair["stop"])
+        of_pair = {name: arrays[name][own] for name in ("gap_before", "gap_after", "lam")}
+        marks = [point for points in record["marks"].values() for point in points]
+        made = _map(pair_name(pair), arrays["contact_nodes"][own], of_pair, np.array(marks).reshape(-1, 2))
+        groups.append(made.pop("nodes"))
+        maps.append(made | {"group": len(groups) - 1})
+    return {"groups": groups, "maps": maps, "left_out": []}
+
+
+def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
+    """The maps of a series: the quantiles over the cases, some cases, the worst among them, and for each
+    contact the gaps that given shares of the cases exceed.
+
+    quantiles : (len(names), m), mm.
+    """
+    if series.nodes is None or not len(series.cases) or not len(series.gaps):
+        return {"groups": [], "maps": [], "left_out": []}
+    step = _step(len(series.nodes))
+    numbers = series.cases["case"].to_numpy()
+    fields = [_field(name, values[::step]) for name, values in zip(names, quantiles, strict=True)]
+    curves = _exceeded(series, step)
+    spent = sum(len(field["values"]) for field in fields) + len(curves)
+    for case in _chosen(series):
+        field = _field(f"case {case}", np.asarray(series.gaps[case, ::step], dtype=float))
+        spent += len(field["values"])
+        if spent > BUDGET:
+            break
+        fields.append(field | {"case": int(case)})
+    fields[len(names) :] = sorted(fields[len(names) :], key=lambda field: field["case"])
+    made = {
+        "name": f"{len(numbers)} cases",
+        "contacts": len(series.nodes),
+        "every": step,
+        "fields": fields,
+        "marks": series.fasteners.tolist(),
+        "shares": list(SHARES),
+        "exceeded": curves,
+        "group": 0,
+    }
+    return {"groups": [exact(series.nodes[::step])], "maps": [made], "left_out": []}
+
+
+def _chosen(series: Series) -> Iterator[int]:
+    """The worst case, then others at equal distances."""
+    numbers = series.cases["case"].to_numpy()
+    worst = int(numbers[series.cases["max_gap_mm"].to_numpy().argmax()])
+    yield worst
+    for place in np.unique(np.linspace(0, len(numbers) - 1, CASES - 1).astype(int)):
+        if numbers[place] != worst:
+            yield int(numbers[place])
+
+
+def _exceeded(series: Series, step: int) -> str:
+    """(contacts, len(SHARES)), mm: the gap that this share of the cases exceeds."""
+    numbers, m = series.cases["case"].to_numpy(), series.gaps.shape[1]
+    found = []
+    width = max(2**22 // len(numbers), 1) * step
+    for start in range(0, m, width):
+        some = series.gaps[numbers, start : min(start + width, m) : step].astype(float)
+        found.append(np.quantile(some, 1 - np.array(SHARES), axis=0).T)
+    return packed(np.concatenate(found))
+
+
+def _map(name: str, nodes: Array, arrays: dict[str, Array], marks: Array | None) -> Data:
+    step = _step(len(nodes))
+    known = {"gap_before": ("gap before", "mm"), "gap_after": ("gap after", "mm"), "lam": ("force", "N")}
+    fields: list[dict[str, Any]] = [
+        _field(text, arrays[key][::step], unit) for key, (text, unit) in known.items() if key in arrays
+    ]
+    return {
+        "name": name,
+        "contacts": len(nodes),
+        "every": step,
+        "fields": fields,
+        "marks": [] if marks is None else marks.tolist(),
+        "nodes": exact(nodes[::step]),
+    }
+
+
+def _field(name: str, values: Array, unit: str = "mm") -> Data:
+    return {"name": name, "unit": unit, "values": packed(values)}
+
+
+def _step(contacts: int) -> int:
+    return -(-contacts // MOST)

@@ -1,0 +1,108 @@
+// The matrix of solvers × scenes: sorted by any column, as ratios to a pinned line if there is one.
+const BLUES = d3.scaleLog().domain([1, 30]).range(["#9ec9e8", "#f4f9fd"]).clamp(true);
+const NEAR = d3.scaleLog().domain([1e-5, 1]).range(["#9ec9e8", "#f4f9fd"]).clamp(true); // error over limit
+
+function matrix(main) {
+  const limit = Number(STATE.limit), {lines, fastest} = ranking(filtered(), limit);
+  if (!lines.length) return main.append(el("p", {}, "No measurement passes the filters."));
+  const scenes = DATA.scenes.filter(scene => lines.some(line => line.cells.has(scene.scene)));
+  const base = lines.find(line => line.name === STATE.base);
+  sorted(lines);
+  const errors = STATE.metric === "error";
+  const counted = errors ? "Error over the limit, the largest of the repeats. " : `Seconds, ${METRICS[STATE.metric]}, medians of the repeats. `;
+  const shade = errors ? "the darker the smaller the error" : "the darker the nearer to the fastest of the scene (bold)";
+  main.append(el("p", {class: "note"},
+    counted, base ? `Ratios to ${base.name}. ` : "",
+    `Blue: within the limit, ${shade}; × outside the limit; ⊗ outside, though reported as solved; `
+    + "? cannot be judged, because the reference error bound is above a tenth of the limit; otherwise why there is no answer. "
+    + "☆ pins a line as the baseline. Arrow keys move between cells, Enter opens the row."));
+  const upright = scenes.length > 8 ? "upright" : "";
+  const heads = [["rank", "#", "place in the ranking: share of scenes within the limit, then time over the fastest"],
+    ["name", "solver (form)", ""], ["within", "within", "scenes within the limit, of those measured"],
+    ["slower", "× fastest", "geometric mean of time over the fastest, on the scenes answered within the limit"],
+    ...scenes.map(scene => [`scene ${scene.scene}`, scene.ladder ? scene.scene.split("/").slice(1).join("/") : scene.scene, `${scene.title} n = ${scene.n}, m = ${scene.m}, active ${scene.active}`])];
+  const head = el("tr", {}, heads.map(([name, text, hint], place) => el("th", {
+    scope: "col", class: place < 2 ? `stuck${place}` : place > 3 ? upright : "",
+    "aria-sort": STATE.sort === name ? (STATE.down ? "descending" : "ascending") : "none",
+  }, el("button", {type: "button", title: hint, "data-sort": name,
+    onclick: () => update({sort: name, down: STATE.sort === name && !STATE.down ? "1" : ""})},
+  el("span", {}, text), STATE.sort === name ? (STATE.down ? " ▾" : " ▴") : ""))));
+  const body = lines.map(line => el("tr", {class: line === base ? "base" : ""},
+    el("td", {class: "stuck0 number"}, String(line.rank)),
+    el("th", {scope: "row", class: "stuck1"},
+      el("button", {type: "button", class: "pin", "aria-pressed": String(line === base), "data-pin": line.name,
+        title: line === base ? "unpin" : "pin as the baseline", onclick: () => update({base: line === base ? "" : line.name})},
+      line === base ? "★" : "☆"),
+      swatch(line.method),
+      el("button", {type: "button", class: "name", title: "all of this solver", onclick: () => update({view: "solver", solver: line.method})}, line.name)),
+    el("td", {class: "number"}, `${line.within} of ${line.scenes}`),
+    el("td", {class: "number"}, Number.isFinite(line.slower) ? number(line.slower) : "–"),
+    scenes.map(scene => cellOf(line.cells.get(scene.scene), limit, fastest.get(scene.scene), base?.cells.get(scene.scene), base))));
+  const table = el("table", {class: "matrix"}, el("thead", {}, head), el("tbody", {}, body));
+  table.querySelector("td[data-key]")?.setAttribute("tabindex", "0");
+  moves(table);
+  main.append(el("div", {class: "scroll", tabindex: "-1"}, table));
+  main.append(el("p", {}, el("button", {type: "button", id: "csv", onclick: () => csv(lines, limit)}, "CSV of what is shown")));
+}
+
+function sorted(lines) {
+  const of = STATE.sort.startsWith("scene ") ? STATE.sort.slice(6) : "";
+  const limit = Number(STATE.limit);
+  const value = line => {
+    if (!of) return line[STATE.sort];
+    const cell = line.cells.get(of);
+    if (!cell || figure(cell) == null) return Infinity;
+    return STATE.metric === "error" || verdict(cell, limit) === "within" ? figure(cell) : 1e30 + figure(cell);
+  };
+  lines.sort((a, b) => (STATE.down ? -1 : 1) * (d3.ascending(value(a), value(b)) || a.rank - b.rank));
+}
+
+function textOf(cell, judged, against, pinned) {
+  if (judged === "no_answer") return cell.status === "time_limit" && cell.time_limit_s ? `> ${number(cell.time_limit_s)} s` : words(cell.status);
+  const value = pinned ? (against && figure(against) ? figure(cell) / figure(against) : null) : figure(cell);
+  return [number(value, pinned ? 2 : 3), claimed(cell, judged) ? "⊗" : VERDICTS[judged][1]].filter(Boolean).join(" ");
+}
+
+const claimed = (cell, judged) => judged === "outside" && cell.status === "solved";
+
+function cellOf(cell, limit, fastest, against, pinned) {
+  if (!cell) return el("td", {class: "none"});
+  const judged = verdict(cell, limit), slower = timeOf(cell) / fastest;
+  const node = el("td", {
+    class: `number ${judged} ${claimed(cell, judged) ? "claimed" : judged === "within" && slower === 1 ? "fastest" : ""}`, "data-key": cell.key, tabindex: "-1",
+    style: judged === "within" ? `background:${STATE.metric === "error" ? NEAR(figure(cell) || 1e-9) : BLUES(slower || 1)}` : null,
+  }, textOf(cell, judged, against, pinned));
+  node.cell = cell;
+  return node;
+}
+
+// One listener per table: description, row, and movement by the arrow keys.
+function moves(table) {
+  const at = event => event.target.closest("td[data-key]");
+  table.addEventListener("mousemove", event => at(event) ? tip(described(at(event).cell), at(event), event) : noTip());
+  table.addEventListener("mouseleave", noTip);
+  table.addEventListener("focusin", event => at(event) ? tip(described(at(event).cell), at(event)) : noTip());
+  table.addEventListener("focusout", noTip);
+  table.addEventListener("click", event => at(event) && openRow(at(event).cell));
+  table.addEventListener("keydown", event => {
+    const node = at(event), step = {ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0]}[event.key];
+    if (!node) return;
+    if (event.key === "Enter" || event.key === " ") { event.preventDefault(); openRow(node.cell); }
+    if (!step) return;
+    event.preventDefault();
+    const next = table.rows[node.parentNode.rowIndex + step[0]]?.cells[node.cellIndex + step[1]];
+    if (!next?.dataset.key) return;
+    node.tabIndex = -1;
+    next.tabIndex = 0;
+    next.focus();
+  });
+}
+
+function csv(lines, limit) {
+  const names = ["scene", "n", "m", "active", "label", "solver", "form", "variant", "tolerance", "threads", "status", "load_case_s",
+    "least_s", "most_s", "total_s", "scene_s", "repeats", "iterations", "inner_iterations", "displacement_error_mm", "bound_mm",
+    "peak_rss_mib", "machine", "commit", "recorded_at", "key"];
+  const cells = lines.flatMap(line => [...line.cells.values()]);
+  download("rows.csv", [[...names, "limit_mm", "verdict"],
+    ...cells.map(cell => [...names.map(name => cell[name]), limitOf(cell, limit), verdict(cell, limit)])]);
+}

@@ -1,0 +1,32 @@
+// All that was measured of one solver.
+function solverView(main) {
+  const names = [...new Set(DATA.order.map(label => CELLS.find(cell => cell.label === label)?.method))];
+  const chosen = names.includes(STATE.solver) ? STATE.solver : names[0];
+  const limit = Number(STATE.limit), {fastest} = ranking(filtered(), limit);
+  const cells = filtered().filter(cell => cell.method === chosen);
+  const select = el("select", {id: "solver", onchange: event => update({solver: event.target.value})},
+    names.map(name => el("option", {value: name, selected: name === chosen}, name)));
+  main.append(el("p", {}, el("label", {}, "solver ", select)));
+  if (!cells.length) return main.append(el("p", {}, "None of its measurements passes the filters."));
+  const counts = Object.entries(VERDICTS).map(([name, [text]]) => [cells.filter(cell => verdict(cell, limit) === name).length, text]).filter(([count]) => count);
+  const versions = [...new Set(cells.map(cell => [cell.solver_version && `version ${cell.solver_version}`, cell.solver_code && `code ${cell.solver_code}`].filter(Boolean).join(", ")))];
+  main.append(el("p", {}, `${cells.length} measurements at the limit ${tidy(limit)} mm: ${counts.map(([count, text]) => `${count} ${text}`).join(", ")}. ${versions.filter(Boolean).join("; ")}`),
+    el("p", {class: "note"}, "A row can be opened by a click or Enter."));
+  const columns = [
+    ["scene", cell => cell.scene], ["tolerance", cell => tidy(cell.tolerance), 1], ["threads", cell => number(cell.threads), 1],
+    ["verdict", cell => VERDICTS[verdict(cell, limit)][0]], ["reported", cell => words(cell.status)],
+    ["error, mm", cell => number(cell.displacement_error_mm), 1], ["error / limit", cell => number(cell.displacement_error_mm == null ? null : cell.displacement_error_mm / limitOf(cell, limit)), 1],
+    ["bound, mm", cell => number(cell.bound_mm), 1], ["steps", cell => number(cell.iterations), 1],
+    ["load case, s", cell => number(cell.load_case_s), 1], ["spread, s", cell => cell.least_s < cell.most_s ? `${number(cell.least_s, 2)} to ${number(cell.most_s, 2)}` : "", 1],
+    ["with preparation, s", cell => number(cell.total_s), 1], ["× fastest", cell => verdict(cell, limit) === "within" ? number(timeOf(cell) / fastest.get(cell.scene)) : "–", 1],
+    ["peak, MiB", cell => number(cell.peak_rss_mib), 1],
+  ];
+  const table = el("table", {class: "matrix"}, el("thead", {}, el("tr", {}, columns.map(([text]) => el("th", {scope: "col"}, text)))),
+    el("tbody", {}, cells.map(cell => el("tr", {}, columns.map(([, text, right], k) => {
+      const node = el("td", {class: `${right ? "number" : ""} ${k === 3 ? verdict(cell, limit) : ""}`, "data-key": cell.key, tabindex: k ? "-1" : "0"}, text(cell));
+      node.cell = cell;
+      return node;
+    })))));
+  moves(table);
+  main.append(el("div", {class: "scroll"}, table));
+}
