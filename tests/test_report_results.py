@@ -77,7 +77,7 @@ def test_a_section_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 # Layers.
 
-LAYERS = ("document", "results", "analysis", "figures", "sections", "writers")
+LAYERS = ("document", "results", "analysis", "figures", "page", "sections", "writers")
 FROM_OUTSIDE = {"harness.results.digits", "harness.results.provenance", "harness.results.schema"}
 OWN = ("harness", "solvers", "problems", "report")
 

@@ -18,7 +18,7 @@ function curve(title, curves) {
   const colours = ["#0072B2", "#D55E00"], dashes = ["", "7 4"];
   curves.forEach(({name, points}, k) => {
     const shown = points.filter(([, share]) => share > 0);
-    svg.append("path").attr("d", path(p => x(p[0]), p => y(p[1]), shown).attr("fill", "none").attr("stroke", colours[k]).attr("stroke-width", 2).attr("stroke-dasharray", dashes[k]);
+    svg.append("path").attr("d", path(p => x(p[0]), p => y(p[1]), shown)).attr("fill", "none").attr("stroke", colours[k]).attr("stroke-width", 2).attr("stroke-dasharray", dashes[k]);
     svg.append("text").attr("x", 745).attr("y", 42 + 16 * k).attr("text-anchor", "end").style("fill", colours[k]).text(`${k ? "- - " : "— "}${name}`);
     for (const [gap, share] of shown.filter((_, i) => i % Math.ceil(shown.length / 40) === 0))
       listen(svg.append("circle").attr("cx", x(gap)).attr("cy", y(share)).attr("r", 4).attr("fill", colours[k]).attr("fill-opacity", 0.35).node(),

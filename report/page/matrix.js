@@ -9,7 +9,7 @@ function matrix(main) {
   const base = lines.find(line => line.name === STATE.base);
   sorted(lines);
   const errors = STATE.metric === "error";
-  const counted = errors ? "Error over the limit, the largest of the repeats. " : `Seconds, ${METRICS[STATE.metric]}, medians of the repeats. `;
+  const counted = errors ? "Error over the limit, the largest of the repeats. " : `Seconds (${METRICS[STATE.metric]}), medians of the repeats. `;
   const shade = errors ? "the darker the smaller the error" : "the darker the nearer to the fastest of the scene (bold)";
   main.append(el("p", {class: "note"},
     counted, base ? `Ratios to ${base.name}. ` : "",
@@ -67,10 +67,10 @@ const claimed = (cell, judged) => judged === "outside" && cell.status === "solve
 
 function cellOf(cell, limit, fastest, against, pinned) {
   if (!cell) return el("td", {class: "none"});
-  const judged = verdict(cell, limit), slower = timeOf(cell) / fastest;
+  const judged = verdict(cell, limit), slower = timeOf(cell) / fastest, errors = STATE.metric === "error";
   const node = el("td", {
-    class: `number ${judged} ${claimed(cell, judged) ? "claimed" : judged === "within" && slower === 1 ? "fastest" : ""}`, "data-key": cell.key, tabindex: "-1",
-    style: judged === "within" ? `background:${STATE.metric === "error" ? NEAR(figure(cell) || 1e-9) : BLUES(slower || 1)}` : null,
+    class: `number ${judged} ${claimed(cell, judged) ? "claimed" : !errors && judged === "within" && slower === 1 ? "fastest" : ""}`, "data-key": cell.key, tabindex: "-1",
+    style: judged === "within" ? `background:${errors ? NEAR(figure(cell) || 1e-9) : BLUES(slower || 1)}` : null,
   }, textOf(cell, judged, against, pinned));
   node.cell = cell;
   return node;

@@ -2,10 +2,11 @@
 const SHAPES = {s: [4, 45], D: [4, 0], d: [4, 0], p: [5, 0], h: [6, 0], H: [6, 30], 8: [8, 22.5], "^": [3, 0], v: [3, 180], "<": [3, -90], ">": [3, 90]};
 
 function markerPath(marker, size = 4.5) {
-  if (marker === "*") return d3.symbol(d3.symbolStar, 2.6 * size * size)();
-  if (marker === "P" || marker === "X") return d3.symbol(d3.symbolCross, 2.6 * size * size)();
+  const symbol = (type, area) => d3.symbol().type(type).size(area * size * size)();
+  if (marker === "*") return symbol(d3.symbolStar, 3.4);
+  if (marker === "P" || marker === "X") return symbol(d3.symbolCross, 2.6);
   const [corners, turn] = SHAPES[marker] ?? [0, 0];
-  if (!corners) return d3.symbol(d3.symbolCircle, 2.6 * size * size)();
+  if (!corners) return symbol(d3.symbolCircle, 2.6);
   const at = k => (turn + 360 * k / corners - 90) * Math.PI / 180;
   return `M${d3.range(corners).map(k => [1.15 * size * Math.cos(at(k)), 1.15 * size * Math.sin(at(k))].map(x => x.toFixed(2))).join("L")}Z`;
 }

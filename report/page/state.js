@@ -48,10 +48,10 @@ function rowsOf(columns) {
   return d3.range(count).map(i => Object.fromEntries(names.map((name, k) => [name, read[k](i)])));
 }
 
-// Three significant digits, with a power of ten below 0.001 and from 100 000.
+// Whole numbers as they are, others with three significant digits, with a power of ten below 0.001 and from 100 000.
 function number(value, digits = 3) {
   if (value == null || Number.isNaN(value)) return "–";
-  if (value === 0) return "0";
+  if (Number.isInteger(value) && Math.abs(value) < 1e5) return String(value);
   const size = Math.floor(Math.log10(Math.abs(Number(value.toExponential(digits - 1)))));
   if (size < -3 || size >= 5) return value.toExponential(digits - 1).replace("e+", "e");
   return value.toFixed(Math.max(0, digits - 1 - size));

@@ -7,7 +7,7 @@ from pathlib import Path
 import jinja2
 from mpld3 import urls  # ships D3
 
-from report.document.escape import plain, script_json, short
+from report.document.escape import plain, quoted, script_json, short
 
 from .packed import Data
 
@@ -48,6 +48,5 @@ def write(path: Path, title: str, data: Data, directory: Path | None = None) -> 
 def _named(directory: Path) -> str:
     """The directory from here, or its name alone if it lies elsewhere."""
     whole = directory.resolve()
-    return (
-        whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else Path(whole.name)
-    ).as_posix()
+    near = whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else Path(whole.name)
+    return str(quoted(near.as_posix()))

@@ -1,0 +1,181 @@
+"""The page beside the report: all rows are in it, and no text of theirs is markup."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic_results import everything, no_answer, row, write_rows
+from test_hostile_text import HOSTILE, MADE
+from test_series_report import made as made_series
+
+from report.analysis.remaining_gaps import QUANTILES, quantile_maps
+from report.figures import style
+from report.page import maps, run
+from report.page.packed import packed
+from report.page.run import run_data
+from report.page.write import write
+from report.results.reader import read
+from report.results.series import read as read_series
+from report.writers.series import write as write_series
+
+PUBLISHED = Path(__file__).parents[1] / "results" / "published"
+DIRECTORIES = sorted(path.parent for path in PUBLISHED.glob("*/measurements.jsonl"))
+MOST_BYTES = 2_000_000
+SCENES = {4386: [100, 1500], 11308: [2500]}
+
+
+class Page(HTMLParser):
+    """The elements of a page, and the text of each script."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag == "script":
+            self.texts.append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.cdata_elem == "script":
+            self.texts[-1] += data
+
+    @property
+    def data(self) -> Any:
+        return json.loads(self.texts[0])
+
+
+def page_of(directory: Path, target: Path) -> Page:
+    return Page(write(target, "Made up", run_data(read(directory)), directory).read_text("utf-8"))
+
+
+def column(data: Any, name: str) -> list[Any]:
+    found = data["cells"][name]
+    return found if isinstance(found, list) else [found["distinct"][place] for place in found["places"]]
+
+
+def unpacked(text: str) -> np.ndarray:
+    return np.frombuffer(zlib.decompress(base64.b64decode(text)), "<f4")
+
+
+def test_every_cell_is_in_the_page_with_all_its_digits(tmp_path: Path) -> None:
+    directory = everything(tmp_path / "made", SCENES)
+    data = page_of(directory, tmp_path / "index.html").data
+    cells = read(directory).cells
+    cells = cells[cells["status"] != "unsupported"]
+    assert len(cells) == 48
+    for name in ("scene", "label", "status", "verdict"):
+        assert column(data, name) == list(cells[name])
+    for name in ("load_case_s", "displacement_error_mm", "once_s", "iterations"):
+        found = np.array(column(data, name), dtype=float)
+        np.testing.assert_array_equal(found, cells[name].to_numpy())
+    assert {scene["scene"] for scene in data["scenes"]} == set(cells["scene"])
+
+
+def test_the_bound_of_a_cell_is_the_largest_of_its_repeats(tmp_path: Path) -> None:
+    rows = [row(repeat=0, reference_bound_mm=3e-9), row(repeat=1, displacement_error_mm=2e-9)]
+    data = run_data(read(write_rows(tmp_path, rows)))
+    assert column(data, "bound_mm") == [3e-9]
+    assert column(data, "displacement_error_mm") == [2e-9]
+
+
+def test_a_limit_that_conditioning_eases_stays_and_others_do_not(tmp_path: Path) -> None:
+    rung = {"scene": "hard/made/1", "limit_asked_mm": 1e-7}
+    rows = [row() | rung | {"limit_mm": 3e-5}, row(solver="gi") | rung, row(limit_asked_mm=1e-7)]
+    assert column(run_data(read(write_rows(tmp_path, rows))), "least_mm") == [3e-5, None, None]
+
+
+@pytest.mark.parametrize("directory", DIRECTORIES, ids=lambda path: path.name)
+def test_a_published_page_is_small_and_alone(directory: Path, tmp_path: Path) -> None:
+    page = page_of(directory, tmp_path / "index.html")
+    assert (tmp_path / "index.html").stat().st_size < MOST_BYTES
+    assert not any({"src", "href"} & set(attributes) for _, attributes in page.elements)
+    assert len(column(page.data, "key")) > 20
+    again = write(tmp_path / "again.html", "Made up", run_data(read(directory)), directory)
+    assert again.read_bytes() == (tmp_path / "index.html").read_bytes()
+
+
+@pytest.mark.parametrize(("made", "written"), MADE)
+def test_hostile_text_ends_no_script_and_begins_no_element(
+    made: Any, written: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(style, "DPI", 40)
+    hostile = f"</script><script>alert(1)</script><!--<img src=x>{HOSTILE}"
+    written(made(tmp_path, hostile))
+    (path,) = tmp_path.rglob("index.html")
+    text = path.read_text("utf-8")
+    page = Page(text)
+    assert [tag for tag, _ in page.elements].count("script") == 3
+    assert "img" not in {tag for tag, _ in page.elements}
+    assert text.count("</script>") == 3
+    assert "</script><script>alert(1)</script>" in json.dumps(page.data, ensure_ascii=False)
+    assert not any("\ue000" <= character <= "\uf8ff" for character in text)
+
+
+def test_an_array_keeps_four_digits_and_what_is_not_finite() -> None:
+    values = np.random.default_rng(0).normal(size=2000) * 10.0 ** np.arange(-10, 10).repeat(100)
+    values[:3] = 0.0, np.nan, np.inf
+    found = unpacked(packed(values))
+    np.testing.assert_allclose(found, values, rtol=2.0**-12)
+
+
+def test_maps_that_do_not_fit_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    directory = everything(tmp_path, SCENES)
+    found = run_data(read(directory))["maps"]
+    assert [each["name"] for each in found["maps"]] == ["4386/0100", "4386/1500", "11308/2500"]
+    assert len(found["groups"]) == 2  # two scenes have the same contacts
+    with np.load(directory / "scenes" / "4386_1500.npz") as arrays:
+        np.testing.assert_allclose(
+            unpacked(found["maps"][1]["fields"][2]["values"]), arrays["lam"], rtol=2.0**-12
+        )
+    monkeypatch.setattr(maps, "BUDGET", 40_000)
+    assert "11308/2500" in run_data(read(directory))["maps"]["left_out"]
+
+
+def test_a_series_has_its_quantiles_its_worst_case_and_a_curve_for_each_contact(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(style, "DPI", 40)
+    gaps = made_series(tmp_path)
+    write_series(tmp_path)
+    (made,) = Page((tmp_path / "report" / "index.html").read_text("utf-8")).data["maps"]["maps"]
+    fields = {field["name"]: unpacked(field["values"]) for field in made["fields"]}
+    series = read_series(tmp_path)
+    for q, values in zip(QUANTILES, quantile_maps(series), strict=False):
+        np.testing.assert_allclose(fields[f"{100 * q:g} % quantile"], values, rtol=2.0**-12)
+    worst = series.cases["case"][series.cases["max_gap_mm"].idxmax()]
+    assert fields[f"case {worst}"].max() == pytest.approx(gaps.max(), rel=2.0**-12)
+    curves = unpacked(made["exceeded"]).reshape(12, -1)
+    for share, exceeded in zip(made["shares"], curves[7], strict=True):
+        above = (gaps[:, 7] > exceeded * (1 + 2.0**-11)).mean()
+        assert above == pytest.approx(share, abs=1 / len(gaps) + 1e-9)
+
+
+def test_of_more_contacts_than_a_map_holds_every_kth_is_in_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(maps, "MOST", 1000)
+    made = run_data(read(everything(tmp_path, {4386: [100]})))["maps"]["maps"][0]
+    assert (made["contacts"], made["every"]) == (2193, 3)
+    assert len(unpacked(made["fields"][0]["values"])) == 731
+
+
+def test_the_banner_warns_of_mixed_code(tmp_path: Path) -> None:
+    rows = [row(commit="a" * 40), row(solver="gi", commit="b" * 40)]
+    assert "mix rows" in run._banner(read(write_rows(tmp_path, rows)))["warnings"][0]
+
+
+def test_a_directory_without_an_answer_has_a_page(tmp_path: Path) -> None:
+    data = page_of(write_rows(tmp_path / "made", [row(**no_answer("crashed"))]), tmp_path / "index.html").data
+    assert column(data, "load_case_s") == [None]
+    empty = page_of(write_rows(tmp_path / "empty", []), tmp_path / "index.html").data
+    assert column(empty, "key") == []
