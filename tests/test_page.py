@@ -160,6 +160,18 @@ def test_a_series_has_its_quantiles_its_worst_case_and_a_curve_for_each_contact(
         assert above == pytest.approx(share, abs=1 / len(gaps) + 1e-9)
 
 
+def test_two_answers_have_both_gaps_and_their_difference() -> None:
+    nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 20.0)])
+    answers = [{"contact_nodes": nodes, "gap_after": np.arange(6) * scale} for scale in (0.1, 0.3)]
+    pairs = [{"pair": ["a", "b"], "start": 0, "stop": 4}, {"pair": ["b", "c"], "start": 4, "stop": 6}]
+    found = maps.two_answers_maps({"pairs": pairs}, answers)
+    first, second, change = (unpacked(field["values"]) for field in found["maps"][1]["fields"])
+    np.testing.assert_allclose(first, [0.4, 0.5], rtol=2.0**-12)
+    np.testing.assert_allclose(second, [1.2, 1.5], rtol=2.0**-12)
+    np.testing.assert_allclose(change, [0.8, 1.0], rtol=2.0**-12)
+    np.testing.assert_array_equal(unpacked(found["groups"][1]).reshape(-1, 2), nodes[4:])
+
+
 def test_of_more_contacts_than_a_map_holds_every_kth_is_in_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

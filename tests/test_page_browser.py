@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,12 @@ from report.figures import style
 from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
+from report.sections.profiles import compared, ratios
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
 
 pytestmark = pytest.mark.slow
 SEEN = "[...document.querySelectorAll('#view td[data-key]')]"
-VIEWS = ("matrix", "precision", "profiles", "solver", "maps", "curves", "answer", "compare")
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +90,8 @@ def test_no_view_of_any_page_has_an_error(
     CliRunner().invoke(app, ["compare", str(old), str(new), "--out", str(tmp_path / "compared")])
     pages += [answer / "index.html", series / "report" / "index.html", tmp_path / "compared" / "index.html"]
     for page in pages:
-        for view in VIEWS:
+        opened(chromium, page)
+        for view in chromium.execute_script("return Object.keys(VIEWS)"):
             opened(chromium, page, f"view={view}&node=3&threshold=0.1")
             shown = eventually(chromium, "document.getElementById('view').textContent")
             assert errors(chromium) == [], (page, view, shown)
@@ -162,6 +164,53 @@ def test_the_ranking_is_by_the_share_within_then_by_time(
         assert within == lines["good"].sum()[name]
         if within:
             assert mean == pytest.approx(means[name])
+
+
+@pytest.mark.parametrize("limit", ["1e-7", "1e-9"])
+def test_the_profiles_are_those_of_the_report(chromium: Any, tmp_path: Path, limit: str) -> None:
+    found = read(everything(tmp_path, {4386: [100, 800, 1500], 6112: [300, 2000]}))
+    opened(chromium, write(tmp_path / "index.html", "Made up", run_data(found), tmp_path), f"limit={limit}")
+    asked = replace(found, cells=found.cells.assign(limit_mm=float(limit)))
+    times = ratios(compared(asked))
+    shown = chromium.execute_script(
+        "const {ratios, count} = profiles(filtered(), Number(STATE.limit));"
+        "const met = list => list.filter(Number.isFinite).sort(d3.ascending);"
+        "return [count, [...ratios].map(([name, list]) => [name, met(list)])]"
+    )
+    assert shown[0] == len(times) == 5
+    assert {name for name, _ in shown[1]} == set(times)
+    for name, values in shown[1]:
+        np.testing.assert_allclose(values, np.sort(times[name][np.isfinite(times[name])]))
+
+
+def test_the_csv_has_the_cells_shown_judged_at_the_limit(
+    chromium: Any, made: tuple[pd.DataFrame, Path]
+) -> None:
+    cells, page = made
+    opened(chromium, page, "limit=1e-9&rows=all&form=dual")
+    lines = chromium.execute_script(
+        "let saved; download = (name, lines) => { saved = lines; };"
+        "document.getElementById('csv').click(); return saved"
+    )
+    table = pd.DataFrame(lines[1:], columns=lines[0]).sort_values(["scene", "label"], ignore_index=True)
+    wanted = cells[cells["form"] == "dual"].sort_values(["scene", "label"], ignore_index=True)
+    assert list(table["label"]) == list(wanted["label"])
+    assert list(table["verdict"]) == list(judged(wanted, 1e-9).replace("?", "cannot_be_judged"))
+    np.testing.assert_array_equal(table["load_case_s"].astype(float), wanted["load_case_s"])
+
+
+def test_a_share_counts_before_a_number_and_time_after_both(chromium: Any, tmp_path: Path) -> None:
+    scenes = ["4386/0100", "4386/1000", "4386/2000"]
+    rows = [row(scene, "slow", solve_s=9.0) for scene in scenes]
+    rows += [
+        row(scene, "quick", displacement_error_mm=1e-5 if scene == scenes[2] else 1e-9) for scene in scenes
+    ]
+    rows += [row(scenes[0], "seldom", solve_s=5.0)]
+    opened(chromium, write(tmp_path / "index.html", "", run_data(read(write_rows(tmp_path, rows))), tmp_path))
+    ranked = "return ranking(filtered(), Number(STATE.limit)).lines.map(line => line.solver)"
+    assert chromium.execute_script(ranked) == ["slow", "seldom", "quick"]
+    opened(chromium, tmp_path / "index.html", "limit=1e-3")
+    assert chromium.execute_script(ranked) == ["quick", "slow", "seldom"]
 
 
 def test_filters_a_baseline_and_the_address(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:

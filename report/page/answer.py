@@ -5,7 +5,7 @@ from __future__ import annotations
 from report.document.numbers import significant
 from report.results.series import Array
 
-from .maps import answer_maps
+from .maps import answer_maps, two_answers_maps
 from .packed import Data
 
 
@@ -28,6 +28,16 @@ def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
         "facts": [[name, str(value)] for name, value in facts.items() if value is not None],
         "maps": answer_maps(record, arrays),
     }
+
+
+def two_answers_data(records: list[Data], answers: list[dict[str, Array]], names: list[str]) -> Data:
+    """What the page of two answers on one junction shows: records and arrays of both, and their names."""
+    facts = [
+        [which, f"{record['title']}, {record['method']}"]
+        for which, record in zip(("first", "second"), records, strict=True)
+    ]
+    maps = two_answers_maps(records[0], answers)
+    return {"kind": "answer", "banner": banner(names), "facts": facts, "maps": maps}
 
 
 def banner(lines: list[str], **more: object) -> Data:

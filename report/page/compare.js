@@ -8,7 +8,7 @@ function compareView(main) {
     if (name) lines.sort((a, b) => (STATE.down ? -1 : 1) * d3.ascending(a[name] ?? Infinity, b[name] ?? Infinity));
     main.append(el("h2", {}, `${pair.old} → ${pair.new}`), el("p", {}, pair.summary),
       el("div", {class: "scroll"}, el("table", {class: "matrix"},
-        el("thead", {}, el("tr", {}, columns.map(([column, text]) => el("th", {scope: "col", "aria-sort": name === column ? (STATE.down ? "descending" : "ascending") : "none"},
+        el("thead", {}, el("tr", {}, columns.map(([column, text, right]) => el("th", {scope: "col", class: right ? "number" : "", "aria-sort": name === column ? (STATE.down ? "descending" : "ascending") : "none"},
           el("button", {type: "button", "data-sort": column, onclick: () => update({sort: column, down: STATE.sort === column && !STATE.down ? "1" : ""})},
             text, name === column ? (STATE.down ? " ▾" : " ▴") : ""))))),
         el("tbody", {}, lines.map(line => el("tr", {class: `change-${line.group.split(" ")[0]}`}, columns.map(([column, , right]) =>

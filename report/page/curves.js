@@ -13,8 +13,8 @@ function curveView(main) {
 
 function curve(title, curves) {
   const every = curves.flatMap(each => each.points), high = d3.max(every, ([gap]) => gap) || 1;
-  const x = d3.scaleLinear().domain([Math.min(0, d3.min(every, ([gap]) => gap)), high]), y = d3.scaleLog().domain([Math.max(1e-3, d3.min(every, p => p[1])), 110]);
-  const svg = panel(title, x, y, {width: 760, height: 320, xLabel: "gap t, mm", yLabel: "share with more than t, %", yTicks: [0.01, 0.1, 1, 2, 5, 10, 20, 50, 100].filter(value => value >= y.domain()[0])});
+  const x = d3.scaleLinear().domain([Math.min(0, d3.min(every, ([gap]) => gap)), high]), y = d3.scaleLog().domain([d3.min(every.filter(p => p[1] > 0), p => p[1]) ?? 1, 110]);
+  const svg = panel(title, x, y, {width: 760, height: 320, xLabel: "gap t, mm", yLabel: "share with more than t, %", yTicks: [1e-5, 1e-4, 0.001, 0.01, 0.1, 1, 10, 100].filter(value => value >= y.domain()[0])});
   const colours = ["#0072B2", "#D55E00"], dashes = ["", "7 4"];
   curves.forEach(({name, points}, k) => {
     const shown = points.filter(([, share]) => share > 0);

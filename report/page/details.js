@@ -9,7 +9,7 @@ function described(cell) {
     cell.iterations == null ? null : `${number(cell.iterations)} steps${inner}`,
     `error ${number(cell.displacement_error_mm)} mm; reference error bound ${number(cell.bound_mm)} mm`,
     `${VERDICTS[verdict(cell, limit)][0]} (limit ${tidy(limitOf(cell, limit))} mm); the solver reported: ${words(cell.status)}`,
-    `${cell.options ? `${cell.options}; ` : ""}tolerance ${tidy(cell.tolerance)}, ${number(cell.threads)} threads`,
+    `${cell.options ? `${cell.options}; ` : ""}tolerance ${tidy(cell.tolerance)}, ${number(cell.threads)} thread${cell.threads === 1 ? "" : "s"}`,
     [cell.solver_version && `version ${cell.solver_version}`, cell.solver_code && `code ${cell.solver_code}`,
       cell.commit && `commit ${cell.commit.slice(0, 10)}`].filter(Boolean).join(", "),
   ].filter(Boolean);
@@ -18,14 +18,15 @@ function described(cell) {
 const quoted = text => /^[\w./=+:-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 
 function command(cell) {
-  const words = cell.key.split(" ").every(word => /^[\w./=+:-]+$/.test(word));
-  return `python -m harness reproduce ${quoted(DATA.directory)} ${words ? cell.key : quoted(cell.key)}`;
+  const key = cell.key.split(" ").every(word => quoted(word) === word) ? cell.key : quoted(cell.key);
+  return `python -m harness reproduce ${quoted(DATA.directory)} ${key}`;
 }
 
 function openRow(cell) {
   noTip();
   const dialog = document.getElementById("row");
-  const shown = {...cell, "verdict at the limit shown": VERDICTS[verdict(cell, Number(STATE.limit))][0], "limit shown, mm": Number(STATE.limit)};
+  const {label, method, verdict: inRow, ...others} = cell;
+  const shown = {...others, "verdict in the row": words(inRow), "verdict at the limit shown": VERDICTS[verdict(cell, Number(STATE.limit))][0], "limit shown, mm": Number(STATE.limit)};
   const facts = Object.entries(shown).filter(([, value]) => value != null && value !== "");
   const again = command(cell);
   dialog.replaceChildren(

@@ -49,7 +49,7 @@ function profileView(main) {
 
 function profileTable(methods, ratios, count) {
   const within = (method, most) => `${ratios.get(method).filter(value => value <= most).length}`;
-  return el("table", {}, el("thead", {}, el("tr", {}, ["solver (form)", "fastest", "τ ≤ 2", "τ ≤ 10", "within the limit", "scenes"].map(text => el("th", {scope: "col"}, text)))),
+  return el("table", {}, el("thead", {}, el("tr", {}, ["solver (form)", "fastest", "τ ≤ 2", "τ ≤ 10", "within the limit", "scenes"].map((text, k) => el("th", {scope: "col", class: k ? "number" : ""}, text)))),
     el("tbody", {}, methods.map(method => el("tr", {}, el("th", {scope: "row"}, swatch(method), method),
       [1, 2, 10, 1e300].map(most => el("td", {class: "number"}, within(method, most))), el("td", {class: "number"}, String(count))))));
 }

@@ -1,5 +1,6 @@
 // Gap maps on a canvas, with a range, a scale, a threshold contour, and the curve of a contact.
 const SCALES = {linear: "linear", log: "logarithmic"};
+const SIGNED = t => d3.interpolateRdBu(1 - t); // red: larger than before
 const FILLED = {gap: d3.interpolateViridis, force: t => d3.interpolateMagma(1 - t)};
 const MEMORY = new Map();
 let drawing = 0;
@@ -13,16 +14,16 @@ async function mapView(main) {
   const {maps, groups, left_out: leftOut} = DATA.maps, map = maps[Number(STATE.map)] ?? maps[0];
   if (!map) return main.append(el("p", {}, "No contact has a place on a map."));
   const cases = map.fields.filter(field => field.case != null), others = map.fields.filter(field => field.case == null);
-  const field = map.fields.find(each => each.name === STATE.field) ?? map.fields.find(each => each.name === "gap after") ?? map.fields[0];
+  const field = map.fields.find(each => each.name === STATE.field) ?? map.fields.find(each => ["gap after", "95 % quantile"].includes(each.name)) ?? map.fields[0];
   const slider = el("input", {id: "case", type: "range", min: "0", max: String(cases.length - 1), value: String(Math.max(0, cases.indexOf(field))),
     "aria-valuetext": field.name, oninput: event => update({field: cases[event.target.value].name})});
-  const field_ = (name, label) => el("label", {}, `${label} `, el("input", {id: name, type: "number", step: "any", value: STATE[name],
+  const entry = (name, label) => el("label", {}, `${label} `, el("input", {id: name, type: "number", step: "any", value: STATE[name],
     onchange: event => update({[name]: event.target.value})}));
   const controls = el("div", {class: "controls"},
     maps.length > 1 ? options("map", "map", maps.map((each, k) => [String(k), each.name]), "") : "",
     options("field", "show", others.map(each => [each.name, each.name]), field.case == null ? "" : field.name),
     cases.length ? el("label", {}, `case (${cases.length} of them) `, slider) : "",
-    options("scale", "scale", Object.entries(SCALES), ""), field_("low", `from, ${field.unit}`), field_("high", "to"), field_("threshold", "contour at"));
+    options("scale", "scale", Object.entries(SCALES), ""), entry("low", `from, ${field.unit}`), entry("high", `to, ${field.unit}`), entry("threshold", `contour at, ${field.unit}`));
   const place = el("div", {class: "map"}), about = el("p", {class: "note", id: "about-map"});
   main.append(controls, about, place);
   controls.querySelector("#field").value = field.case == null ? field.name : "";
@@ -32,13 +33,17 @@ async function mapView(main) {
   const known = others.map((each, k) => [each, values[k + 1]]);
   drawMap(place, map, field, nodes, values[0], known);
   about.textContent = `${map.name}: ${field.name}, ${field.unit}. ${number(d3.min(values[0]))} to ${number(d3.max(values[0]))} ${field.unit} at ${map.contacts} contacts`
-    + (map.every > 1 ? `, every ${map.every}th of which is drawn` : "") + ". Circles: fasteners."
+    + (map.every > 1 ? `, every ${map.every}th of which is drawn` : "") + (!map.marks.length ? "." : DATA.kind === "answer" ? ". Circles: fasteners and clamps." : ". Circles: fasteners.")
     + (map.exceeded ? " A click on a contact shows how often its gap is exceeded." : "")
     + (leftOut.length ? ` Left out to keep the page small: ${leftOut.join(", ")}.` : "");
   if (map.exceeded && STATE.node) main.append(await exceedance(map, Number(STATE.node), nodes));
 }
 
 function colours(field, values) {
+  if (field.signed) {
+    const most = Number(STATE.high) || d3.max(values, Math.abs) || 1, scale = d3.scaleLinear().domain([-most, most]).range([0, 1]).clamp(true);
+    return {scale, log: false, ends: [-most, most], of: value => SIGNED(scale(value))};
+  }
   const log = STATE.scale === "log", positive = values.filter(value => value > 0);
   const ends = [STATE.low === "" ? (log ? Math.max(d3.quantile(positive.sort(), 0.02) ?? 1e-9, 1e-12) : Math.min(0, d3.min(values))) : Number(STATE.low),
     STATE.high === "" ? d3.max(values) || 1 : Number(STATE.high)];
@@ -82,7 +87,7 @@ function drawMap(box, map, field, nodes, values, known) {
   for (const [mx, my] of map.marks) ring(pen, x(mx), y(my), "#D55E00");
   if (STATE.node !== "" && Number(STATE.node) < on.count) ring(pen, x(on.x(Number(STATE.node))), y(on.y(Number(STATE.node))), "#000000", 6);
   const svg = d3.create("svg").attr("width", width).attr("height", height + 52).attr("class", "over");
-  svg.append("g").attr("class", "axis").attr("transform", `translate(0,${height + 12})`).call(d3.axisBottom(x).ticks(8));
+  svg.append("g").attr("class", "axis").attr("transform", `translate(0,${height + 12})`).call(d3.axisBottom(x).ticks(Math.max(1, scale * span[0] / 80)));
   svg.append("g").attr("class", "axis").attr("transform", `translate(${pad - 2},0)`).call(d3.axisLeft(y).ticks(Math.max(2, height / 50)));
   svg.append("text").attr("x", pad + scale * span[0] / 2).attr("y", height + 46).attr("text-anchor", "middle").text("x, mm (up: y, mm)");
   const stage = el("div", {class: "stage", tabindex: "0", role: "img", "aria-label": `${map.name}: ${field.name}`}, canvas, svg.node());

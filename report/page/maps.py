@@ -53,7 +53,8 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     """The maps of one answer, one per pair of parts in contact."""
     if "contact_nodes" not in arrays or not record["m"]:
         return {"groups": [], "maps": [], "left_out": []}
-    groups, maps = [], []
+    groups: list[str] = []
+    maps: list[Data] = []
     for pair in record["pairs"]:
         own = slice(pair["start"], pair["stop"])
         of_pair = {name: arrays[name][own] for name in ("gap_before", "gap_after", "lam")}
@@ -61,6 +62,33 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
         made = _map(pair_name(pair), arrays["contact_nodes"][own], of_pair, np.array(marks).reshape(-1, 2))
         groups.append(made.pop("nodes"))
         maps.append(made | {"group": len(groups) - 1})
+    return {"groups": groups, "maps": maps, "left_out": []}
+
+
+def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
+    """The maps of two answers on one junction, one per pair of parts: both gaps, and what the second adds."""
+    if "contact_nodes" not in answers[0]:
+        return {"groups": [], "maps": [], "left_out": []}
+    groups: list[str] = []
+    maps: list[Data] = []
+    for pair in record["pairs"]:
+        own = slice(pair["start"], pair["stop"])
+        first, second = (arrays["gap_after"][own] for arrays in answers)
+        nodes = answers[0]["contact_nodes"][own]
+        step = _step(len(nodes))
+        fields = [_field("first", first[::step]), _field("second", second[::step])]
+        fields.append(_field("second − first", (second - first)[::step]) | {"signed": True})
+        maps.append(
+            {
+                "name": pair_name(pair),
+                "contacts": len(nodes),
+                "every": step,
+                "fields": fields,
+                "marks": [],
+                "group": len(groups),
+            }
+        )
+        groups.append(exact(nodes[::step]))
     return {"groups": groups, "maps": maps, "left_out": []}
 
 

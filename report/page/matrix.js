@@ -14,6 +14,7 @@ function matrix(main) {
   main.append(el("p", {class: "note"},
     counted, base ? `Ratios to ${base.name}. ` : "",
     `Blue: within the limit, ${shade}; × outside the limit; ⊗ outside, though reported as solved; `
+    + (lines.some(line => [...line.cells.values()].some(cell => cell.least_mm)) ? "on a rung, the limit is at least what conditioning allows; " : "")
     + "? cannot be judged, because the reference error bound is above a tenth of the limit; otherwise why there is no answer. "
     + "☆ pins a line as the baseline. Arrow keys move between cells, Enter opens the row."));
   const upright = scenes.length > 8 ? "upright" : "";

@@ -72,7 +72,7 @@ function show() {
 }
 
 document.getElementById("controls").addEventListener("submit", event => event.preventDefault());
-addEventListener("hashchange", () => { readAddress(); show(); });
+addEventListener("hashchange", () => { document.getElementById("row").close(); readAddress(); show(); });
 addEventListener("keydown", event => event.key === "Escape" && noTip());
 readAddress();
 banner();

@@ -21,7 +21,7 @@ function solverView(main) {
     ["with preparation, s", cell => number(cell.total_s), 1], ["× fastest", cell => verdict(cell, limit) === "within" ? number(timeOf(cell) / fastest.get(cell.scene)) : "–", 1],
     ["peak, MiB", cell => number(cell.peak_rss_mib), 1],
   ];
-  const table = el("table", {class: "matrix"}, el("thead", {}, el("tr", {}, columns.map(([text]) => el("th", {scope: "col"}, text)))),
+  const table = el("table", {class: "matrix"}, el("thead", {}, el("tr", {}, columns.map(([text, , right]) => el("th", {scope: "col", class: right ? "number" : ""}, text)))),
     el("tbody", {}, cells.map(cell => el("tr", {}, columns.map(([, text, right], k) => {
       const node = el("td", {class: `${right ? "number" : ""} ${k === 3 ? verdict(cell, limit) : ""}`, "data-key": cell.key, tabindex: k ? "-1" : "0"}, text(cell));
       node.cell = cell;

@@ -1,4 +1,4 @@
-"""Writes two answers on one junction: comparison.md, maps, and tables of contacts and fasteners.
+"""Writes two answers on one junction: comparison.md, maps, tables of contacts and fasteners, and index.html.
 
 Reads solution.json and solution.npz of two directories, nothing else.
 """
@@ -20,13 +20,18 @@ from report.figures import style
 from report.figures.answer import pair_name
 from report.figures.maps import Array
 from report.figures.two_answers import Answer, gap_maps
+from report.page.answer import two_answers_data
+from report.page.write import write as write_page
 
 from .markdown import save_block
 from .pages import rendered
 
 
 def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
-    """Write DIRECTORY/comparison.md from two of its folders; returns its path and the figures per pair."""
+    """Write DIRECTORY/comparison.md, with index.html, from two of its folders.
+
+    Returns the path of the former and the figures per pair.
+    """
     first, second = answers = [_read(directory / folder) for folder in folders]
     names = [str(record["scene"]) for record, _ in answers]
     if names[0] == names[1]:
@@ -57,8 +62,10 @@ def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
     with style.applied():
         section = Section("Two scenes on one junction", [save_block(block, directory) for block in blocks])
     path = directory / "comparison.md"
-    page = rendered("sections.md.j2", title=f"{names[0]} and {names[1]}", sections=[section], csv=False)
-    path.write_text(page, "utf-8")
+    title = f"{names[0]} and {names[1]}"
+    path.write_text(rendered("sections.md.j2", title=title, sections=[section], csv=False), "utf-8")
+    data = two_answers_data([first[0], second[0]], [first[1], second[1]], names)
+    write_page(directory / "index.html", title, data)
     return path, pairs
 
 
