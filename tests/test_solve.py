@@ -282,6 +282,7 @@ def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "answer.md",
         "contacts.csv",
+        "index.html",
         "nodes.csv",
         "solution.json",
         "solution.npz",
