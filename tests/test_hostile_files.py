@@ -30,6 +30,7 @@ from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.formats import pyyeti
 from problems.scene import read_scene
 from problems.storage import cache
 
@@ -131,9 +132,7 @@ def test_an_export_into_the_folder_of_its_own_matrices_is_refused(tmp_path: Path
 
 
 def cards(path: Path, **frames: pd.DataFrame) -> Path:
-    from pyyeti import nastran
-
-    nastran.wtdmig(str(path), frames)
+    pyyeti(path).wtdmig(str(path), frames)
     return path
 
 

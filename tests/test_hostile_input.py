@@ -237,8 +237,8 @@ def test_a_name_with_a_nul_is_an_error_of_the_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_loads_whose_displacements_overflow_are_refused(form: str, tmp_path: Path) -> None:
-    K = np.diag([1e-3, 1.0, 1.0])
-    np.savez(tmp_path / "own.npz", K=K, A=np.eye(3)[:, :2], g=np.ones(2), f=np.array([1.7e308, 0.0, 0.0]))
+    K, A = 1e-3 * np.array([[2.0, 1.0], [1.0, 2.0]]), np.ones((2, 1))  # x = ±inf, p = inf − inf
+    np.savez(tmp_path / "own.npz", K=K, A=A, g=np.ones(1), f=np.full(2, 1.7e308))
     given = ["solve", str(tmp_path / "own.npz"), "--form", form, "--out", str(tmp_path / "out")]
     done = CliRunner().invoke(app, given)
     assert done.exit_code == 2, done.output

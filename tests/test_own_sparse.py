@@ -18,6 +18,7 @@ from harness.planning import own_matrices, road
 from harness.verification.general_definite import shifted_bound
 from problems import formats
 from problems.build import load_case, prepared
+from problems.formats import pyyeti
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
@@ -140,8 +141,7 @@ def test_the_bound_without_a_band_is_below_the_smallest_eigenvalue_and_near_it(s
 
 
 def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:
-    from pyyeti.nastran import op4
-
+    op4 = pyyeti(tmp_path).op4
     K = band_matrix(np.random.default_rng(2), 50, 2)
     path, f = tmp_path / "k.op4", np.arange(50.0)[:, None]
     op4.OP4().write(str(path), {"k": sp.csc_matrix(K), "f": sp.csc_matrix(f)}, binary=True, sparse="bigmat")
