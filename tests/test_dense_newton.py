@@ -141,7 +141,7 @@ def test_sweeps_end_at_what_long_sums_leave(stalled: int, times: float, ends: bo
     assert M is not None
     sweeps = BatchedSweeps(decaying(), np.ones(M_CONTACTS), M, lambda *given: pytest.fail("not asked for"))
     case = Case(load, p, p > 0, trial, stalled=stalled)
-    assert (sweeps.enough(case, 5e-9, True) > 0) == ends
+    assert (sweeps.enough(case, 5e-9) > 0) == ends
 
 
 def test_the_banded_preconditioner_is_the_inverse_of_its_definition() -> None:

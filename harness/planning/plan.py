@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import random
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -67,6 +67,11 @@ class Measurement:
         words += [] if self.batched is None else [f"batched={self.batched}"]
         words += [] if self.case is None else [f"case={self.case}"]
         return " ".join(words + ([json.dumps(self.options, sort_keys=True)] if self.options else []))
+
+    def same_settings(self, row: Mapping[str, Any]) -> bool:
+        """Whether a row is of this solver, form, options and threads, whatever its scene and tolerance."""
+        mine = (self.solver, self.form, self.variant, self.options, self.threads)
+        return tuple(row[name] for name in ("solver", "form", "variant", "options", "threads_asked")) == mine
 
     @property
     def stem(self) -> str:

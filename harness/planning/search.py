@@ -12,19 +12,17 @@ from math import inf
 from harness.results.records import Row
 from harness.results.schema import STEPS
 
-from .plan import DECADES, Measurement
+from .plan import DECADES, MOST_REPEATS, Measurement
 
-SAME = ("scene", "solver", "form", "variant", "options", "threads_asked")
 #: (seconds of the first run below which, repeats).
-REPEATS = ((2.0, 5), (20.0, 3), (inf, 1))
+REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
 
 
 def superfluous(m: Measurement, rows: Sequence[Row]) -> bool:
     """Whether the search at looser tolerances has ended, or m was repeated often enough."""
     if not (m.searched or m.paced):
         return False
-    mine = (m.scene, m.solver, m.form, m.variant, m.options, m.threads)
-    first = [row for row in rows if row["repeat"] == 0 and tuple(row[name] for name in SAME) == mine]
+    first = [row for row in rows if row["repeat"] == 0 and row["scene"] == m.scene and m.same_settings(row)]
     if m.searched and not _due(m, first):
         return True
     same = [row for row in first if row["tolerance"] == m.tolerance]

@@ -21,9 +21,7 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     the sparse form: with dense matrices, time grows at least like n², with sparse ones like n. (Not on rungs
     of ladders, where size is not what makes them hard.)
     """
-    same = ("solver", "form", "variant", "options", "threads_asked")
-    mine = (m.solver, m.form, m.variant, m.options, m.threads)
-    own = [row for row in rows if tuple(row[name] for name in same) == mine]
+    own = [row for row in rows if m.same_settings(row)]
     looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
     for row in looser:
         if row["status"] in OUT_OF_TIME and m.time_limit_s <= row["time_limit_s"]:

@@ -18,7 +18,7 @@ from problems.build import load_case, prepared
 from problems.errors import Fault, InputError
 from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase
-from problems.forms.names import FORMS
+from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
 from problems.input.digits import DOUBLE
@@ -82,8 +82,8 @@ def import_(files: list[str], out: Path, console: Console) -> None:
         data, origin = _read_all(given)
         checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)
         formats.write("npz", new, data | {name: sp.csr_array(data[name]) for name in "KA"})
-        _refuse_unusable(new, origin)
-    _print_facts(out, console)
+        used = _refuse_unusable(new, origin)
+    _print_facts(out, used, console)
 
 
 def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Path]]:
@@ -130,16 +130,20 @@ def _named(found: formats.Data, name: str, path: Path) -> object:
     return found.get(name, next(iter(found.values())))
 
 
-def _refuse_unusable(path: Path, origin: dict[str, Path]) -> None:
-    """Raise InputError, naming the matrix's own file, if K is indefinite or A's columns are dependent."""
+def _refuse_unusable(path: Path, origin: dict[str, Path]) -> tuple[Form, Prepared, LoadCase]:
+    """The problem in its cheaper form. Raises InputError, naming the matrix's own file, if K is indefinite or
+    A's columns are dependent.
+    """
     try:
         scene = read_scene(str(path))
-        data = prepared(scene, form=cheaper(scene, FORMS).form)
+        form = cheaper(scene, FORMS).form
+        data = prepared(scene, form=form)
         if not isinstance(data, SparsePrepared):
             _ = data.Q
         elif data.sparse_factors and data.assembly.m and not independence(data.assembly) > 0:
             allowed = "no column may depend on the others"
             raise InputError.one(scene.source_of("A"), "A", "dependent columns", allowed)
+        return form, data, load_case(scene, form)
     except InputError as error:
         own = [
             replace(fault, where=str(origin["A" if fault.key[0] == "A" else "K"])) for fault in error.faults
@@ -147,11 +151,9 @@ def _refuse_unusable(path: Path, origin: dict[str, Path]) -> None:
         raise InputError(own) from error
 
 
-def _print_facts(out: Path, console: Console) -> None:
+def _print_facts(out: Path, used: tuple[Form, Prepared, LoadCase], console: Console) -> None:
     """Print size, definiteness, condition and digits of what was read."""
-    scene = read_scene(str(out))
-    form = cheaper(scene, FORMS).form
-    data, load = prepared(scene, form=form), load_case(scene, form)
+    form, data, load = used
     blocks = " + ".join(str(K.shape[0]) for K in data.assembly.blocks)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
     if isinstance(data, SparsePrepared):

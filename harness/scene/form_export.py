@@ -27,6 +27,7 @@ from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.names import FORMS, Form
 from problems.forms.problem import in_form
+from problems.input import sparse_npz
 from problems.model.scene import MatricesScene, Scene
 from problems.scene import read_scene
 
@@ -94,20 +95,10 @@ def in_one_form(
 
 
 def _write_npz(path: Path, program: Program) -> None:
-    """Matrices of the sparse form as the three arrays of the compressed columns, and their shape."""
-    arrays: dict[str, Any] = {name: np.array(value) for name, value in program.about.items()}
-    for name, M in program.arrays.items():
-        if not sp.issparse(M):
-            arrays[name] = M
-        elif program.about["form"] != "sparse":
-            arrays[name] = M.toarray()
-        else:
-            columns = sp.csc_array(M)
-            parts = {"data": columns.data, "indices": columns.indices, "indptr": columns.indptr}
-            arrays |= {f"{name}_{part}": array for part, array in parts.items()}
-            arrays[f"{name}_shape"] = np.array(M.shape)
-    with path.open("wb") as file:
-        np.savez(file, **arrays)
+    """Matrices of the sparse form as compressed columns, all others whole."""
+    whole = program.about["form"] != "sparse"
+    arrays = {name: M.toarray() if whole and sp.issparse(M) else M for name, M in program.arrays.items()}
+    sparse_npz.write(path, {name: np.array(value) for name, value in program.about.items()} | arrays)
 
 
 def _write_mtx(path: Path, program: Program) -> None:

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.stages import Progress, Stored, indefinite
-from problems.model.effect import ForceEffect, GapEffect, TieEffect
+from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 from problems.storage import cache
@@ -117,14 +117,7 @@ def _own(scene: MatricesScene) -> tuple[Assembly, LoadCase, float, str]:
 
 
 def _load_of_effects(scene: JointScene) -> LoadCase:
-    joint = scene.joint
-    n, m = joint.size
-    f, g = np.zeros(n), np.zeros(m)
-    for effect in scene.effects:
-        if isinstance(effect, ForceEffect):
-            f += effect.force(joint)
-        elif isinstance(effect, GapEffect):
-            g += effect.gap(joint)
+    joint, (f, g) = scene.joint, scene.junction_load()
     for effect in scene.effects_of(PartLoadEffect):
         from .condensed_load import condensed_load  # imported only for such loads
 

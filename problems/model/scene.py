@@ -11,11 +11,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from problems.forms.assembly import Matrix
+from problems.forms.assembly import Matrix, Vector
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem, made
 from problems.storage.cache import digest
 
-from .effect import Effect, ForceEffect, StiffnessEffect
+from .effect import Effect, ForceEffect, GapEffect, StiffnessEffect
 from .joint import Joint, Table
 
 E = TypeVar("E", bound=Effect)
@@ -86,6 +86,17 @@ class JointScene(Scene):
     @property
     def expected_size(self) -> tuple[int, int]:
         return self.joint.size
+
+    def junction_load(self) -> tuple[Vector, Vector]:
+        """f (n,) N of the forces on the junction, and the initial gaps g (m,) mm."""
+        n, m = self.joint.size
+        f, g = np.zeros(n), np.zeros(m)
+        for effect in self.effects:
+            if isinstance(effect, ForceEffect):
+                f += effect.force(self.joint)
+            elif isinstance(effect, GapEffect):
+                g += effect.gap(self.joint)
+        return f, g
 
     def marks(self) -> Matrix:
         own = [effect.marks(self.joint) for effect in self.effects_of(ForceEffect)]

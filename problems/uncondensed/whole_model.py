@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from problems.forms.assembly import Assembly, LoadCase
-from problems.model.effect import ForceEffect, GapEffect, TieEffect
+from problems.model.effect import TieEffect
 from problems.model.joint import Joint
 from problems.model.part import PartModel
 from problems.model.part_load import PartLoadEffect
@@ -101,17 +101,10 @@ class WholeModel:
 
     def load_case(self) -> LoadCase:
         """f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
-        joint = self.scene.joint
-        n, m = joint.size
-        f, g = np.zeros(n), np.zeros(m)
-        for effect in self.scene.effects:
-            if isinstance(effect, ForceEffect):
-                f += effect.force(joint)
-            elif isinstance(effect, GapEffect):
-                g += effect.gap(joint)
+        f, g = self.scene.junction_load()
         whole = np.zeros(self.numbering.size)
         whole[self.junction] = f
-        names = [part.name for part in joint.part]
+        names = [part.name for part in self.scene.joint.part]
         for load in self.scene.effects_of(PartLoadEffect):
             part = names.index(load.part)
             place, force = self.numbering.places[part], load.load(self.models[part])

@@ -25,7 +25,7 @@ import numpy as np
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.compliance import AnyQ
-from solvers.base import Answer, LoadCase
+from solvers.base import Answer, LoadCase, WarmStart
 from solvers.kkt import kkt_status, rounding_of
 from solvers.linear_algebra.product import products
 
@@ -112,11 +112,17 @@ class BatchedSweeps:
         (case,) = self._sweep([_warm_started(solved, load, p)], tolerance)
         return case
 
+    def case_of(self, solved: WarmStart, load: LoadCase) -> Case:
+        """The case of a load with p that was solved elsewhere."""
+        order = self.M.order
+        trial = TrialSolution(solved.lam[order], solved.gap[order], 0.0)
+        return Case(load, load.p[order], self.diagonal[order] * trial.lam > trial.y, trial)
+
     def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
         """y = Qλ − p, (m, k) mm, of forces λ (m, k) for that many loads."""
         return products(self.Q, lam) - np.column_stack([load.p for load in loads])
 
-    def enough(self, case: Case, tolerance: float, stagnating: bool) -> float:
+    def enough(self, case: Case, tolerance: float) -> float:
         """The KKT residual, mm, that ends the sweeps of a case: −1 as long as |y_C| is neither far below the
         tolerance nor within rounding, of which long sums leave several times as much.
         """
@@ -180,7 +186,7 @@ class BatchedSweeps:
         right = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
         residual = max(rounding, float(-y.min(initial=0.0))) + _cut_off(lam, compliance)
         # Of a case with a larger residual the answer would be inaccurate.
-        case.settled = right and residual <= self.enough(case, tolerance, stagnating)
+        case.settled = right and residual <= self.enough(case, tolerance)
 
     def answer(self, case: Case, load: LoadCase, tolerance: float) -> Answer:
         """The answer of a case; one that is unsettled is solved from its set."""

@@ -20,10 +20,10 @@ from solvers.linear_algebra.approximate_inverse import approximate_inverse
 from solvers.linear_algebra.inverse import inverse_with_factor
 from solvers.linear_algebra.product import product
 
-from .batched import MIN_CLOSED, BatchedSweeps, Case
+from .batched import MIN_CLOSED, BatchedSweeps
 from .block_pivoting import block_pivoting
 from .bordered_factor import Set
-from .contact_sets import ContactSets, TrialSolution
+from .contact_sets import ContactSets
 from .nested import Cells, cells_of, representatives
 from .solve import Identified, solve_or_identify
 
@@ -93,10 +93,7 @@ class DenseState:
 
     def _warm(self, start: WarmStart, load: LoadCase, tolerance: float) -> Answer:
         assert self.sweeps is not None
-        order = self.sweeps.M.order
-        trial = TrialSolution(start.lam[order], start.gap[order], 0.0)
-        C = self.sweeps.diagonal[order] * trial.lam > trial.y
-        case = self.sweeps.warm(Case(start.load, start.load.p[order], C, trial), load, tolerance)
+        case = self.sweeps.warm(self.sweeps.case_of(start, start.load), load, tolerance)
         return self.sweeps.answer(case, load, tolerance)
 
     def _sweeps(self, M: BandedInverse) -> BatchedSweeps:

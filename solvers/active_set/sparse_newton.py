@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.banded_inverse import Contacts
 from problems.forms.problem import Problem, stacked
 from problems.forms.sparse_factor import NotPositiveDefinite
 from problems.forms.sparse_prepared import SparsePrepared
@@ -24,7 +23,6 @@ from solvers.kkt import EPS
 from .augmented_sets import AugmentedSets
 from .batched import BatchedSweeps, Case
 from .bordered_factor import Set
-from .contact_sets import TrialSolution
 from .solve import solve_from
 
 MAX_SWEEPS = 100
@@ -79,7 +77,8 @@ class SparseState:
         if self.start is None:
             case = self.sweeps.cold(given, tolerance)
         else:
-            case = self.sweeps.warm(self._solved(self.start, self.sweeps.M.order), given, tolerance)
+            (before,) = self._with_p([self.start.load])
+            case = self.sweeps.warm(self.sweeps.case_of(self.start, before), given, tolerance)
         (answer,) = self._with_x([self.sweeps.answer(case, given, tolerance)], [load], tolerance)
         if answer.status == "solved" or answer.lam is None or not case.settled:
             return answer
@@ -95,11 +94,6 @@ class SparseState:
             return self._with_x(sweeps(self._with_p(loads), tolerance), loads, tolerance)
 
         return solve
-
-    def _solved(self, start: WarmStart, order: Contacts) -> Case:
-        load = self._with_p([start.load])[0]
-        trial = TrialSolution(start.lam[order], start.gap[order], 0.0)
-        return Case(load, load.p[order], self.diagonal[order] * trial.lam > trial.y, trial)
 
     def _with_p(self, loads: Sequence[LoadCase]) -> list[LoadCase]:
         """With p = AᵀK⁻¹f − g, (m,) mm; K⁻¹f is computed once if they share their f."""
@@ -145,12 +139,12 @@ class SparseSweeps(BatchedSweeps):
     def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
         return gaps(self.prepared, lam, loads)
 
-    def enough(self, case: Case, tolerance: float, stagnating: bool) -> float:
+    def enough(self, case: Case, tolerance: float) -> float:
         """Also what some sweeps have not made smaller, as the rounding of K⁻¹: whether that is enough is said
         by the refined x.
         """
         rounding = case.trial.rounding
-        if rounding <= TARGET * tolerance or (stagnating and rounding <= tolerance):
+        if rounding <= TARGET * tolerance or (case.stalled and rounding <= tolerance):
             return tolerance
         return STALLED_MM if case.stalled >= STALLED else -1.0
 

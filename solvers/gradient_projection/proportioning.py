@@ -49,10 +49,6 @@ class Proportioning:
     steps: dict[str, int] = field(default_factory=lambda: {"cg": 0, "expansion": 0, "proportioning": 0})
     before: tuple[Vector, Vector, Set] | None = None
 
-    def times_Q(self, v: Vector) -> Vector:
-        self.products += 1
-        return product(self.Q, v)
-
     def solve(self, tolerance: float, max_products: int) -> bool:
         """Until the KKT residual is at most max(tolerance/10, rounding) mm, or rounding leaves no more; False
         if the products were not enough. λ and y then are those of the smallest residual computed anew.

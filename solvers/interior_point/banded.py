@@ -17,26 +17,22 @@ from problems.forms.banded_inverse import BandedInverse, BandFactor
 from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
 from solvers.linear_algebra.product import product
 
-from .newton_system import CG_LIMIT, Solved
+from .newton_system import CG_LIMIT, FactoredPerD, Solved
 
 
-class Banded:
+class Banded(FactoredPerD):
     """Conjugate gradients until rᵀP⁻¹r ≤ tolerance² bᵀP⁻¹b with r = b − (Q + D) v."""
 
     def __init__(self, Q: Matrix, M: BandedInverse) -> None:
-        self.Q, self.M = Q, M
-        self.begin()
+        super().__init__(Q)
+        self.M = M
 
-    def begin(self) -> None:
-        """Start a new load case."""
-        self.D = np.full(len(self.Q), np.nan)
-        self.factorisations = 0
+    def factor_for(self, D: Vector) -> None:
+        self.S = np.sqrt(D[self.M.order])
+        self.factor: BandFactor = self.M.shifted_factor(self.S)
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
-        if not np.array_equal(D, self.D):
-            self.D, self.S = D, np.sqrt(D[self.M.order])
-            self.factor: BandFactor = self.M.shifted_factor(self.S)
-            self.factorisations += 1
+        self.take(D)
         limit = min(limit, CG_LIMIT * len(b))
         cg = conjugate_gradients(self._multiply, b, tolerance, limit, self._precondition)
         return Solved(cg.z, cg.iterations, cg.converged)

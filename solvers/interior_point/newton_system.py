@@ -6,6 +6,7 @@ factored in `prepare`, when the system is made.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -48,8 +49,8 @@ class NewtonSystem(Protocol):
         """v with (Q + D) v = b to the tolerance, in at most `limit` inner iterations."""
 
 
-class Direct:
-    """A Cholesky factorisation of H = Q + D for every D."""
+class FactoredPerD(ABC):
+    """Q (m, m), and something that is factored anew whenever D changes."""
 
     def __init__(self, Q: Matrix) -> None:
         self.Q = Q
@@ -60,13 +61,27 @@ class Direct:
         self.D = np.full(len(self.Q), np.nan)
         self.factorisations = 0
 
-    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+    def take(self, D: Vector) -> None:
+        """Factor for D, unless it is the one before."""
         if not np.array_equal(D, self.D):
-            H = np.array(self.Q, order="F")
-            H[np.diag_indices_from(H)] += D
-            self.factor = sla.cho_factor(H, overwrite_a=True, check_finite=False)
             self.D = D
+            self.factor_for(D)
             self.factorisations += 1
+
+    @abstractmethod
+    def factor_for(self, D: Vector) -> None: ...
+
+
+class Direct(FactoredPerD):
+    """A Cholesky factorisation of H = Q + D for every D."""
+
+    def factor_for(self, D: Vector) -> None:
+        H = np.array(self.Q, order="F")
+        H[np.diag_indices_from(H)] += D
+        self.factor = sla.cho_factor(H, overwrite_a=True, check_finite=False)
+
+    def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
+        self.take(D)
         return Solved(sla.cho_solve(self.factor, b, check_finite=False), 0, True)
 
 

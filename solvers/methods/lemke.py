@@ -9,8 +9,8 @@ d is the change of p from the load case whose answer is the start, and t goes fr
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,19 +19,14 @@ from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.parametric_path import ParametricPath
 from solvers.active_set.solve import solve_from
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.base import Answer, LoadCase, WarmStart, failed
+from solvers.dense_dual import DenseDual, DenseDualSolver
 from solvers.kkt import kkt_status
 
 FINISHING_SETS = 1000
 
 
-@dataclass(frozen=True)
-class _Ready:
-    Q: Matrix
-    start: WarmStart | None = None
-
-
-class Lemke(Solver):
+class Lemke(DenseDualSolver):
     """Lemke's pivots, with a factor of Q_CC that grows and shrinks.
 
     Ends at t = 0 with λ_C refined: "solved" if max(max(−y), max_{λ>0} |y|) ≤ max(tolerance,
@@ -44,29 +39,18 @@ class Lemke(Solver):
     max_pivots : limit on the pivots, in units of m.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
-
     def __init__(self, *, max_pivots: float = 10.0) -> None:
         if not max_pivots > 0:
             raise InputError.one("lemke", "max_pivots", max_pivots, "must be positive")
         self.max_pivots = max_pivots
 
-    def prepare(self, data: Problem) -> _Ready:
-        return _Ready(data.Q)
-
-    def update(
-        self, state: _Ready, ready: object, load: LoadCase, tolerance: float, start: WarmStart
-    ) -> _Ready:
-        """Along the change of p."""
-        return replace(state, start=start)
-
-    def solve(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+    def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
         try:
             return self._solved(ready, load, tolerance)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 
-    def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+    def _solved(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
         path = _cold(Q, p) if ready.start is None else _warm(Q, p, ready.start)
         arrived = path.follow(int(self.max_pivots * len(p)) + 10)

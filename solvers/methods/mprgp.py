@@ -22,6 +22,7 @@ from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.banded_inverse import banded_inverse
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.dense_dual import first_point
 from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
 from solvers.gradient_projection.proportioning import Proportioning
 from solvers.kkt import kkt_status
@@ -95,11 +96,8 @@ class Mprgp(Solver):
             return failed(str(error))
 
     def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
-        lam, y = np.zeros_like(load.p), -load.p
-        if ready.start is not None:
-            lam, y = np.maximum(ready.start.lam, 0.0), ready.start.gap + ready.start.load.p - load.p
         metric = ready.metric()
-        case = Proportioning(ready.Q, load.p, ready.diagonal, metric, lam, y)
+        case = Proportioning(ready.Q, load.p, ready.diagonal, metric, *first_point(ready.start, load))
         enough = case.solve(tolerance, self.max_products)
         status, residual = kkt_status(ready.Q, load.p, case.lam, case.y, tolerance)
         details: dict[str, Any] = {"products": case.products, "kkt_residual_mm": residual}

@@ -10,15 +10,15 @@ which converges for 0 < ω < 2, by a factor of about 1 − 1/cond(Q) per sweep: 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from scipy.linalg import blas
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart
+from solvers.base import Answer, LoadCase
+from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
 from solvers.kkt import kkt_residual, kkt_status, rounding_of
 from solvers.linear_algebra.product import product
 
@@ -26,13 +26,7 @@ CHECKED = 10  # sweeps after which y is computed anew
 SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slower is as good as never
 
 
-@dataclass(frozen=True)
-class _Ready:
-    Q: Matrix
-    start: WarmStart | None = None
-
-
-class ProjectedGaussSeidel(Solver):
+class ProjectedGaussSeidel(DenseDualSolver):
     """Projected Gauss–Seidel, from λ = 0 or a warm start.
 
     Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Qλ|)) mm, looked at after every
@@ -45,8 +39,6 @@ class ProjectedGaussSeidel(Solver):
     max_sweeps : limit on the sweeps.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
-
     def __init__(self, *, relaxation: float = 1.5, max_sweeps: int = 1_000_000) -> None:
         where, faults = "projected-gauss-seidel", []
         if not 0 < relaxation < 2:
@@ -57,19 +49,10 @@ class ProjectedGaussSeidel(Solver):
             raise InputError(faults)
         self.relaxation, self.max_sweeps = relaxation, max_sweeps
 
-    def prepare(self, data: Problem) -> _Ready:
-        return _Ready(data.Q)
-
-    def update(
-        self, state: _Ready, ready: object, load: LoadCase, tolerance: float, start: WarmStart
-    ) -> _Ready:
-        """From the forces of the warm start."""
-        return replace(state, start=start)
-
-    def solve(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+    def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
-        lam = np.zeros_like(p) if ready.start is None else np.maximum(ready.start.lam, 0.0)
-        y, products, sweeps = product(Q, lam) - p, 1, 0
+        lam, y = first_point(ready.start, load)
+        products, sweeps = 0, 0
         reached: list[float] = []  # the residual at each check
         cause = ""
         while True:

@@ -18,15 +18,16 @@ length nor how it solves its equations: nothing here is taken from it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.contact_sets import Principal
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.base import Answer, LoadCase, failed
+from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
 from solvers.kkt import kkt_residual, kkt_status, rounding_of
 from solvers.linear_algebra.product import product
 
@@ -34,12 +35,6 @@ LARGEST_EPSILON = 0.01  # mm
 DECREASE = 1e-4
 SHORTEST = 2.0**-40
 RESIDUAL_TARGET = 0.1  # of the tolerance
-
-
-@dataclass(frozen=True)
-class _Ready:
-    Q: Matrix
-    start: WarmStart | None = None
 
 
 @dataclass
@@ -53,7 +48,7 @@ class _Point:
         self.residual = kkt_residual(self.lam, self.y)
 
 
-class ProjectedNewton(Solver):
+class ProjectedNewton(DenseDualSolver):
     """Projected Newton with a line search along the projection arc, from λ = 0 or a warm start.
 
     Stops when max(max(−y), max_{λ>0} |y|) is at most 4ε max(|p| + |Qλ|) mm, or at most tolerance/10 and not
@@ -67,33 +62,19 @@ class ProjectedNewton(Solver):
     max_iterations : limit on the Newton steps.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
-
     def __init__(self, *, max_iterations: int = 1000) -> None:
         if max_iterations < 1:
             raise InputError.one("projected-newton", "max_iterations", max_iterations, "must be at least 1")
         self.max_iterations = max_iterations
 
-    def prepare(self, data: Problem) -> _Ready:
-        return _Ready(data.Q)
-
-    def update(
-        self, state: _Ready, ready: object, load: LoadCase, tolerance: float, start: WarmStart
-    ) -> _Ready:
-        """From the forces of the warm start."""
-        return replace(state, start=start)
-
-    def solve(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+    def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
         try:
             return self._solved(ready, load, tolerance)
         except np.linalg.LinAlgError as error:
             return failed(str(error))
 
-    def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
-        point = _Point(np.zeros_like(load.p), -load.p)
-        if ready.start is not None:
-            gap = ready.start.gap + ready.start.load.p - load.p
-            point = _Point(np.maximum(ready.start.lam, 0.0), gap)
+    def _solved(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
+        point = _Point(*first_point(ready.start, load))
         newton = _Newton(ready.Q, load.p)
         cause = f"max_iterations = {self.max_iterations}"
         for k in range(self.max_iterations + 1):
