@@ -92,6 +92,19 @@ def test_a_work_tree_as_committed(tree: Path) -> None:
     assert asked(tree) == (head, True)
 
 
+def test_a_commit_of_documents_or_results_is_no_other_code(tree: Path) -> None:
+    code = committed(tree)
+    (tree / "results").mkdir()
+    for name in ("results/index.md", "README.md"):
+        (tree / name).write_text("said\n")
+    assert committed(tree) != code
+    assert asked(tree) == (code, True)
+    with (tree / "pyproject.toml").open("a") as file:
+        file.write("\n")
+    assert asked(tree) == (code, False)
+    assert committed(tree) == asked(tree)[0]
+
+
 @pytest.mark.parametrize(
     "name", ["problems/__init__.py", "pyproject.toml", "solvers/new.py", "report/new.py"]
 )

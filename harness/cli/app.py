@@ -19,6 +19,7 @@ from harness.terminal.console import FormName, Plugin, ReferenceLimit, Scheduler
 from . import check as check_command
 from . import compare as compare_command
 from . import exchange as exchange_commands
+from . import publish as publish_command
 from . import reproduce as reproduce_command
 from . import scene as scene_commands
 from . import series as series_command
@@ -29,6 +30,7 @@ app = typer.Typer(
 app.add_typer(check_command.app)
 app.add_typer(compare_command.app)
 app.add_typer(exchange_commands.app)
+app.add_typer(publish_command.app)
 app.add_typer(reproduce_command.app)
 app.add_typer(scene_commands.app)
 app.add_typer(series_command.app)
@@ -155,13 +157,16 @@ def run(
 
 @app.command()
 def report(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")],
+    directory: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Directory that `run`, `series` or `publish` wrote.")
+    ],
 ) -> None:
-    """Rewrite DIR/report/report.md from the rows.
+    """Rewrite DIR/report/report.md from the rows, or DIR/index.md of published results.
 
     \b
     Example:
       python -m harness report results/default
+      python -m harness report results/published
     """
     with error_reporting() as console:
         from harness.planning.suite import read_written
@@ -177,6 +182,11 @@ def report(
             console.print(f"Report: {write_series(directory)}")
             return
         path = directory / records.MEASUREMENTS
+        if not path.is_file() and any(directory.glob(f"*/{path.name}")):
+            from report.writers.published import write_index
+
+            console.print(f"Index: {write_index(directory)}")
+            return
         if not path.is_file():
             raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
         refuse_unreadable(directory)

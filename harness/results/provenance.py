@@ -29,8 +29,9 @@ def provenance() -> dict[str, str | bool | None]:
 def commit() -> tuple[str, bool | None]:
     """The commit of the code in these packages, and whether the code is as committed.
 
-    In a git work tree of the project, the 40 hexadecimal digits of HEAD, and whether CODE has no changes;
-    an untracked file is one, because plug-ins are found by discovery. If pip installed the packages from
+    In a git work tree of the project, the 40 hexadecimal digits of the last commit that changed CODE, so that
+    one to documents or results is no other code, and whether CODE has no changes; an untracked file is one,
+    because plug-ins are found by discovery. If pip installed the packages from
     a git repository, the commit it recorded (PEP 610), which is clean. Otherwise, or if git is missing,
     the version and None, not known.
     """
@@ -38,14 +39,14 @@ def commit() -> tuple[str, bool | None]:
 
 
 def _of_work_tree() -> tuple[str, bool | None] | None:
-    head = _git("rev-parse", "--show-prefix", "HEAD")
-    if head is None or _git("ls-files", "--error-unmatch", "--", *OWN_FILES) is None:
+    prefix = _git("rev-parse", "--show-prefix")
+    if prefix is None or _git("ls-files", "--error-unmatch", "--", *OWN_FILES) is None:
         return None
-    prefix, digits = head.splitlines()
-    if prefix:  # the packages lie in a subfolder: the work tree is another project's
+    digits = _git("log", "-1", "--format=%H", "--", *CODE)
+    if prefix.strip() or not digits:  # in a subfolder, the work tree is another project's; or no commit yet
         return None
     changes = _git("status", "--porcelain", "--untracked-files=all", "--", *CODE)
-    return digits, None if changes is None else not changes
+    return digits.strip(), None if changes is None else not changes
 
 
 def _git(*arguments: str) -> str | None:

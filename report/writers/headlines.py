@@ -1,0 +1,142 @@
+"""What the published rows say in a few figures: for the index page and, held to it by a test, the README."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from report.analysis.outcomes import WRONG_CLAIMED, with_outcomes
+from report.analysis.precision import ACCURACIES, swept
+from report.analysis.relative import load_cases
+from report.analysis.roads import roads
+from report.analysis.standings import geometric_mean
+from report.document.numbers import counted, listed, power, significant
+from report.results.reader import Results
+from report.sections.ladders import in_house
+from report.sections.recommendation import recommended
+from report.sections.series import compared
+
+#: The solver that the README compares with the libraries.
+OWN = "newton (dual)"
+THREADS = 2
+ALONE, PREPARED, FROM_SCENE = "one load case", "one load case, preparation included", "one, from the scene on"
+
+
+def fastest(speed: Results) -> pd.DataFrame:
+    """By n and `question`, the line within the limit on every scene with the least geometric mean: `method`,
+    its `seconds`, and `times`, how many times as fast as the fastest library, the median over the scenes.
+    """
+    cases = load_cases(speed)
+    cases = cases[cases["threads"] == THREADS]
+    lines = _fastest(cases, "load_case_s", ALONE) + _fastest(cases, "total_s", PREPARED)
+    ways = roads(speed)
+    if len(ways):
+        library = ways[~ways["in_house"]].groupby("scene")["total_1_s"].min()
+        ways = ways.assign(library_total_1_s=ways["scene"].map(library))
+        lines += _fastest(ways, "total_1_s", FROM_SCENE)
+    return pd.DataFrame(lines).sort_values("n", kind="stable")
+
+
+def _fastest(lines: pd.DataFrame, seconds: str, question: str) -> list[dict[str, Any]]:
+    found = []
+    for n, of_size in lines.dropna(subset=[seconds]).groupby("n"):
+        table = of_size.pivot_table(index="scene", columns="method", values=seconds, aggfunc="median")
+        means = table.dropna(axis=1).apply(geometric_mean)
+        if means.empty:
+            continue
+        mine = of_size[of_size["method"] == means.idxmin()]
+        ratio = (mine[seconds] / mine[f"library_{seconds}"]).groupby(mine["scene"]).median().median()
+        line = {"n": n, "question": question, "method": means.idxmin()}
+        found.append(line | {"seconds": means.min(), "times": 1 / ratio})
+    return found
+
+
+def ratios(speed: Results) -> pd.DataFrame:
+    """By n, how many times as fast OWN is as the fastest library: `alone`, and `prepared`, what each prepares
+    included; the medians over the scenes, of the medians of the repeats.
+    """
+    cases = load_cases(speed)
+    mine = cases[(cases["threads"] == THREADS) & (cases["method"] == OWN)]
+    by_scene = mine.groupby(["n", "scene"])[["to_library", "total_to_library"]].median()
+    return (1 / by_scene.groupby("n").median()).set_axis(["alone", "prepared"], axis=1)
+
+
+def ratio_sentence(speed: Results) -> str:
+    found = ratios(speed)
+    alone, prepared = (listed([significant(x, 2) for x in found[name]]) for name in ("alone", "prepared"))
+    sizes = listed([f"{n:.0f}" for n in found.index])
+    return (
+        f"With two threads, the in-house `newton` is {alone} times as fast as the fastest library at "
+        f"n = {sizes}, and {prepared} times as fast if the preparation for each assembly is included"
+    )
+
+
+def series_rates(series: Results) -> pd.DataFrame:
+    """By n, the most load cases per second of any line with THREADS: `solver` and `rate`; `library_s`, the
+    seconds of the fastest library's next case.
+    """
+    rows = compared(series.of_threads(THREADS).rows)
+    rows = rows[rows["case"].notna()]
+    found = []
+    for n, of_size in rows.groupby("n"):
+        lines = of_size.groupby(["solver", "variant"])["later_s"].median().dropna()
+        name = ", ".join(word for word in lines.index[int(lines.argmin())] if word)
+        found.append(
+            {"n": n, "solver": name, "rate": 1 / lines.min(), "library_s": of_size["library_s"].iloc[0]}
+        )
+    return pd.DataFrame(found)
+
+
+def ladder_score(hard: Results) -> str:
+    """How often the in-house solvers are correct, and how often a library says solved of a wrong answer."""
+    rungs = hard.on_ladders(True)
+    cells = with_outcomes(rungs.cells)
+    others = cells[~cells["in_house"]]
+    wrong = int((others["outcome"] == WRONG_CLAIMED).sum())
+    return (
+        f"{in_house(rungs, cells)} Of {counted(len(others), 'row')} of the libraries, {wrong} "
+        f"{'is' if wrong == 1 else 'are'} wrong and reported as solved."
+    )
+
+
+def accuracy_cost(accuracy: Results) -> pd.DataFrame:
+    """By n and accuracy, mm, the fastest settings that reach it on every scene, of all and of the libraries:
+    `use` and `seconds`, `library` and `library_s`.
+    """
+    lines = []
+    for _, of_size in swept(accuracy).groupby("n"):
+        for wanted in ACCURACIES:
+            best = recommended(of_size, wanted)
+            library = recommended(of_size[~of_size["in_house"]], wanted)
+            lines.append(best | {"library": library["use"], "library_s": library["seconds"]})
+    return pd.DataFrame(lines)
+
+
+def gaps(directory: Path) -> Mapping[str, Any]:
+    """Of a series: `cases`, `within`, `rate` (cases per second of set-up, solve, x and bound), `bound_mm`."""
+    with (directory / "cases.jsonl").open("rb") as file:
+        rows: Sequence[Mapping[str, Any]] = [json.loads(line) for line in file]
+    spent = sum(row.get(step) or 0.0 for row in rows for step in ("setup_s", "solve_s", "form_s"))
+    return {
+        "cases": len(rows),
+        "within": sum(row["verdict"] == "within" for row in rows),
+        "rate": len(rows) / spent,
+        "bound_mm": max(np.inf if row.get("bound_mm") is None else row["bound_mm"] for row in rows),
+    }
+
+
+def gaps_sentence(directory: Path) -> str:
+    found = gaps(directory)
+    return (
+        f"{found['cases']} random load cases on {_scene(directory)}: {found['within']} proven to be within "
+        f"{power(found['bound_mm'], 2)} mm, {significant(found['rate'], 2)} per second, the proof included"
+    )
+
+
+def _scene(directory: Path) -> str:
+    return str(json.loads((directory / "series.json").read_text("utf-8"))["scene"])
