@@ -49,6 +49,13 @@ def test_a_terminal_of_few_letters_ends_no_command(words: tuple[str, ...], tmp_p
     assert "?" in done.stdout or words == ("--help",)
 
 
+def test_a_closed_terminal_ends_no_command(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "harness", "validate", "gallery/three-part-stack"]
+    root = Path(__file__).parents[1]
+    done = subprocess.run(["sh", "-c", f"{' '.join(words)} >&-"], cwd=root, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize(
     "words",
     [

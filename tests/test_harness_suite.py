@@ -119,6 +119,18 @@ def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:
     assert "'primal', 'dual' or 'sparse'" in faults["solver.1.forms.0"].allowed
 
 
+def test_a_value_that_may_be_a_word_has_one_fault(tmp_path: Path) -> None:
+    path = tiny.write_suite(tmp_path, TWO, repeats=0, tolerances=[0.0, "auto"])
+    with pytest.raises(InputError) as caught:
+        read_suite(str(path))
+    said = {fault.key: fault.allowed for fault in caught.value.faults}
+    assert said["repeats"] == "must be greater than or equal to 1"
+    assert said["tolerances.0"] == "must be greater than 0"
+    assert set(said) == {"repeats", "tolerances.0", "tolerances.1"}
+    with pytest.raises(InputError, match="repeats = 'often': must be 'auto'"):
+        read_suite(str(tiny.write_suite(tmp_path, TWO, repeats="often")))
+
+
 def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> None:
     text = '[[solver]]\nname = "gi"\n[[solver]]\nname = "gi"\noptions = {a = 1}\n'
     with pytest.raises(InputError, match=r"solver\.1\.variant"):

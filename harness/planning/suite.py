@@ -16,12 +16,12 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, PositiveInt, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, JsonValue, PositiveInt, Tag, ValidationError
 
 from harness.results.checksums import Damaged, refuse_changed
 from problems.errors import Fault, InputError
 from problems.input.bounded import Finite, Positive, Seed, resolved
-from problems.input.validation import unknown, validation_faults
+from problems.input.validation import VALUE, WORD, is_word, unknown, validation_faults
 from problems.manufactured.ladder import prefix_of, rung_names
 from problems.scene import read_toml, scene_names
 from solvers.base import Form
@@ -31,8 +31,9 @@ SUITES = Path(__file__).parent.parent / "suites"
 NonEmpty = Field(min_length=1)
 OLDER = {"together": "batched"}  # keys that older versions wrote
 FILE_NAME = r"^[^\x00-\x1f\x7f/\\]*$"  # what a file may be called
-Repeats = Annotated[int, Field(ge=1, le=1000)] | Literal["auto"]
-Tolerances = Annotated[list[Positive], NonEmpty] | Literal["auto"]
+Auto = Annotated[Literal["auto"], Tag(WORD)]
+Repeats = Annotated[Annotated[int, Field(ge=1, le=1000), Tag(VALUE)] | Auto, Discriminator(is_word)]
+Tolerances = Annotated[Annotated[list[Positive], NonEmpty, Tag(VALUE)] | Auto, Discriminator(is_word)]
 Cases = Annotated[int, Field(ge=1, le=1_000_000)]
 
 

@@ -63,7 +63,7 @@ def error_reporting(
 
     errors = PlainConsole(stderr=True, soft_wrap=True)
     try:
-        yield PlainConsole(width=None if sys.stdout.isatty() else WIDTH_OF_A_LOG)
+        yield PlainConsole(width=None if sys.stdout and sys.stdout.isatty() else WIDTH_OF_A_LOG)
     except InputError as error:
         for fault in error.faults[:MOST_FAULTS]:
             errors.print(str(fault), style="red")

@@ -19,6 +19,8 @@ UNITS = {
     **dict.fromkeys(["young", "value"], "N/mm²"),
     "stiffness_per_point": "N/mm",
 }
+#: Tags of what may be a value or a word, such as "auto"; left out of the keys in messages.
+VALUE, WORD = "a value", "a word"
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -35,11 +37,18 @@ def validation_faults(
         depth = len(item["loc"])
         if any(len(other["loc"]) > depth and other["loc"][:depth] == item["loc"] for other in items):
             continue  # a consequence of a fault inside it
-        key = ".".join(filter(None, [prefix, *map(str, item["loc"])]))
+        key = ".".join(
+            filter(None, [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD))])
+        )
         value = None if item["type"] == "missing" else item["input"]
         unit = next((units[str(part)] for part in reversed(item["loc"]) if part in units), None)
         allowed = _allowed(item, model)
         yield Fault(str(where), key or "file", value, f"{allowed}; in {unit}" if unit else allowed)
+
+
+def is_word(value: object) -> str:
+    """The tag of a value."""
+    return WORD if isinstance(value, str) else VALUE
 
 
 def unknown(kind: str, value: object, known: Sequence[str]) -> str:
