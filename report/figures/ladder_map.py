@@ -1,7 +1,13 @@
-"""Every solver on every rung of every ladder, as one picture."""
+"""Every solver on every rung of every ladder, as one picture.
+
+A wrong answer says by how much: k if its error is up to 10ᵏ times the limit. A rung whose limit is wider
+than the one asked for has it below its name.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -17,10 +23,12 @@ from report.analysis.outcomes import (
     WRONG_CLAIMED,
     WRONG_UNCLAIMED,
 )
+from report.document.blocks import records
+from report.document.numbers import power, tidy_power
 
 from . import style
 
-ROW, COLUMN = 0.18, 0.15  # inches
+ROW, COLUMN = 0.18, 0.17  # inches
 GAP = 0.6  # between ladders, in columns
 LABELS = 1.9  # inches to the left of the cells, for the names of the lines
 
@@ -31,24 +39,52 @@ LOOKS: dict[str, tuple[str, str, str]] = {
     UNJUDGED: ("white", "", "?"),
     NO_ANSWER: ("#E6E6E6", "", "–"),
     WRONG_UNCLAIMED: ("white", "//////", ""),
-    WRONG_CLAIMED: (style.VERMILLION, "", "×"),
+    WRONG_CLAIMED: (style.VERMILLION, "", ""),
+}
+WRONG = (WRONG_UNCLAIMED, WRONG_CLAIMED)
+
+#: What the rungs of a ladder count, and its unit.
+COUNTED = {
+    "coincident": "tie, N/mm",
+    "conditioning": "cond(K)",
+    "contact_scale": "2^±k in g",
+    "degeneracy": "weak, %",
+    "denormal": "in units of",
+    "duplicates": "apart",
+    "pivoting": "family, m",
+    "refinement": "nodes along",
+    "supports": "spring, N/mm",
+    "thickness": "times as thick",
+    "together": "cond(K)",
+    "units": "of K and A",
 }
 
 
 def ladder_map(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Figure:
     """cells : with outcomes. order : labels, the rows. ladders : the rungs of each ladder, the columns."""
     panels = _panels(ladders)
-    height = len(order) * ROW * len(panels) + 1.25 * len(panels) + 0.3
+    height = len(order) * ROW * len(panels) + 1.75 * len(panels) + 0.4
     drawing = style.figure(height)
-    places: Any = cells.set_index(["label", "ladder", "rung"])["outcome"].to_dict()
+    table = cells.assign(text=[_text(cell) for cell in records(cells)])
+    places: Any = table.set_index(["label", "ladder", "rung"])[["outcome", "text"]].to_dict("index")
+    wider = cells[cells["limit_mm"] > cells["limit_asked_mm"]].groupby(["ladder", "rung"])["limit_mm"].max()
+    limits: Any = {rung: f"  ≤ {tidy_power(power(limit, 2))} mm" for rung, limit in wider.items()}
     for axes, names in zip(drawing.subplots(len(panels), 1, squeeze=False)[:, 0], panels, strict=True):
-        _panel(axes, places, order, {name: ladders[name] for name in names})
+        _panel(axes, places, limits, order, {name: ladders[name] for name in names})
     handles = [
         Patch(facecolor=face, hatch=hatch, edgecolor="#888888", linewidth=0.5, label=f"{name} {mark}".strip())
         for name, (face, hatch, mark) in LOOKS.items()
     ]
     drawing.legend(handles=handles, loc="outside lower center", ncols=3)
     return drawing
+
+
+def _text(cell: Mapping[str, Any]) -> str:
+    """The mark of a cell's outcome, or of a wrong answer the power of ten of its error over the limit."""
+    if cell["outcome"] not in WRONG:
+        return LOOKS[cell["outcome"]][2]
+    share = cell["displacement_error_mm"] / cell["limit_mm"]
+    return f"{math.ceil(math.log10(share))}" if 1 <= share < math.inf else "∞"
 
 
 def _panels(ladders: dict[str, list[str]]) -> list[list[str]]:
@@ -66,22 +102,27 @@ def _panels(ladders: dict[str, list[str]]) -> list[list[str]]:
 
 
 def _panel(
-    axes: Axes, places: dict[tuple[str, str, str], str], order: list[str], ladders: dict[str, list[str]]
-) -> None:
+    axes: Axes, places: dict[tuple[str, str, str], dict[str, str]], limits: dict[tuple[str, str], str],
+    order: list[str], ladders: dict[str, list[str]],
+) -> None:  # fmt: skip
     x, ticks, names = 0.0, [], []
     for ladder, rungs in ladders.items():
         left = x
         for rung in rungs:
             for y, label in enumerate(order):
                 if (label, ladder, rung) in places:
-                    _cell(axes, x, y, places[label, ladder, rung])
+                    _cell(axes, x, y, **places[label, ladder, rung])
             ticks.append(x)
-            names.append(rung)
+            names.append(rung + limits.get((ladder, rung), ""))
             x += 1
-        axes.annotate(
-            ladder, ((left + x - 1) / 2, 1), (0, 3), xycoords=axes.get_xaxis_transform(),
-            textcoords="offset points", ha="center", fontsize=8, weight="bold", annotation_clip=False,
-        )  # fmt: skip
+        for text, above, size, weight in (
+            (ladder, 12, 8, "bold"),
+            (COUNTED.get(ladder, ""), 3, 6.5, "normal"),
+        ):
+            axes.annotate(
+                text, ((left + x - 1) / 2, 1), (0, above), xycoords=axes.get_xaxis_transform(),
+                textcoords="offset points", ha="center", fontsize=size, weight=weight, annotation_clip=False,
+            )  # fmt: skip
         x += GAP
     room = (style.WIDTH - LABELS) / COLUMN
     axes.set(xlim=(-0.6, max(x - GAP, room) - 0.4), ylim=(len(order) - 0.4, -0.6))
@@ -92,9 +133,11 @@ def _panel(
     axes.spines[:].set_visible(False)
 
 
-def _cell(axes: Axes, x: float, y: float, outcome: str) -> None:
-    face, hatch, mark = LOOKS[outcome]
+def _cell(axes: Axes, x: float, y: float, outcome: str, text: str) -> None:
+    face, hatch, _ = LOOKS[outcome]
     looks: Any = {"facecolor": face, "hatch": hatch, "edgecolor": "#999999", "linewidth": 0.4}
     axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, **looks))
-    ink = "white" if outcome == WRONG_CLAIMED else "#555555"
-    axes.text(x, y + 0.03, mark, ha="center", va="center", color=ink, fontsize=8, weight="bold")
+    ink = {WRONG_CLAIMED: "white", WRONG_UNCLAIMED: "black"}.get(outcome, "#555555")
+    box = {"facecolor": "white", "pad": 0.4, "linewidth": 0} if hatch else None
+    size = 8 if len(text) < 2 else 6.5
+    axes.text(x, y + 0.03, text, ha="center", va="center", color=ink, fontsize=size, weight="bold", bbox=box)

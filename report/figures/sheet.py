@@ -1,4 +1,4 @@
-"""A sheet of maps of one region, each in true proportions, with one colour bar.
+"""A sheet of maps of one region, each in true proportions, with colour bars.
 
 All sizes are known in advance. A layout engine would find them by drawing every label several times, which
 takes longer than the picture.
@@ -31,12 +31,13 @@ BAR, FROM_MAPS, SHORTEST = 0.18, 0.25, 1.0  # of a colour bar: width, distance, 
 class Sheet:
     figure: Figure
     axes: list[Axes]
-    bar: Axes
+    bars: list[Axes]
     legend_columns: int
 
-    def finished(self, drawn: ScalarMappable, label: str) -> Figure:
-        """The sheet with the colour bar of what was drawn and a legend of the labelled marks."""
-        self.figure.colorbar(drawn, cax=self.bar, label=label)
+    def finished(self, *scales: tuple[ScalarMappable, str]) -> Figure:
+        """The sheet with a labelled colour bar for each scale, and a legend of the labelled marks."""
+        for bar, (drawn, label) in zip(self.bars, scales, strict=True):
+            self.figure.colorbar(drawn, cax=bar, label=label)
         found = [axes.get_legend_handles_labels() for axes in self.axes]
         named = {text: mark for marks, texts in found for mark, text in zip(marks, texts, strict=True)}
         if named:
@@ -44,19 +45,19 @@ class Sheet:
         return self.figure
 
 
-def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int) -> Sheet:
+def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int, bars: int = 1) -> Sheet:
     """An empty map of one region for each title, row by row; the outer ones have tick labels.
 
-    low, high : the region's corners (x, y), mm. marks : the number of legend entries.
+    low, high : the region's corners (x, y), mm. marks : the number of legend entries. bars : of scales.
     """
-    rows = -(-len(titles) // columns)
+    rows, beside = -(-len(titles) // columns), bars * RIGHT
     ratio = (high[1] - low[1]) / (high[0] - low[0])
-    room = (style.WIDTH - LEFT - RIGHT - (columns - 1) * BESIDE) / columns
+    room = (style.WIDTH - LEFT - beside - (columns - 1) * BESIDE) / columns
     width = min(room, TALLEST / ratio)
     height = width * ratio
     over = LETTER * min(max(map(len, titles)), LONGEST_LABEL)  # a title may be wider than its map
     across, down = max(width + BESIDE, over), max(height, LOWEST) + BELOW  # from a map to the next
-    wide = LEFT + (columns - 1) * across + max(width + RIGHT, over)
+    wide = LEFT + (columns - 1) * across + max(width + beside, over)
     long = (rows - 1) * down + height
     bar = max(long, SHORTEST)
     top = TOP + (bar - long) / 2  # the maps in the middle of the bar
@@ -83,5 +84,5 @@ def sheet(low: Array, high: Array, titles: list[str], columns: int, marks: int) 
         axes.xaxis.label.set_visible(last)
         maps.append(axes)
     right = LEFT + (columns - 1) * across + width
-    beside = placed(right + FROM_MAPS, tall - TOP - bar, BAR, bar)
-    return Sheet(figure, maps, beside, legend_columns)
+    lefts = [right + FROM_MAPS + k * RIGHT for k in range(bars)]
+    return Sheet(figure, maps, [placed(left, tall - TOP - bar, BAR, bar) for left in lefts], legend_columns)

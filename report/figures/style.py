@@ -2,7 +2,8 @@
 
 A solver keeps its colour and marker in every figure of every report. Its forms differ in dashes and in the
 face of the marker, its variants in dashes, tint and the part of the marker that is filled. The colours are
-those of Okabe and Ito (2008), without their yellow.
+those of Okabe and Ito (2008), without their yellow; those of our solvers are told apart without their markers
+too, also by colour-blind readers (tests/test_figures.py).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 BLUE, VERMILLION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, ORANGE, BLACK, GREY = "#56B4E9", "#E69F00", "#000000", "#7F7F7F"
+ROSE, INDIGO, BROWN, PINK, CYAN = "#AA4466", "#332288", "#661100", "#FA9FB5", "#33BBEE"
 
 WIDTH = 9.0  # inches; at 100 pixels per inch the width of a page of text on a screen
 DPI = 160
@@ -37,7 +39,11 @@ KNOWN = {
     "ipm": (BLUE, "o"),
     "gi": (VERMILLION, "s"),
     "newton": (BLACK, "*"),
-    "ipm-fast": (BLACK, "o"),
+    "ipm-fast": (ROSE, "o"),
+    "mprgp": (INDIGO, "v"),
+    "projected-newton": (BROWN, "d"),
+    "lemke": (PINK, "H"),
+    "projected-gauss-seidel": (CYAN, "8"),
     "piqp": (GREEN, "D"),
     "proxqp": (PURPLE, "P"),
     "clarabel": (ORANGE, "X"),

@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 
 from . import style
-from .answer import map_sheet, marked, outlined, pair_name
+from .answer import CLOSED, map_sheet, marked, outlined, pair_name
 from .maps import Array, draw
 
 Answer = tuple[dict[str, Any], dict[str, Array]]
@@ -22,16 +22,16 @@ def gap_maps(answers: list[Answer], names: list[str]) -> dict[str, Figure]:
     nodes, pairs = one["contact_nodes"], first["pairs"]
     with style.applied():
         titles = [f"{name}: gap, {pair_name(pair)}" for pair in pairs for name in names]
-        maps = map_sheet(nodes, titles, 2, len(first["marks"] | second["marks"]))
+        maps = map_sheet(nodes, titles, 2, len(first["marks"] | second["marks"]) + 1)
         largest = max(float(arrays["gap_after"].max()) for _, arrays in answers)
         norm = PowerNorm(0.5, 0.0, max(largest, 0.0) or 1.0)
         for k, pair in enumerate(pairs):
             own = slice(pair["start"], pair["stop"])
             for axes, (record, arrays) in zip(maps.axes[2 * k : 2 * k + 2], answers, strict=True):
                 drawn = draw(axes, nodes[own], arrays["gap_after"][own], norm, "viridis")
-                outlined(axes, nodes[own], arrays["lam"][own] > 0, "white")
+                outlined(axes, nodes[own], arrays["lam"][own] > 0, CLOSED, "closed contacts")
                 marked(axes, record["marks"])
-        figures = {"gaps": maps.finished(drawn, "gap, mm")}
+        figures = {"gaps": maps.finished((drawn, "gap, mm"))}
         change = other["gap_after"] - one["gap_after"]
         size = float(abs(change).max()) or 1.0
         titles = [f"{names[1]} minus {names[0]}: {pair_name(pair)}" for pair in pairs]
@@ -40,4 +40,4 @@ def gap_maps(answers: list[Answer], names: list[str]) -> dict[str, Figure]:
             own = slice(pair["start"], pair["stop"])
             drawn = draw(axes, nodes[own], change[own], Normalize(-size, size), "RdBu_r")
             marked(axes, second["marks"])
-        return figures | {"difference": maps.finished(drawn, "change of the gap, mm")}
+        return figures | {"difference": maps.finished((drawn, "change of the gap, mm"))}

@@ -6,16 +6,20 @@ from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
+from matplotlib.ticker import LogLocator
 
 from report.analysis.precision import in_view, swept
 from report.document.blocks import Figure, Place, Section, Table, number, word
 from report.document.numbers import whole
 from report.figures import style
 from report.figures.lines import looks
+from report.figures.overlaps import side_by_side
 from report.results.labels import in_order, named
 from report.results.reader import Results
 
 PLACE = Place(350)
+
+PANEL = 2.7  # inches
 
 
 def section(results: Results) -> Section | None:
@@ -26,7 +30,8 @@ def section(results: Results) -> Section | None:
         "*Error against the requested tolerance*, the worst over the scenes of each size. Below the dotted "
         "diagonal the error is smaller than the tolerance. Solvers apply their tolerance to different "
         "quantities (a gap, a force, an energy), so only the slope matters: whether a line runs parallel to "
-        "the diagonal, and where it levels off. Runs without an answer are omitted."
+        "the diagonal, and where it levels off. Markers that would hide each other stand side by side. Runs "
+        "without an answer are omitted."
     )
     columns = [
         word("solver (form)", "method"),
@@ -47,16 +52,17 @@ def section(results: Results) -> Section | None:
 
 def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
     sizes, styles = sorted(cells["n"].unique()), looks(results, cells)
-    drawing = style.figure_above(3.2, style.legend_entries(styles))
-    panels = drawing.subplots(1, len(sizes), sharex=True, sharey=True, squeeze=False)[0]
+    drawing = style.figure(PANEL * len(sizes) + 0.4)
+    panels = drawing.subplots(len(sizes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    panels[0].set(xscale="log", yscale="log")
+    panels[0].xaxis.set_major_locator(LogLocator(numticks=20))
     for axes, n in zip(panels, sizes, strict=True):
         worst = cells[cells["n"] == n].groupby(["method", "tolerance"], as_index=False)["error"].max()
-        for method, look in styles.items():
-            line = worst[worst["method"] == method]
-            axes.plot(line["tolerance"], line["error"], **look)
+        side_by_side(axes, worst, "tolerance", "error", styles)
         axes.axline((1e-6, 1e-6), (1e-5, 1e-5), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
-        axes.set(xscale="log", yscale="log", title=f"n = {n:.0f}", xlabel="requested tolerance")
-    panels[0].set_ylabel("displacement error, mm")
+        axes.set(title=f"n = {n:.0f}", ylabel="displacement error, mm")
+    panels[-1].set_xlabel("requested tolerance")
+    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     return drawing
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, PowerNorm
 
 from report.analysis.drawn import middle_scene
 from report.document.blocks import Block, Figure, Place, Section, Text
 from report.figures import style
-from report.figures.maps import Array, draw, grid_of, outline
+from report.figures.answer import CLOSED, RIM, outlined
+from report.figures.maps import Array, draw
 from report.results.reader import Results
 
 PLACE = Place(410)
+
+BAR: dict[str, Any] = {"aspect": 6, "pad": 0.015, "fraction": 0.05}
+RING: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "none", "markeredgecolor": style.VERMILLION}
 
 
 def section(results: Results) -> Section | None:
@@ -33,29 +38,28 @@ def _figure(scene: str, n: int, arrays: dict[str, Array]) -> Figure:
     closed = lam > 0
     width, height = np.ptp(nodes, axis=0)
     strip = 7.6 * height / width  # inches
-    drawing = style.figure(3 * (max(strip, 0.5) + 0.42) + 0.5)
+    drawing = style.figure(3 * (max(strip, 0.5) + 0.42) + 0.8)
     panels: list[Axes] = list(drawing.subplots(3, 1, sharex=True, sharey=True))
 
-    widest = float(max(before.max(), after.max(), 0.0))
-    gap = Normalize(min(0.0, float(after.min())), widest or 1.0)
+    gaps = (("gap before", before), ("gap after", after))
+    for axes, (title, values) in zip(panels, gaps, strict=False):
+        norm = Normalize(min(0.0, float(values.min())), max(float(values.max()), 0.0) or 1.0)
+        drawn = draw(axes, nodes, values, norm, "viridis")
+        drawing.colorbar(drawn, ax=axes, label="gap, mm", **BAR)
+        axes.plot(*fasteners.T, "o", label="fasteners", **RING)
+        axes.set_title(title)
     force = PowerNorm(0.5, 0.0, float(lam.max()) or 1.0)
-    draw(panels[0], nodes, before, gap, "viridis")
-    gaps = draw(panels[1], nodes, after, gap, "viridis")
-    forces = draw(panels[2], nodes, np.where(closed, lam, np.nan), force, "magma_r")
-    drawing.colorbar(gaps, ax=panels[:2], label="gap, mm", aspect=14, pad=0.015, fraction=0.05)
-    drawing.colorbar(forces, ax=panels[2], label="force, N", aspect=6, pad=0.015, fraction=0.05)
-    if grid := grid_of(nodes):
-        for axes, colour in ((panels[1], "white"), (panels[2], "#444444")):
-            axes.add_collection(LineCollection(outline(grid, closed), colors=colour, linewidths=0.9))
-    for axes in panels[:2]:
-        axes.plot(*fasteners.T, "o", markersize=3.2, markerfacecolor="none", markeredgecolor=style.VERMILLION)
-    panels[0].set_title("gap before")
-    panels[1].set_title("gap after")
+    drawn = draw(panels[2], nodes, np.where(closed, lam, np.nan), force, "magma_r")
+    drawing.colorbar(drawn, ax=panels[2], label="force, N", **BAR)
     panels[2].set_title("contact forces")
+    outlined(panels[1], nodes, closed, CLOSED, "closed contacts")
+    outlined(panels[2], nodes, closed, RIM, "closed contacts")
     panels[2].set_xlabel("x, mm")
+    handles, names = panels[1].get_legend_handles_labels()
+    drawing.legend(handles, names, loc="outside lower left", ncols=2)
     caption = (
-        f"*Scene {scene} (n = {n}): the gap before and after, and the contact forces.* Both gaps share one "
-        f"scale; proportions are true. Outlined: the {closed.sum()} closed contacts"
+        f"*Scene {scene} (n = {n}): the gap before and after, and the contact forces.* Each has a scale "
+        f"of its own; proportions are true. Outlined: the {closed.sum()} closed contacts"
         + (f"; circles: the {len(fasteners)} fasteners" if len(fasteners) else "")
         + ". The force scale is that of the square root, so that small forces are visible."
     )

@@ -43,7 +43,9 @@ def section(results: Results) -> Section | None:
             "ladders",
             "*Every solver on every rung; each ladder grows harder to the right.* Dark: correct and reported "
             "as solved; pale: correct, but not reported as solved; hatched: wrong, and not reported as "
-            "solved; ×: wrong, but reported as solved; –: no answer.",
+            "solved; red: wrong, but reported as solved; –: no answer. A k in a wrong answer: its error "
+            "is up to 10ᵏ times the limit. A rung whose limit is wider than "
+            f"{results.limit} has it below the figure.",
             ladder_map(cells, order, ladders),
         ),
         honesty(cells, order),

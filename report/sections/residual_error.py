@@ -20,7 +20,9 @@ PLACE = Place(360)
 
 RESIDUALS = {"primal_residual": "mm", "dual_residual": "N", "duality_gap": "N·mm"}
 
-SMALL = {"markersize": 4.0, "markeredgewidth": 1.0}
+PANEL = 2.7  # inches
+RING = {"markersize": 5.0, "markeredgewidth": 0.9}
+OPACITY = 0.35
 
 
 def section(results: Results) -> Section | None:
@@ -42,16 +44,21 @@ def section(results: Results) -> Section | None:
 
 
 def _drawing(results: Results, cells: pd.DataFrame) -> Drawing:
-    styles = {s: style.marker_only(look) | SMALL for s, look in styles_of(results, cells).items()}
-    drawing = style.figure_above(3.2, style.legend_entries(styles))
-    panels = drawing.subplots(1, len(RESIDUALS), sharey=True)
+    """The markers are rings, those of the methods with the fewest answers on top."""
+    styles = {s: style.marker_only(look) | RING for s, look in styles_of(results, cells).items()}
+    for look in styles.values():
+        look["markerfacecolor"] = (look["markerfacecolor"], OPACITY)
+    drawing = style.figure(PANEL * len(RESIDUALS) + 0.4)
+    panels = drawing.subplots(len(RESIDUALS), 1, sharey=True)
+    often = cells["method"].value_counts()
     for axes, (name, unit) in zip(panels, RESIDUALS.items(), strict=True):
         for method, look in styles.items():
             line = cells[cells["method"] == method]
-            axes.plot(line[name], line["error"], **look)
+            axes.plot(line[name], line["error"], **look, zorder=3 - often[method] / often.max())
         axes.set(xscale="log", yscale="log", xlabel=f"{name.replace('_', ' ')}, {unit}")
+        axes.set_ylabel("displacement error, mm")
         axes.axhline(cells["limit_mm"].max(), color="black", linewidth=1.1, linestyle=(0, (1, 1.5)))
-    panels[0].set_ylabel("displacement error, mm")
+    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper")
     return drawing
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 
 from report.analysis.drawn import drawn_cells, omission_note
 from report.analysis.relative import load_cases
@@ -19,7 +20,11 @@ from report.results.reader import Results
 
 PLACE = Place(130)
 
-PANEL = 3.0  # inches
+Styles = dict[str, dict[str, Any]]
+
+PANEL, GROWING = 3.0, 4.5  # inches
+YARDSTICK: dict[str, Any] = {"color": "#888888", "linewidth": 1.0, "zorder": 0.5}
+BESIDE: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 7.5, "color": "#666666"}
 
 
 def section(results: Results) -> Section | None:
@@ -127,33 +132,56 @@ def _range(name: str) -> Callable[[Mapping[str, Any]], str]:
 
 
 def _figure(results: Results, cases: pd.DataFrame) -> Figure:
+    """One panel per size against the active contacts; if each size has one scene, one panel against n."""
     most = cases["threads"].max()
     results, cases = results.of_threads(most), cases[cases["threads"] == most]
+    drawn = drawn_cells(results)
+    styles = styles_of(results, drawn[drawn["method"].isin(cases["method"])])
     sizes = sorted(cases["n"].unique())
-    drawing = style.figure(PANEL * len(sizes) + 0.3)
-    shown = drawn_cells(results)
-    styles = styles_of(results, shown[shown["method"].isin(cases["method"])])
-    for axes, n in zip(drawing.subplots(len(sizes), 1, squeeze=False)[:, 0], sizes, strict=True):
-        of_size = cases[cases["n"] == n]
-        for method, look in styles.items():
-            line = of_size[of_size["method"] == method].groupby("active")["to_cholesky"].median()
-            axes.plot(line.index, line.to_numpy(), **look)
-        product = (of_size["product_s"] / of_size["cholesky_s"]).median()
-        for height, what in ((1.0, "one Cholesky of Q"), (product, "one product Qv")):
-            axes.axhline(height, color="#888888", linewidth=1.0, zorder=0.5)
-            axes.annotate(
-                what, (1, height), (3, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
-                va="center", fontsize=7.5, color="#666666",
-            )  # fmt: skip
-        axes.set(yscale="log", ylabel="time, in Cholesky factorisations")
-        style.plain_log(axes.yaxis)
-        style.percent_above(axes, of_size["m"].iloc[0])
-        axes.set_title(f"n = {n:.0f}", pad=5)
-    axes.set_xlabel("active contacts")
+    growing = len(sizes) > 1 and cases["scene"].nunique() == len(sizes)
+    drawing = style.figure(GROWING if growing else PANEL * len(sizes) + 0.3)
+    if growing:
+        _against_size(drawing.subplots(), cases, styles)
+    else:
+        panels = drawing.subplots(len(sizes), 1, squeeze=False)[:, 0]
+        for axes, n in zip(panels, sizes, strict=True):
+            _against_contacts(axes, cases[cases["n"] == n], styles)
+        panels[-1].set_xlabel("active contacts")
     drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
+    against = "size" if growing else "active contacts"
     caption = (
-        "*Time per load case in Cholesky factorisations of Q* of the same process, against the active "
-        "contacts; answers within the limit only, medians of the repeats, at the largest number of threads."
+        f"*Time per load case in Cholesky factorisations of Q* of the same process, against the {against}; "
+        "answers within the limit only, medians of the repeats, at the largest number of threads."
         f"{omission_note(results)}"
     )
     return Figure("speed", caption, drawing)
+
+
+def _against_contacts(axes: Axes, cases: pd.DataFrame, styles: Styles) -> None:
+    product = (cases["product_s"] / cases["cholesky_s"]).median()
+    _lines(axes, cases, "active", styles)
+    for height, what in ((1.0, "one Cholesky of Q"), (product, "one product Qv")):
+        axes.axhline(height, **YARDSTICK)
+        axes.annotate(what, (1, height), (3, 0), xycoords=("axes fraction", "data"), **BESIDE)
+    style.percent_above(axes, cases["m"].iloc[0])
+    axes.set_title(f"n = {cases['n'].iloc[0]:.0f}", pad=5)
+
+
+def _against_size(axes: Axes, cases: pd.DataFrame, styles: Styles) -> None:
+    products = (cases["product_s"] / cases["cholesky_s"]).groupby(cases["n"]).median()
+    _lines(axes, cases, "n", styles)
+    for heights, what in ((0 * products + 1, "one Cholesky of Q"), (products, "one product Qv")):
+        axes.plot(heights.index, heights, **YARDSTICK)
+        axes.annotate(what, (heights.index[-1], heights.iloc[-1]), (8, 0), **BESIDE)
+    axes.set_xscale("log")
+    axes.set_xticks(products.index.tolist(), [f"{n:.0f}" for n in products.index])
+    axes.minorticks_off()
+    axes.set_xlabel("n")
+
+
+def _lines(axes: Axes, cases: pd.DataFrame, along: str, styles: Styles) -> None:
+    for method, look in styles.items():
+        line = cases[cases["method"] == method].groupby(along)["to_cholesky"].median()
+        axes.plot(line.index, line.to_numpy(), **look)
+    axes.set(yscale="log", ylabel="time, in Cholesky factorisations")
+    style.plain_log(axes.yaxis)

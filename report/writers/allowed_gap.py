@@ -31,7 +31,7 @@ def write(directory: Path, series: Series, found: Exceeding) -> Path:
             maps = sheet(middle - size / 2, middle + size / 2, [title], 1, 0)
             norm = Normalize(0.0, 100 * float(found.shares.max()) or 1.0)
             drawn = draw(maps.axes[0], nodes, 100 * found.shares, norm, "magma_r")
-            maps.finished(drawn, "share of cases, %").savefig(directory / "allowed-gap.png", dpi=style.DPI)
+            maps.finished((drawn, "share of cases, %")).savefig(directory / "allowed-gap.png", dpi=style.DPI)
     path = directory / "allowed-gap.csv"
     table.to_csv(path, index_label="contact")
     return path

@@ -5,11 +5,12 @@ and a page in HTML with the maps.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
+from matplotlib.colors import PowerNorm
 
 from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number
@@ -26,6 +27,7 @@ from .pages import rendered
 
 MAPPED = (0.5, 0.95, 0.99)
 LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))
+RING: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "none", "markeredgecolor": style.VERMILLION}
 STEPS = {"setup_s": "update or set-up", "solve_s": "solve", "form_s": "x, gaps, residuals, error bound"}
 
 
@@ -115,7 +117,7 @@ def _pictures(series: Series, target: Path) -> list[Block]:
         shown = [(f"{100 * q:g} % quantile", maps[QUANTILES.index(q)]) for q in MAPPED]
         caption = (
             "*The remaining gap at each contact: quantiles over the cases.* In one case out of twenty, the "
-            "gap at a contact exceeds its 95 % quantile. Circles: the fasteners."
+            "gap at a contact exceeds its 95 % quantile. Each map has a square-root scale of its own."
         )
         blocks.append(_maps("quantile-maps", caption, series, shown))
         worst_caption = f"*The worst case, number {case}, with a largest gap of {significant(gap.max())} mm.*"
@@ -131,19 +133,22 @@ def _pictures(series: Series, target: Path) -> list[Block]:
 
 
 def _maps(name: str, caption: str, series: Series, shown: list[tuple[str, np.ndarray]]) -> Figure:
+    """Each map on a square-root scale of its own, with its largest gap above it."""
     assert series.nodes is not None
     width, height = np.ptp(series.nodes, axis=0)
     strip = max(7.6 * height / (width or 1.0), 0.5)
-    drawing = style.figure(len(shown) * (min(strip, 4.0) + 0.36) + 0.36)
+    drawing = style.figure(len(shown) * (min(strip, 4.0) + 0.4) + 0.6)
     panels: list[Axes] = list(drawing.subplots(len(shown), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
-    low, high = min(float(v.min()) for _, v in shown), max(float(v.max()) for _, v in shown)
-    norm = Normalize(min(0.0, low), high if high > 0 else 1.0)
     for axes, (title, values) in zip(panels, shown, strict=True):
+        low, high = min(0.0, float(values.min())), float(values.max())
+        norm = PowerNorm(0.5, low, high if high > low else low + 1.0)
         mapped = draw(axes, series.nodes, values, norm, "viridis")
-        axes.plot(*series.fasteners.T, "o", markersize=3.2, markerfacecolor="none", markeredgecolor="white")
-        axes.set_title(title)
+        drawing.colorbar(mapped, ax=axes, label="gap, mm", aspect=6, pad=0.015, fraction=0.05)
+        axes.plot(*series.fasteners.T, "o", label="fasteners", **RING)
+        axes.set_title(f"{title}: at most {significant(high)} mm")
     panels[-1].set_xlabel("x, mm")
-    drawing.colorbar(mapped, ax=panels, label="gap, mm", aspect=8 * len(shown), pad=0.015, fraction=0.05)
+    if len(series.fasteners):
+        drawing.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left")
     return Figure(name, caption, drawing)
 
 
