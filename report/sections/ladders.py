@@ -25,6 +25,7 @@ from report.results.reader import Results
 
 PLACE = Place(10, "ladders")
 
+NOT_RUN = "not run"
 CONDITION = 1e12  # of K: up to it the in-house solvers are required to be correct
 
 
@@ -43,8 +44,8 @@ def section(results: Results) -> Section | None:
             "ladders",
             "*Every solver on every rung; each ladder grows harder to the right.* Dark: correct and reported "
             "as solved; pale: correct, but not reported as solved; hatched: wrong, and not reported as "
-            "solved; red: wrong, but reported as solved; –: no answer. A k in a wrong answer: its error "
-            "is up to 10ᵏ times the limit. A rung whose limit is wider than "
+            "solved; red: wrong, but reported as solved; –: no answer; empty: not run. A k in a wrong "
+            "answer: its error is up to 10ᵏ times the limit. A rung whose limit is wider than "
             f"{results.limit} has it below the figure.",
             ladder_map(cells, order, ladders),
         ),
@@ -122,12 +123,14 @@ def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, li
     columns = [word("solver (form)", "label"), *(word(ladder, ladder) for ladder in ladders)]
     caption = (
         "*Breaking points: the first rung of each ladder without a correct answer.* ×: reported as solved. "
-        f"{MISSING}: correct on every rung."
+        f"{MISSING}: correct on every rung that was run."
     )
     return Table("breaking-points", caption, pd.DataFrame(records), columns)
 
 
 def _first_broken(line: pd.DataFrame, rungs: list[str]) -> str:
+    if line.empty:
+        return NOT_RUN
     broken = line[~is_correct(line)].set_index("rung")["outcome"]
     for rung in rungs:
         if rung in broken:
