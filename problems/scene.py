@@ -22,7 +22,7 @@ from pydantic import ValidationError
 
 from problems.input.bounded import regular_file, resolved
 from problems.input.validation import UNITS, unknown, validation_faults
-from problems.manufactured.ladder import make_rung, prefix_of, rung_names
+from problems.manufactured.ladder import LADDERS, make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
 from problems.model.joint import Joint, Table
@@ -90,10 +90,13 @@ def _rung_scene(prefix: str, name: str) -> Scene:
     if name not in (known := rung_names(prefix)):
         raise _unknown_scene(name, known)
     rung = make_rung(name)
+    on_ladder = prefix in LADDERS
     if rung.made:
-        return MadeScene(name, rung.title, rung.made, on_ladder=True, refused=rung.refused)
+        return MadeScene(
+            name, rung.title, rung.made, on_ladder=on_ladder, refused=rung.refused, printed=rung.printed
+        )
     assert rung.joint is not None
-    return JointScene(name, rung.title, rung.joint, rung.effects, on_ladder=True, refused=rung.refused)
+    return JointScene(name, rung.title, rung.joint, rung.effects, on_ladder=on_ladder, refused=rung.refused)
 
 
 def _unknown_scene(name: str, known: list[str]) -> InputError:

@@ -28,7 +28,8 @@ def judged(x: np.ndarray, lam: np.ndarray, bound_mm: float = 1e-15) -> Judgement
 
 
 def test_the_exact_answer() -> None:
-    assert judged(X, LAM) == Judgement("within", 1e-15, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    # The objective: ½ 2 (0.75² + 0.25²) − (3 · 0.75 − 0.25).
+    assert judged(X, LAM) == Judgement("within", 1e-15, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.375)
 
 
 def test_an_answer_without_contact() -> None:

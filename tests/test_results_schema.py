@@ -11,7 +11,7 @@ import pytest
 
 from harness.results import schema
 from harness.verification.judge import Judgement
-from problems.manufactured.ladder import PREFIXES
+from problems.manufactured.ladder import LADDERS
 from solvers.base import Status
 
 PUBLISHED = Path(__file__).parents[1] / "results" / "published"
@@ -35,7 +35,7 @@ def test_every_field_of_the_published_rows_is_in_the_schema_with_its_kind(name: 
 def test_the_vocabulary_is_that_of_solvers_judge_and_ladders() -> None:
     assert set(get_args(Status)) == set(schema.STATUSES[:4])
     assert {field.name for field in fields(Judgement)} == set(schema.JUDGED)
-    assert schema.LADDERS == PREFIXES
+    assert schema.LADDERS == LADDERS
     assert schema.ANSWERED == ("within", "outside", "cannot_be_judged")
 
 

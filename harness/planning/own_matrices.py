@@ -1,4 +1,4 @@
-"""What a user's own matrices will need: memory of the dense forms and of the sparse one, before the work."""
+"""What given matrices will need: memory of the dense forms and of the sparse one, before the work."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from harness.results.machine import physical_memory_mib
 from problems.errors import InputError
 from problems.forms.names import DENSE_FORMS, Form
 from problems.forms.sparse_factor import expected_numbers
-from problems.input.stored_matrices import holds_sparse, stored_matrices
-from problems.model.scene import MatricesScene
+from problems.input.stored_matrices import SMALL, holds_sparse, stored_matrices
+from problems.model.scene import MadeScene, MatricesScene
 
 MIB = 2**20
 BYTES_PER_ENTRY = 200  # of K and its copies in sparse storage
@@ -32,12 +32,17 @@ class OwnSize:
         return self.dense_mib if form in DENSE_FORMS else self.sparse_mib
 
 
-def own_size(scene: MatricesScene) -> OwnSize | None:
-    """Of matrices that the files hold as sparse ones; None if they hold K as an array, which it then fits."""
-    files = dict(scene.files)
-    if not holds_sparse(files):
-        return None
-    assembly = stored_matrices(files, scene.assembly_key, sparse=True)[0]
+def own_size(scene: MatricesScene | MadeScene) -> OwnSize | None:
+    """Of matrices that are sparse; None if K is an array, which then fits, or small."""
+    if isinstance(scene, MadeScene):
+        if not scene.sparse or sum(scene.block_sizes) <= SMALL:
+            return None
+        assembly = scene.made.assembly
+    else:
+        files = dict(scene.files)
+        if not holds_sparse(files):
+            return None
+        assembly = stored_matrices(files, scene.assembly_key, sparse=True)[0]
     sizes, m = [K.shape[0] for K in assembly.blocks], assembly.m
     dense = 8 * (2 * sum(size**2 for size in sizes) + max(sizes) ** 2 + 2 * m**2)
     numbers = [expected_numbers(K) for K in assembly.sparse_blocks]
@@ -55,7 +60,7 @@ def own_size(scene: MatricesScene) -> OwnSize | None:
     )
 
 
-def refuse_own(scene: MatricesScene, form: Form) -> None:
+def refuse_own(scene: MatricesScene | MadeScene, form: Form) -> None:
     """Raise InputError where a form's matrices need more memory than this machine has."""
     size = own_size(scene)
     physical = physical_memory_mib()

@@ -9,7 +9,7 @@ from harness.results.machine import physical_memory_mib
 from problems.condensation.build import built
 from problems.errors import InputError
 from problems.forms.names import DENSE_FORMS, Form, default_form
-from problems.model.scene import JointScene, MatricesScene, Scene
+from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 
 from .estimate import estimated, estimated_sparse, refuse_what_cannot_fit
 from .own_matrices import own_size, refuse_own
@@ -38,7 +38,7 @@ def chosen_form(
         return cheaper(scene, taken, cases, in_house)
     if asked not in taken:
         raise InputError.one("--form", "form", asked, f"the solver takes {' and '.join(taken)}")
-    if isinstance(scene, MatricesScene):
+    if isinstance(scene, MatricesScene | MadeScene):
         refuse_own(scene, asked)
     elif asked in DENSE_FORMS:
         refuse_what_cannot_fit(scene, scene.name)
@@ -51,10 +51,9 @@ def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1, in_house: bool 
     Raises InputError if the only form that this machine's memory could hold is not among them.
     """
     usual = default_form([form for form in taken if form in DENSE_FORMS] or taken)
-    if isinstance(scene, MatricesScene):
-        return _own(scene, taken, usual, in_house)
     if not isinstance(scene, JointScene):
-        return Choice(usual)
+        assert isinstance(scene, MatricesScene | MadeScene)
+        return _own(scene, taken, usual, in_house)
     condensed, sparse = estimated(scene, FLOPS_PER_S), estimated_sparse(scene, FLOPS_PER_S)
     physical = physical_memory_mib()
     if condensed.peak_mib > physical:
@@ -73,7 +72,7 @@ def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1, in_house: bool 
     return Choice("sparse", f"about {sparse_s:.0f} s, where condensing first would take {dense_s:.0f} s")
 
 
-def _own(scene: MatricesScene, taken: Sequence[Form], usual: Form, in_house: bool) -> Choice:
+def _own(scene: MatricesScene | MadeScene, taken: Sequence[Form], usual: Form, in_house: bool) -> Choice:
     """The sparse form of a user's sparse K where the dense one does not fit or takes longer."""
     size = own_size(scene)
     if size is None or usual == "sparse" or "sparse" not in taken:

@@ -74,7 +74,7 @@ MEASURED_OF_CASES: dict[str, Kind] = {**_fields("number", "batched"), **_fields(
 JUDGED: dict[str, Kind] = {
     **_fields("text", "verdict"),
     **_fields("number", "reference_bound_mm displacement_error_mm contact_mismatch min_gap_mm"),
-    **_fields("number", "primal_residual dual_residual duality_gap backward_error"),
+    **_fields("number", "primal_residual dual_residual duality_gap backward_error objective"),
 }
 #: The checksum of a row (checksums.py).
 CRC = "crc32"
@@ -91,8 +91,9 @@ FIELDS: dict[str, Kind] = {**ASKED, **PROBLEM, **MEASURED, **MEASURED_OF_CASES, 
 
 #: The rows of problems.jsonl, one per scene.
 PROBLEM_FIELDS: dict[str, Kind] = {
-    **_fields("text", "scene title scene_key reference_route refused"),
+    **_fields("text", "scene title scene_key reference_route refused printed_source"),
     **_fields("number", "n m active cond_K lambda_min lambda_max reference_s reference_bound_mm"),
+    **_fields("number", "printed_objective printed_digits"),
     **_fields("object", "build_s stored_mib sparse"),
 }
 

@@ -27,7 +27,8 @@ from .principal_pivoting import Stop, pivoted
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
 PASSES = 3
-FEW = 2000  # contacts, for which the interior point may make Q
+FEW = 2000  # contacts, for which the interior point may make Q, and pivoting begins where it is told
+STIFFENING = 4.0  # of the springs that tell the first set of more
 ROUNDING = 2.0**-50  # of the largest term: gaps and forces that are zero but for rounding
 
 
@@ -82,6 +83,8 @@ def contact_set(
 ) -> NDArray[np.bool_]:
     """The closed contacts by principal pivoting from a first set; a guess, if `stop` ends the search."""
     m = prepared.assembly.m
+    if m > FEW:
+        start = _with_springs(prepared, load, start, stop)
 
     def rescue() -> NDArray[np.bool_] | None:
         if m > FEW:
@@ -89,3 +92,25 @@ def contact_set(
         return interior_contact_set(prepared.compliance, prepared.dual_load(load), stop)
 
     return pivoted(lambda S: solution(prepared, load, S), start, rescue, stop)[0]
+
+
+def _with_springs(
+    prepared: SparsePrepared, load: LoadCase, S: NDArray[np.bool_], stop: Stop
+) -> NDArray[np.bool_]:
+    """The contacts that overlap if springs hold them, the set found anew for springs ever stiffer, from as
+    stiff as K against the overlap of S to as stiff as its stiffest unknown at a contact.
+
+    From S itself pivoting would open the contacts at its edge alone, a row of them per factorisation.
+    """
+    assembly = prepared.assembly
+    A, K = assembly.A, sp.csc_array(sp.block_diag(assembly.blocks, format="csc"))
+    stiffest = float(assembly.diagonal_K()[A.indices].max()) / float((A.data**2).max())
+    overlap = np.where(S, prepared.dual_load(load), 0.0)
+    given_way = float(overlap @ (A.T @ prepared.solve_K(A @ overlap)))
+    rho = float(overlap @ overlap) / given_way if given_way > 0 else stiffest
+    while rho < stiffest and S.any() and not stop():
+        springs = sp.diags_array(rho * S)
+        factor = factored(sp.csc_array(K + A @ springs @ A.T), assembly.nodes)
+        S = A.T @ factor.solve(load.f + A @ (springs @ load.g)) > load.g
+        rho *= STIFFENING
+    return S

@@ -8,6 +8,7 @@ With x, λ the answer, x* the reference and y = g − Aᵀx the final gaps:
     primal_residual       = max(0, max(Aᵀx − g))                          mm
     dual_residual         = max(max|Kx − f + Aλ|, max(0, −λ))             N
     duality_gap           = |xᵀKx − fᵀx + gᵀλ|                            N·mm
+    objective             = ½xᵀKx − fᵀx                                  N·mm
     contact_mismatch      = closed in x* and y > limit, or open in x* and y ≤ limit
 
 The backward error is the residual of the optimality conditions (equilibrium; λ ≥ 0, y ≥ 0, λᵀy = 0) relative
@@ -49,6 +50,7 @@ class Judgement:
     dual_residual: float | None = None
     duality_gap: float | None = None
     backward_error: float | None = None
+    objective: float | None = None
 
 
 def conditioned_limit(limit_mm: float, cond_K: float, largest_mm: float) -> float:
@@ -74,8 +76,8 @@ def judge(
     wrongly_open = reference.active & (gap > limit_mm)
     wrongly_closed = ~reference.active & (reference_gap > 2 * limit_mm) & (gap <= limit_mm)
     dual_residual = duality_gap = backward_error = None
+    Kx = prepared.assembly.multiply_K(x)
     if lam.shape == (A.shape[1],) and np.isfinite(lam).all():
-        Kx = prepared.assembly.multiply_K(x)
         force = Kx - load.f + A @ lam
         dual_residual = float(max(np.max(np.abs(force)), np.max(-lam, initial=0.0)))
         backward_error = _backward_error(prepared, load, x, lam, force, y)
@@ -94,6 +96,7 @@ def judge(
         dual_residual=dual_residual,
         duality_gap=duality_gap,
         backward_error=backward_error,
+        objective=float(x @ Kx / 2 - load.f @ x),
     )
 
 

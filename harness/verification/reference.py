@@ -81,7 +81,7 @@ def reference_of(
     if isinstance(scene, MadeScene):
         made = scene.made
         if made.x is None or made.lam is None:
-            return refined_active_set(prepared, load, limit_s, guess)
+            return reference(prepared, load, limit_s, guess)
         route = "chosen, exact"
         return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
     return reference(prepared, load, limit_s, guess)

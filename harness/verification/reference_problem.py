@@ -121,6 +121,9 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
         **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},
         **of_road,
     }
+    if printed := scene.printed:
+        row |= {"printed_objective": printed.value, "printed_digits": printed.digits}
+        row["printed_source"] = printed.source
     before = _recorded(directory, scene)
     x = assembly.at_junction(known.x)
     sparse = before.get("sparse", {}) if before else {}

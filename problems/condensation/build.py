@@ -7,6 +7,7 @@ scene → LoadCase (f, g), loads beyond the junction condensed
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,10 @@ def prepared(scene: Scene, progress: Progress) -> Stored:
             return Stored(assembly, key, {"condensation": seconds}, scene.source_of, True, progress)
         case MadeScene():
             no_time = {"condensation": 0.0}
-            return Stored(scene.made.assembly, scene.assembly_key, no_time, scene.source_of, True, progress)
+            made = scene.made.assembly
+            if scene.sparse:
+                made = replace(made, blocks=tuple(K.toarray(order="F") for K in made.sparse_blocks))
+            return Stored(made, scene.assembly_key, no_time, scene.source_of, True, progress)
     raise TypeError(type(scene).__name__)
 
 

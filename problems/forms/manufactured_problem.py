@@ -31,11 +31,13 @@ class DeferredProblem:
     """A manufactured problem so large that it is made when needed only, and not kept beside another.
 
     sizes : the unknowns of each block of K. m : the contacts. make : the same problem at every call.
+    sparse : whether the blocks are.
     """
 
     sizes: tuple[int, ...]
     m: int
     make: Callable[[], ManufacturedProblem]
+    sparse: bool = False
 
 
 @lru_cache(maxsize=1)

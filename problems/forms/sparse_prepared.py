@@ -23,6 +23,7 @@ from .whole_compliance import whole_compliance
 
 SAMPLE = 3  # contacts, for the size of Q
 FEW = 3000  # contacts for which Q is small beside K
+SETS = 15  # factorisations of K that settle the contacts without M
 SINGLE_BITS = 18  # of cond(Q_WW): more are lost in float32
 
 
@@ -123,11 +124,14 @@ class SparsePrepared(Prepared):
         """M ≈ Q⁻¹ with a narrow band, and about the diagonal of Q; None where K has no band.
 
         In single precision; in double where some Q_WW is not positive definite in that. Of few contacts
-        without coordinates M = Q⁻¹.
+        without coordinates M = Q⁻¹. Also None of contacts all over an area, where M takes longer than some
+        factorisations of K.
         """
         if self.assembly.contact_nodes is None and self.assembly.m <= FEW:
             return self._exact_inverse()
         windows = self._windows()
+        if self.assembly.m > FEW and windows.work > SETS * self._work():
+            return None
         for single in (True, False) if self._single_might_do() else (False,):
             near = self.near_compliance(windows.contacts(), single)
             if near is None:
@@ -149,6 +153,11 @@ class SparsePrepared(Prepared):
         with suppress(np.linalg.LinAlgError):
             return ApproximateInverse(of_windows(Windows(np.arange(m), m), lambda _: Q), diagonal)
         return None
+
+    def _work(self) -> float:
+        """Operations of a factorisation of K: about the entries of each column of a factor, squared."""
+        pairs = zip(self.sparse_factors, self.assembly.slices, strict=True)
+        return sum(factor.numbers**2 / (rows.stop - rows.start) for factor, rows in pairs)
 
     def _single_might_do(self) -> bool:
         """Whether float32 can tell λmin(Q_WW), no less than about 1/K_ii, from zero beside q_ii."""

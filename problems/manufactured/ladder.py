@@ -2,7 +2,8 @@
 
 A ladder is a file of problems/ladders with RUNGS, its rungs by name, the easiest first; each is a function
 that makes the same rung at every call. A rung is a scene, `hard/<ladder>/<rung>`; those of
-problems/ladders/full_size are `hard-full/<ladder>/<rung>`.
+problems/ladders/full_size are `hard-full/<ladder>/<rung>`. The problems of others in problems/outside are
+found likewise, `outside/<problem>/<size>`.
 """
 
 from __future__ import annotations
@@ -17,9 +18,15 @@ from typing import Any
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
 from problems.model.effect import Effect, effect_class
 from problems.model.joint import Joint
+from problems.model.scene import PrintedOptimum
 
 #: The package of the ladders whose scenes' names begin so.
-PACKAGES = {"hard/": "problems.ladders", "hard-full/": "problems.ladders.full_size"}
+PACKAGES = {
+    "hard/": "problems.ladders",
+    "hard-full/": "problems.ladders.full_size",
+    "outside/": "problems.outside",
+}
+LADDERS = ("hard/", "hard-full/")  # whose limit follows their conditioning
 PREFIXES = tuple(PACKAGES)
 
 
@@ -28,6 +35,7 @@ class Rung:
     """A joint with its effects, or a manufactured problem instead, made or still to be made.
 
     refused : part of the InputError with which the model refuses the problem; "" if it accepts it.
+    printed : the optimum that its source prints.
     """
 
     title: str
@@ -35,6 +43,7 @@ class Rung:
     effects: tuple[Effect, ...] = ()
     made: ManufacturedProblem | DeferredProblem | None = None
     refused: str = ""
+    printed: PrintedOptimum | None = None
 
 
 def plates(title: str, joint: dict[str, Any], *effects: dict[str, Any], refused: str = "") -> Rung:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem, made
@@ -22,11 +23,21 @@ E = TypeVar("E", bound=Effect)
 
 
 @dataclass(frozen=True)
+class PrintedOptimum:
+    """The objective ½xᵀKx − fᵀx at the solution, to so many digits, as a source prints it."""
+
+    value: float
+    digits: int
+    source: str
+
+
+@dataclass(frozen=True)
 class Scene(ABC):
     """A checked scene.
 
     on_ladder : whether it is a rung, whose limit follows its conditioning.
     refused : text of the InputError that building this rung must raise; "" if it must not raise one.
+    printed : the optimum that the source of the problem prints.
     """
 
     name: str
@@ -34,6 +45,7 @@ class Scene(ABC):
     _: KW_ONLY
     on_ladder: bool = False
     refused: str = ""
+    printed: PrintedOptimum | None = None
 
     @property
     @abstractmethod
@@ -137,6 +149,13 @@ class MadeScene(Scene):
         return self.problem if isinstance(self.problem, ManufacturedProblem) else made(self.problem)
 
     @property
+    def sparse(self) -> bool:
+        """Whether K's blocks are, without making it."""
+        if isinstance(self.problem, DeferredProblem):
+            return self.problem.sparse
+        return any(map(sp.issparse, self.problem.assembly.blocks))
+
+    @property
     def block_sizes(self) -> tuple[int, ...]:
         """The unknowns of each block of K, without making it."""
         if isinstance(self.problem, DeferredProblem):
@@ -147,7 +166,7 @@ class MadeScene(Scene):
     def assembly_key(self) -> str:
         assembly = self.made.assembly
         A = assembly.A
-        arrays = (*assembly.blocks, A.data, A.indices, A.indptr)
+        arrays = (*assembly.stored, A.data, A.indices, A.indptr)
         return digest([assembly.n, assembly.m], *(array.tobytes() for array in arrays))
 
     @property

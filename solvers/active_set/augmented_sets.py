@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Assembly, Vector
 from problems.forms.sparse_factor import Factor, factored
 from problems.forms.sparse_prepared import SparsePrepared
 
@@ -32,6 +32,12 @@ MAX_CORRECTIONS = 30
 
 #: λ (m,) → y = g − AᵀK⁻¹(f − Aλ), (m,) mm.
 Gap = Callable[[Vector], Vector]
+
+
+def stiffest_contact(assembly: Assembly) -> float:
+    """That of the stiffest unknown at a contact, for a spring at that contact."""
+    stiffest = float(assembly.diagonal_K()[assembly.A.indices].max(initial=0.0))
+    return stiffest / (float((assembly.A.data**2).max(initial=0.0)) or 1.0)
 
 
 class AugmentedSets:
@@ -48,9 +54,7 @@ class AugmentedSets:
 
     @cached_property
     def _rho(self) -> float:
-        A = self.prepared.assembly.A
-        stiffest = float(self.prepared.assembly.diagonal_K()[A.indices].max(initial=0.0))
-        return STIFFER * stiffest / (float((A.data**2).max(initial=0.0)) or 1.0)
+        return STIFFER * stiffest_contact(self.prepared.assembly)
 
     def at(self, C: Set) -> TrialSolution:
         """λ and y of the set C, with |y_C| no larger than after the last correction that halved it."""

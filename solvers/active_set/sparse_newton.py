@@ -3,7 +3,8 @@
 M comes from the compliance between neighbouring contacts, which the band factor of a coarser model gives
 without the rest of Q. A sweep is one product with Q, a solution with K's factors (see `batched`). What the
 sweeps do not settle, and a K without a band, is solved by block principal pivoting with a sparse
-factorisation of K per contact set (see `augmented_sets`).
+factorisation of K per contact set (see `augmented_sets`); with many contacts from a set that ever stiffer
+springs approach (see `approached_set`).
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ import numpy as np
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, stacked
 from problems.forms.sparse_factor import NotPositiveDefinite
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.sparse_prepared import FEW, SparsePrepared
 from solvers.base import Answer, Batch, WarmStart, failed
 from solvers.kkt import EPS
 
+from .approached_set import approached_set
 from .augmented_sets import AugmentedSets
 from .batched import BatchedSweeps, Case
 from .bordered_factor import Set
@@ -73,7 +75,8 @@ class SparseState:
         """The answer with x."""
         given = self._with_p([load])[0]
         if self.sweeps is None:
-            return self._with_x([self.by_sets(None, given, tolerance)], [load], tolerance)[0]
+            C = approached_set(self.prepared, given) if self.prepared.assembly.m > FEW else None
+            return self._with_x([self.by_sets(C, given, tolerance)], [load], tolerance)[0]
         if self.start is None:
             case = self.sweeps.cold(given, tolerance)
         else:

@@ -1,0 +1,62 @@
+"""A membrane over a hemisphere, a free boundary in closed form.
+
+On (−2, 2)², v ≥ ψ = √(1 − r²) where r < 1, and v = u on the edge, with the radial solution
+
+    u = ψ for r ≤ a,   u = A log(2/r) for r > a,   a² (log 2 − log a) = 1 − a²,   A = a²/√(1 − a²)
+
+of E. Bueler, PETSc, src/snes/tutorials/ex9.c. Contacts are the nodes with r < 1; beyond, u is above ψ. The
+edge's values are in f; the objective is the energy less that of the held edge.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from scipy.optimize import brentq
+
+from problems.forms.assembly import Matrix, Vector
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.ladder import Ladder, Rung
+from problems.manufactured.membrane import above, deferred, five_point, nodes
+
+CELLS = (8, 20, 40, 80, 160, 320)
+FREE = float(brentq(lambda a: a**2 * np.log(2 / a) - 1 + a**2, 0.5, 0.9, xtol=1e-15))  # a
+
+
+def exact(at: Matrix) -> Vector:
+    """u at points (n, 2)."""
+    r = np.hypot(*at.T)
+    inside = np.sqrt(np.maximum(1 - r**2, 0.0))
+    return np.where(r <= FREE, inside, FREE**2 / np.sqrt(1 - FREE**2) * np.log(2 / np.maximum(r, FREE)))
+
+
+def _lines(cells: int) -> Vector:
+    return np.linspace(-2.0, 2.0, cells + 1)
+
+
+def _problem(cells: int) -> ManufacturedProblem:
+    line, size = _lines(cells), cells - 1
+    f = np.zeros((size, size))
+    for edge in (0, -1):
+        beyond = exact(np.column_stack([np.full(size, line[edge]), line[1:-1]]))
+        f[edge] += beyond
+        f[:, edge] += beyond
+    at = nodes(line[1:-1], line[1:-1])
+    covered = _covered(cells)
+    lowest = np.sqrt(1 - (at[covered] ** 2).sum(axis=1))
+    return above(five_point(size), f.ravel(), at, lowest, covered)
+
+
+def _covered(cells: int) -> np.ndarray:
+    line = _lines(cells)[1:-1]
+    return np.flatnonzero((nodes(line, line) ** 2).sum(axis=1) < 1)
+
+
+def _rung(cells: int) -> Rung:
+    m = len(_covered(cells))
+    title = f"A membrane over a hemisphere, {cells} × {cells} cells"
+    return Rung(title, made=deferred((cells - 1) ** 2, partial(_problem, cells), m))
+
+
+RUNGS: Ladder = {f"{cells}": partial(_rung, cells) for cells in CELLS}

@@ -1,0 +1,70 @@
+"""The pressure in the oil film of a journal bearing: nowhere negative.
+
+    min ∫ ½ w(x)|∇v|² − ε sin(x) v,   v ≥ 0,   v = 0 on the edge of (0, 2π) × (0, 2b),   w = (1 + ε cos x)³
+
+G. Cimatti, Appl. Math. Optim. 3:227–242 (1977); Averick, Carter, Moré and Xue, The MINPACK-2 Test Problem
+Collection, ANL/MCS-P153-0692 (1992), with ε = 0.1 and b = 10. Linear triangles; the mean of w over a triangle
+is that of its corners. With an even number of cells, sin(x) = 0 on the line in the middle: the contacts there
+carry hardly any force.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.forms.assembly import Vector
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.ladder import Ladder, Rung
+from problems.manufactured.membrane import above, deferred, nodes, second_difference
+from problems.model.scene import PrintedOptimum
+
+HALF_WIDTH = 10.0  # b
+ECCENTRICITY = 0.1  # ε
+CELLS = (20, 40, 80, 160, 320)
+CUTEST = {10: -0.1789600, 23: -0.1800500, 32: -0.1803000, 75: -0.1805500, 100: -0.1805700, 125: -0.1805800}
+PETSC = {  # inner nodes in x and y, ε, optimum, its digits
+    "8x12": (8, 12, 0.1, -0.183437, 6, "jbearing2_1.out"),
+    "10x16": (10, 16, 0.9, -15.607, 5, "jbearing2_3.out"),
+    "50x50": (50, 50, 0.99, -60.1509, 6, "jbearing2_2.out"),
+}
+
+
+def problem(nx: int, ny: int, eccentricity: float) -> ManufacturedProblem:
+    """With nx × ny inner nodes."""
+    hx, hy = 2 * np.pi / (nx + 1), 2 * HALF_WIDTH / (ny + 1)
+    w: Vector = (1 + eccentricity * np.cos(hx * np.arange(nx + 2))) ** 3
+    # ∫w over the two triangles of a cell: two corners of one are on its left line, of the other on its right.
+    left, right = hx * hy / 6 * (2 * w[:-1] + w[1:]), hx * hy / 6 * (w[:-1] + 2 * w[1:])
+    along = (left + right) / hx**2  # of the differences in x, between lines
+    across = (left[1:] + right[:-1]) / hy**2  # of those in y, on a line
+    of_lines = sp.diags_array([-along[1:-1], along[:-1] + along[1:], -along[1:-1]], offsets=[-1, 0, 1])
+    K = sp.kron(of_lines, sp.eye_array(ny)) + sp.kron(sp.diags_array(across), second_difference(ny))
+    x: Vector = hx * np.arange(1.0, nx + 1)
+    y: Vector = hy * np.arange(1.0, ny + 1)
+    f = np.repeat(hx * hy * eccentricity * np.sin(x), ny)
+    return above(sp.csc_array(K), f, nodes(x, y), np.zeros(nx * ny))
+
+
+def _rung(
+    nx: int, ny: int, eccentricity: float = ECCENTRICITY, printed: PrintedOptimum | None = None
+) -> Rung:
+    title = f"Journal bearing, {nx + 1} × {ny + 1} cells, eccentricity {eccentricity:g}"
+    return Rung(title, made=deferred(nx * ny, partial(problem, nx, ny, eccentricity)), printed=printed)
+
+
+def _petsc(nx: int, ny: int, eccentricity: float, value: float, digits: int, file: str) -> Rung:
+    return _rung(nx, ny, eccentricity, PrintedOptimum(value, digits, f"PETSc/TAO, {file}"))
+
+
+def _cutest(side: int, value: float) -> Rung:
+    return _rung(side - 2, side - 2, printed=PrintedOptimum(value, 5, "CUTEst, JNLBRNG1.SIF"))
+
+
+RUNGS: Ladder = {
+    **{f"{cells}": partial(_rung, cells - 1, cells - 1) for cells in CELLS},
+    **{f"cutest-{side}": partial(_cutest, side, value) for side, value in CUTEST.items()},
+    **{f"petsc-{name}": partial(_petsc, *given) for name, given in PETSC.items()},
+}

@@ -1,0 +1,51 @@
+"""Elastic–plastic torsion of a square bar: the stress potential may not be steeper than the yield stress.
+
+    min ∫ ½|∇v|² − c v,   |v(x)| ≤ dist(x, ∂Ω),   v = 0 on ∂Ω,   Ω = (0, 1)²,  c = 5
+
+Averick, Carter, Moré and Xue, The MINPACK-2 Test Problem Collection, ANL/MCS-P153-0692 (1992); R. Glowinski,
+Numerical Methods for Nonlinear Variational Problems (1984). Linear triangles. Only v ≤ dist is stated: K is
+an M-matrix and c > 0, so that v is nowhere negative, and v ≥ −dist holds of itself.
+
+COPS (Dolan, Moré and Munson, ANL/MCS-TM-273, 2004) is the same on 51 × 51 cells. CUTEst's TORSION1 sums over
+the four differences of each inner node, so that those to the edge count half.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from problems.forms.assembly import Vector
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.ladder import Ladder, Rung
+from problems.manufactured.membrane import below, deferred, five_point, nodes
+from problems.model.scene import PrintedOptimum
+
+COUPLE = 5.0  # c: twice the angle of twist per length, in units of the yield stress
+CELLS = (20, 40, 80, 160, 320)
+COPS = "COPS 3.0, torsion, nx = ny = 50 (as MadNLP/COPSBenchmark.jl quotes it)"
+CUTEST = {4: -5.1851852e-1, 10: -4.9234185e-1, 22: -4.5608771e-1}  # nodes a side, edges included
+
+
+def _problem(cells: int, edge: float) -> ManufacturedProblem:
+    size, h = cells - 1, 1 / cells
+    line: Vector = np.arange(1.0, size + 1) * h
+    to_edge = np.minimum(line, 1 - line)
+    distance = np.minimum.outer(to_edge, to_edge).ravel()
+    return below(five_point(size, edge), np.full(size**2, COUPLE * h**2), nodes(line, line), distance)
+
+
+def _rung(cells: int, edge: float = 1.0, printed: PrintedOptimum | None = None) -> Rung:
+    title = f"Elastic–plastic torsion, {cells} × {cells} cells"
+    return Rung(title, made=deferred((cells - 1) ** 2, partial(_problem, cells, edge)), printed=printed)
+
+
+RUNGS: Ladder = {
+    **{f"{cells}": partial(_rung, cells) for cells in CELLS},
+    "cops-50x50": partial(_rung, 51, printed=PrintedOptimum(-4.18087e-1, 6, COPS)),
+    **{
+        f"cutest-{side}": partial(_rung, side - 1, 0.5, PrintedOptimum(value, 8, "CUTEst, TORSION1.SIF"))
+        for side, value in CUTEST.items()
+    },
+}

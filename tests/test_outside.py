@@ -1,0 +1,157 @@
+"""Problems from outside: printed optima, closed forms, convergence; and how they are found and solved."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.sparse as sp
+from synthetic_results import row, write_rows
+
+from harness.planning.road import chosen_form
+from harness.scene.answer import answer_of
+from harness.verification.judge import judge
+from harness.verification.reference import Reference, refined_active_set
+from problems.build import load_case, prepared
+from problems.errors import InputError
+from problems.forms.names import FORMS
+from problems.manufactured.ladder import rung_names
+from problems.outside import journal_bearing
+from problems.outside.hemisphere import FREE, exact
+from problems.scene import read_scene
+from report.results.reader import read
+from report.sections import outside
+from solvers.registry import make_solver
+
+PRINTED = [name for name in rung_names("outside/") if not name.rpartition("/")[2].isdigit()]
+LARGE = "outside/torsion/80"
+
+
+def solved(name: str) -> tuple[Reference, float]:
+    """The reference, from newton's answer in the sparse form, and the objective."""
+    scene = read_scene(name)
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
+    assert answer.status == "solved"
+    known = refined_active_set(data, load, guess=answer.lam)
+    judged = judge(data, load, known, np.asarray(answer.x), np.asarray(answer.lam), 1e-7)
+    assert judged.verdict == "within"
+    assert judged.objective is not None
+    return known, judged.objective
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_the_optimum_is_the_printed_one(name: str) -> None:
+    """To the last printed digit, rounded or cut off: the sources stopped at tolerances of their own."""
+    printed = read_scene(name).printed
+    assert printed is not None
+    _, objective = solved(name)
+    last_digit = 10.0 ** (np.floor(np.log10(abs(printed.value))) + 1 - printed.digits)
+    assert abs(objective - printed.value) <= 1.5 * last_digit
+
+
+def test_the_membrane_over_a_hemisphere_converges_to_its_closed_form() -> None:
+    errors, radii = [], []
+    for cells in (8, 20, 40, 80):
+        known, _ = solved(f"outside/hemisphere/{cells}")
+        at = prepared(read_scene(f"outside/hemisphere/{cells}"), form="sparse").assembly.nodes
+        assert at is not None
+        errors.append(float(abs(known.x - exact(at)).max()))
+        covered = at[prepared(read_scene(f"outside/hemisphere/{cells}"), form="sparse").assembly.A.indices]
+        radii.append(float(np.hypot(*covered[known.active].T).max()) - FREE)
+    # Bueler's example prints this for the same grid: 1.334e-02.
+    assert errors[0] == pytest.approx(1.334e-2, abs=5e-6)
+    assert errors[-1] < errors[0] * 8 / 80  # better than first order
+    assert errors == sorted(errors, reverse=True)
+    assert abs(radii[-1]) <= 4 / 80
+
+
+def test_torsion_stays_above_the_lower_bound_that_is_not_stated() -> None:
+    known, _ = solved("outside/torsion/40")
+    assert known.x.min() > 0
+
+
+def test_the_free_boundary_is_found_by_another_code() -> None:
+    """SciPy's bounded least squares: with K = LLᵀ the problem is min ‖Lᵀx − L⁻¹f‖ with bounds on x."""
+    scene = read_scene("outside/obstacle/20")
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    K = data.assembly.sparse_blocks[0].toarray()
+    L = np.linalg.cholesky(K)
+    found = scipy.optimize.lsq_linear(L.T, np.linalg.solve(L, load.f), (-load.g, np.inf), tol=1e-14)
+    known, _ = solved("outside/obstacle/20")
+    assert abs(found.x - known.x).max() < 1e-6
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_gives_the_same_answer(form: Any) -> None:
+    known, _ = solved("outside/journal_bearing/20")
+    scene = read_scene("outside/journal_bearing/20")
+    data, load = prepared(scene, form=form), load_case(scene, form)
+    solver = make_solver("gi" if form == "primal" else "newton", {})
+    answer = answer_of("any", solver, data, form, load, 1e-12)
+    assert abs(np.asarray(answer.x) - known.x).max() < 1e-9
+
+
+def test_a_large_one_is_solved_in_the_sparse_form_by_choice() -> None:
+    assert chosen_form(read_scene(LARGE), FORMS, None).form == "sparse"
+    assert chosen_form(read_scene("outside/torsion/20"), FORMS, None).form == "dual"
+    with pytest.raises(InputError, match="a dual form needs about"):
+        chosen_form(read_scene("outside/torsion/320"), FORMS, "dual")
+
+
+def test_stiffer_and_stiffer_springs_leave_few_sets_to_pivot() -> None:
+    """Without them the edge of the contact region moves by a row per set, of 40 from edge to middle."""
+    scene = read_scene("outside/journal_bearing/80")
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    assert data.assembly.m > 3000
+    answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
+    assert answer.status == "solved"
+    assert answer.details["factorisations"] <= 6
+
+
+def test_the_matrices_are_those_of_linear_triangles() -> None:
+    """∫ w ∇φ·∇φ summed over each triangle alone, for the journal bearing."""
+    nx, ny, eccentricity = 3, 2, 0.1
+    hx, hy = 2 * np.pi / (nx + 1), 20.0 / (ny + 1)
+    K = np.zeros(((nx + 2) * (ny + 2),) * 2)
+    for i in range(nx + 1):
+        for j in range(ny + 1):
+            for corners in (((i, j), (i + 1, j), (i, j + 1)), ((i + 1, j + 1), (i, j + 1), (i + 1, j))):
+                p = np.array([(a * hx, b * hy) for a, b in corners])
+                gradients = np.linalg.solve(np.column_stack([p, np.ones(3)]), np.eye(3))[:2]
+                w = np.mean((1 + eccentricity * np.cos(p[:, 0])) ** 3)
+                at = [a * (ny + 2) + b for a, b in corners]
+                K[np.ix_(at, at)] += w * hx * hy / 2 * gradients.T @ gradients
+    inner = [a * (ny + 2) + b for a in range(1, nx + 1) for b in range(1, ny + 1)]
+    made = journal_bearing.problem(nx, ny, eccentricity).assembly.blocks[0]
+    assert sp.issparse(made)
+    np.testing.assert_allclose(made.toarray(), K[np.ix_(inner, inner)], rtol=1e-12, atol=1e-14)
+
+
+def test_the_report_shows_printed_values_and_the_order(tmp_path: Path) -> None:
+    values = {"20": 1.0, "40": 1.4, "80": 1.5, "petsc-8x12": -0.18343}
+    rows = [
+        row("1/1", "newton", "sparse") | {"scene": f"outside/made/{size}", "objective": value}
+        for size, value in values.items()
+    ]
+    rows += [row("1/1", "newton", "sparse") | {"scene": "outside/made/160", "verdict": "outside"}]
+    write_rows(tmp_path, rows)
+    problem = {"scene": "outside/made/petsc-8x12", "printed_objective": -0.183437, "printed_digits": 6}
+    (tmp_path / "problems.jsonl").write_text(
+        json.dumps(problem | {"printed_source": "PETSc"}) + "\n", "utf-8"
+    )
+    section = outside.section(read(tmp_path))
+    assert section is not None
+    sentence, printed, refined = section.blocks
+    assert "Of 5 scenes" in sentence.markdown
+    assert "4 have an answer" in sentence.markdown
+    for shown in ("-0.183437", "4e-5", "PETSc"):
+        assert shown in printed.markdown
+    last = [cell.strip() for cell in refined.markdown.splitlines()[-1].split("|")[1:-1]]
+    assert last[:2] == ["made", "80"]
+    assert last[6] == "2.00"  # changes 0.4, then 0.1
+    assert outside.section(read(write_rows(tmp_path / "none", [row()]))) is None
