@@ -304,7 +304,7 @@ def test_of_tolerances_as_fast_the_tightest_is_advised(
     line = advised(found).loc[1e-9]
     assert line[["use", "tolerance"]].tolist() == ["a (dual)", float(tolerance)]
     assert line["seconds"] == pytest.approx(prices[int(tolerance[3:])])
-    assert f"use **a (dual) {tolerance}**" in (advice(found, 4386) or "")
+    assert f" **a (dual) {tolerance}**:" in (advice(found, 4386) or "")
 
 
 def test_ties_are_named(tmp_path: Path) -> None:

@@ -1,4 +1,7 @@
-"""Which solver to use, in sentences computed from the rows."""
+"""Which solver is the fastest of those in a directory, in sentences computed from the rows.
+
+Another directory may hold faster ones. Which to use is said in one place, the index of the published results.
+"""
 
 from __future__ import annotations
 
@@ -40,8 +43,7 @@ def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list
     once = cells.loc[cells["label"] == best, "once_s"].median()
     prepared = f", after {significant(once, 2)} s per assembly" if once >= 0.005 else ""
     words = [
-        f"use **{best}**: within {results.limit} on {every}, "
-        f"{significant(time)} s per load case{mean}{prepared}."
+        f"**{best}**: within {results.limit} on {every}, {significant(time)} s per load case{mean}{prepared}."
     ]
     ties = [str(each) for each in means.index[1:] if means[each] <= tie_of(cells, best, str(each)) * time]
     if ties:
@@ -58,7 +60,7 @@ def _best(results: Results, cells: pd.DataFrame, complete: pd.DataFrame) -> list
 
 
 def _beaten(cells: pd.DataFrame, best: list[str]) -> list[str]:
-    """On which scenes another line is clearly faster than the one recommended."""
+    """On which scenes another line is clearly faster than the fastest over all."""
     method = cells.loc[cells["label"].isin(best), "method"]
     rivals = cells["label"].isin(best) | ~cells["method"].isin(
         method

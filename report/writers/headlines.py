@@ -92,6 +92,24 @@ def series_rates(series: Results) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
+def series_sentence(series: Results) -> str:
+    found = series_rates(series)
+    first, *others = [f"{significant(rate, 2)}" for rate in found["rate"]]
+    sizes = [f"{n:.0f}" for n in found["n"]]
+    rates = [
+        f"{first} load cases per second at n = {sizes[0]}",
+        *map(" at ".join, zip(others, sizes[1:], strict=True)),
+    ]
+    library = listed([significant(seconds, 2) for seconds in found["library_s"]])
+    return f"{listed(rates)}; a case of the fastest library takes {library} s"
+
+
+def contact_sentence(speed: Results) -> str:
+    """The range of the scenes' closed contacts."""
+    share = 100 * speed.rows["active"] / speed.rows["m"]
+    return f"from {share.min():.0f} to {share.max():.0f} % of the contacts closed"
+
+
 def ladder_score(hard: Results) -> str:
     """How often the in-house solvers are correct, and how often a library says solved of a wrong answer."""
     rungs = hard.on_ladders(True)
