@@ -14,6 +14,7 @@ DEFINITE = "harness/verification/definite.py"
 JUDGE = "harness/verification/judge.py"
 SPARSE_DEFINITE = "harness/verification/sparse_definite.py"
 SPARSE_BOUND = "harness/verification/sparse_bound.py"
+SLICED = "harness/verification/sliced_forces.py"
 AUGMENTED = "harness/verification/augmented.py"
 BALANCE = "problems/forms/balance.py"
 REFERENCE = "harness/verification/reference.py"
@@ -303,16 +304,26 @@ MUTANTS = [
         "np.maximum(-s.value, 0.0)",
     ),
     Mutant(SPARSE_BOUND, "+ s.error * (", "+ 0 * s.error * ("),
-    Mutant(SPARSE_BOUND, "at_junction(self.D * error + abs(state.x.lo))", "at_junction(self.D * error)"),
-    Mutant(
-        SPARSE_BOUND, "at_junction(self.D * error + abs(state.x.lo))", "at_junction(error + abs(state.x.lo))"
-    ),
-    Mutant(SPARSE_BOUND, "if (state.lam.hi < 0).any():", "if False:"),
     Mutant(
         SPARSE_BOUND,
-        "error = self.r.error + rounding + gamma(depth) * abs(self.r.value)",
-        "error = self.r.error",
+        "at_junction(self.D) * error + abs(at_junction(state.x.lo))",
+        "at_junction(self.D) * error",
     ),
+    Mutant(SPARSE_BOUND, "at_junction(self.D) * error", "error"),
+    Mutant(SPARSE_BOUND, " & ~(state.lam.hi < 0).any(axis=0)", ""),
+    Mutant(SPARSE_BOUND, "self.bound.stiffness[rows] * most + of_force[rows]", "of_force[rows]"),
+    Mutant(
+        SPARSE_BOUND,
+        "self.bound.stiffness[rows] * most + of_force[rows]",
+        "self.bound.stiffness[rows] * most",
+    ),
+    # f − Kx − Aλ by slices: of them all, and in their bits
+    Mutant(SLICED, "np.hstack([x1, x2, x3])", "np.hstack([x1, x2, 0 * x3])"),
+    Mutant(SLICED, "np.hstack([x1, after])", "np.hstack([x1, x2])"),
+    Mutant(SLICED, "terms.append(part @ x.hi)", "pass"),
+    Mutant(SLICED, "// 2 + 1\n    top", "// 2 + 3\n    top"),
+    Mutant(SLICED, "x3, after = x3 + x.lo, after + x.lo", "pass"),
+    Mutant(SLICED, "rounding + of_K3 * most_lo + 8", "8"),
 ]
 
 #: Which tests must fail.
@@ -323,6 +334,7 @@ TESTS = {
     DEFINITE: ("terms_definite",),
     SPARSE_DEFINITE: ("sparse_terms", "sparse_certificate"),
     SPARSE_BOUND: ("terms_sparse",),
+    SLICED: ("sliced_forces",),
     AUGMENTED: ("sparse_terms", "sparse_certificate"),
     BALANCE: ("sparse_terms", "sparse_certificate"),
     REFERENCE: ("terms_verdict", "altered"),

@@ -36,6 +36,7 @@ from solvers.registry import make_solver
 Gaps = NDArray[np.float32]
 
 BLOCK = 64  # cases that share a pass over K and Q
+BLOCK_BYTES = 2**26  # of their f or x: some fifteen times as much is in use
 BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases are lost
 KEPT_ANSWERS = 32  # for warm starts: memory does not grow with the number of cases
 
@@ -115,8 +116,9 @@ class SeriesSession:
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
         """The results of the cases with these numbers, a block at a time."""
-        for start in range(0, len(numbers), BLOCK):
-            block = numbers[start : start + BLOCK]
+        size = min(BLOCK, max(BLOCK_BYTES // (8 * self.data.assembly.n), 1))
+        for start in range(0, len(numbers), size):
+            block = numbers[start : start + size]
             loads = list(zip(block, self.problem.loads([self.job.cases.load(k) for k in block]), strict=True))
             if self.session.batch is not None:
                 yield self._results(self._try_batch(loads))

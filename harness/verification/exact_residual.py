@@ -71,9 +71,9 @@ def _halves(a: Vector) -> tuple[Vector, Vector]:
 class ErrorFreeSum:
     """Adds terms with their rounding errors; `error` is the uncertainty of the terms themselves."""
 
-    def __init__(self, size: int) -> None:
-        self.hi, self.lo = np.zeros(size), np.zeros(size)
-        self.size, self.error = np.zeros(size), np.zeros(size)
+    def __init__(self, shape: int | tuple[int, ...]) -> None:
+        self.hi, self.lo = np.zeros(shape), np.zeros(shape)
+        self.size, self.error = np.zeros(shape), np.zeros(shape)
         self.terms = 0
 
     def add(self, term: Vector, rows: slice = slice(None)) -> None:
@@ -97,11 +97,11 @@ def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) ->
     """r = f − Kx − Aλ with its error bound, N: that of the given problem, where reading has altered it."""
     total = ErrorFreeSum(assembly.n)
     total.add(f)
-    _subtract_sparse(total, slice(None), sp.csr_array(assembly.A), lam)
+    subtract_sparse(total, slice(None), sp.csr_array(assembly.A), lam)
     for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
         part = DoubleDouble(x.hi[rows], x.lo[rows])
         if sp.issparse(K):
-            _subtract_sparse(total, rows, sp.csr_array(K.T), part)  # symmetric, and stored by columns
+            subtract_sparse(total, rows, sp.csr_array(K.T), part)  # symmetric, and stored by columns
         else:
             _subtract_dense(total, rows, K, part)
     if assembly.altered:
@@ -109,11 +109,14 @@ def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) ->
     return total.enclosed()
 
 
-def gaps(assembly: Assembly, g: Vector, x: DoubleDouble) -> Enclosure:
-    """s = g − Aᵀx with its error bound, mm: that of the given problem, where reading has altered it."""
-    total = ErrorFreeSum(assembly.m)
+def gaps(assembly: Assembly, g: Matrix, x: DoubleDouble) -> Enclosure:
+    """s = g − Aᵀx with its error bound, mm: that of the given problem, where reading has altered it.
+
+    g (m,) and x (n,), or a column for each load case.
+    """
+    total = ErrorFreeSum(g.shape)
     total.add(g)
-    _subtract_sparse(total, slice(None), sp.csr_array(assembly.A.T), x)
+    subtract_sparse(total, slice(None), sp.csr_array(assembly.A.T), x)
     if assembly.altered:
         total.error += assembly.altered.of_gaps(_size(x))
     return total.enclosed()
@@ -123,18 +126,22 @@ def _size(v: DoubleDouble) -> Vector:
     return abs(v.hi) + abs(v.lo)
 
 
-def _subtract_sparse(total: ErrorFreeSum, rows: slice, A: sp.csr_array, v: DoubleDouble) -> None:
-    """total[rows] −= Av, one entry of each of some rows at a time; the terms are counted row by row."""
+def subtract_sparse(total: ErrorFreeSum, rows: slice, A: sp.csr_array, v: DoubleDouble) -> None:
+    """total[rows] −= Av, one entry of each of some rows at a time; the terms are counted row by row.
+
+    v : a vector, or a column for each load case.
+    """
     counts, first = np.diff(A.indptr), rows.start or 0
     parts = [part for part in (v.hi, v.lo) if part.any()]
-    terms = total.terms
-    for start in range(0, A.shape[0], SPARSE_ROWS_AT_A_TIME):
-        chunk = slice(start, min(start + SPARSE_ROWS_AT_A_TIME, A.shape[0]))
+    columns = (1,) * (v.hi.ndim - 1)
+    terms, height = total.terms, max(SPARSE_ROWS_AT_A_TIME // max(v.hi[:1].size, 1), 1)
+    for start in range(0, A.shape[0], height):
+        chunk = slice(start, min(start + height, A.shape[0]))
         place, begin, count = slice(first + start, first + chunk.stop), A.indptr[:-1][chunk], counts[chunk]
         for k in range(int(count.max())):
-            there = count > k
-            entry = np.where(there, begin + k, 0)
-            data, indices = np.where(there, -A.data[entry], 0.0), A.indices[entry]
+            there = (count > k).reshape(-1, *columns)
+            entry = np.where(count > k, begin + k, 0)
+            data, indices = np.where(there, -A.data[entry].reshape(there.shape), 0.0), A.indices[entry]
             for part in parts:
                 factor = np.where(there, part[indices], 0.0)
                 term, rounding = two_product(data, factor)

@@ -37,12 +37,11 @@ from .definite import smallest_eigenvalue
 from .exact_residual import gaps
 from .principal_pivoting import Stop, contact_set
 from .refinement import ENOUGH, refined_solution, units_of
-from .sparse_bound import SparseBound
+from .sparse_bound import PROVEN_ENOUGH_MM, Proven, SparseBound
 
 MAX_SET_CORRECTIONS = 20
 STOPPED = "the search for the contact set was stopped"
 UNPROVEN = "could not be proven"
-PROVEN_ENOUGH_MM = 1e-9  # a wider bound is tried to be improved by a factorisation for the contact set
 
 
 @dataclass(frozen=True)
@@ -110,6 +109,11 @@ def reference(
     return Reference(x, lam, active, facts["bound_mm"], facts["route"])
 
 
+def of_refined(refined: Proven) -> Reference:
+    """What a refinement in the sparse form has proven."""
+    return Reference(refined.x.hi, refined.lam.hi, refined.active, refined.bound_mm, "proven")
+
+
 def sparse_bound(prepared: SparsePrepared) -> SparseBound | None:
     """What load cases of an assembly share of their proofs; None where nothing can be proven so."""
     return SparseBound.of(prepared, proven_lambda_min(prepared))
@@ -169,9 +173,9 @@ def refined_active_set(
     """
     if guess is not None and isinstance(prepared, SparsePrepared):
         bound = bound or sparse_bound(prepared)
-        refined = None if bound is None else bound.proven(load, guess)
+        refined = bound.proven([load], [guess])[0] if bound else None
         if refined is not None and refined.bound_mm <= PROVEN_ENOUGH_MM:
-            return Reference(refined.x.hi, refined.lam.hi, refined.active, refined.bound_mm, "proven")
+            return of_refined(refined)
     p = prepared.dual_load(load)
     active = np.zeros(len(p), dtype=bool)
     limit_s = default_limit_s(len(p)) if limit_s is None else limit_s

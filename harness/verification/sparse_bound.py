@@ -11,30 +11,37 @@ with ‖d‖_K ≤ ‖δ‖ √(‖DKD‖_∞/σ²).
 
 A refinement step is λ_C ← λ_C − P y_C, P the inverse of Q_CC that M ≈ Q⁻¹ gives, and reduces y_C to about a
 tenth. Forces that become negative are set to zero, overlapping contacts join C; the bound holds for any C.
+Load cases are refined together, a column each, which share their solutions with K and are left out when done.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.balance import balanced_units
 from problems.forms.banded_inverse import BandedInverse
+from problems.forms.problem import stacked
 from problems.forms.sparse_prepared import SparsePrepared
 
-from .exact_residual import ETA, DoubleDouble, Enclosure, U, forces, gamma, gaps
+from .exact_residual import ETA, DoubleDouble, Enclosure, U, gamma, gaps
 from .independence import independence
 from .length import length
+from .sliced_forces import SlicedForces
 
 SAFE = 1.01  # for the rounding of the bounds themselves
 MAX_STEPS = 30
 MAX_SETS = 10  # tried with M in a step
 MAX_WORSE = 3  # steps in a row that improve nothing
 ENOUGH_MM = 1e-10  # a bound that needs no further step
+PROVEN_ENOUGH_MM = 1e-9  # a wider one is tried to be improved by a factorisation for the contact set
+ENTRIES_AT_A_TIME = 2**15  # of x: they and what is computed from them stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -49,13 +56,13 @@ class Proven:
 
 @dataclass(frozen=True)
 class SparseBound:
-    """κ, ‖DKD‖_∞, σ² of an assembly, its M, and |K|, |A| for the rounding of products with them."""
+    """κ, ‖DKD‖_∞ and σ² of an assembly, its M, and for rounding |A| and |K|D (n, 1). D : (n, 1)."""
 
     prepared: SparsePrepared
     M: BandedInverse
-    sizes: tuple[sp.csc_array, ...]
     A_size: sp.csc_array
-    D: Vector
+    stiffness: Matrix
+    D: Matrix
     kappa: float
     stiffest: float
     sigma2: float
@@ -66,89 +73,152 @@ class SparseBound:
         assembly, approximate = prepared.assembly, prepared.approximate_inverse
         if approximate is None or assembly.altered or not kappa > 0:
             return None
-        D = balanced_units(assembly)
-        sizes, A_size = tuple(map(_size, assembly.blocks)), _size(assembly.A)
-        rows = zip(sizes, assembly.slices, strict=True)
-        stiffest = SAFE * max(float((K @ D[s] * D[s]).max()) for K, s in rows)
-        sigma2 = independence(Assembly((), sp.csc_array(sp.diags_array(D) @ assembly.A)))
+        D = balanced_units(assembly)[:, None]
+        rows = zip(assembly.sparse_blocks, assembly.slices, strict=True)
+        stiffness = np.concatenate([_size(K) @ D[s] for K, s in rows])
+        stiffest = SAFE * float((stiffness * D).max())
+        sigma2 = independence(Assembly((), sp.csc_array(sp.diags_array(D[:, 0]) @ assembly.A)))
         if not sigma2 > 0:
             return None
-        return cls(prepared, approximate.M, sizes, A_size, D, kappa, stiffest, sigma2)
+        return cls(prepared, approximate.M, _size(assembly.A), stiffness, D, kappa, stiffest, sigma2)
 
     @np.errstate(over="ignore", invalid="ignore")
-    def proven(self, load: LoadCase, lam: Vector) -> Proven:
-        """From forces λ (m,) N."""
-        lam = np.maximum(lam, 0.0)
-        state = _State(self, load, lam)
-        C, best, worse, renewed = lam > 0, None, 0, False
-        for _ in range(MAX_STEPS):
-            y = state.s.value
-            C = (C & (state.lam.hi > 0)) | (y < -state.s.error)
-            bound = self._bound(state, C)
-            if best is not None and not bound < best.bound_mm / 2 and not renewed:
-                state.renew()  # what the steps have rounded may be what is left
-                bound, renewed = self._bound(state, C), True
-            worse = 0 if best is None or bound < best.bound_mm else worse + 1
-            if not worse:
-                best = Proven(state.x, state.lam, state.lam.hi > 0, bound)
-            if bound <= ENOUGH_MM or worse == MAX_WORSE:
+    def proven(
+        self, loads: Sequence[LoadCase], lams: Sequence[Vector], xs: Sequence[Vector] | None = None
+    ) -> list[Proven]:
+        """From forces λ (m,) N of each load case, and about their displacements x (n,), if known."""
+        lam = np.maximum(np.column_stack(lams), 0.0)
+        state = _State(self, stacked(loads), lam, None if xs is None else np.column_stack(xs))
+        C, cases = lam > 0, [_Progress() for _ in loads]
+        left = cases  # those in the columns of the state
+        for step in range(MAX_STEPS):
+            C = (C & (state.lam.hi > 0)) | (state.s.value < -state.s.error)
+            bounds = self._bound(state)
+            halting = np.array([case.halting(bound) for case, bound in zip(left, bounds, strict=True)])
+            if halting.any():
+                state.renew(halting)  # what the steps have rounded may be what is left
+                bounds = self._bound(state)
+            for column, (case, bound) in enumerate(zip(left, bounds, strict=True)):
+                if case.take(float(bound), last=step == MAX_STEPS - 1):
+                    case.found = state.proven(column, float(bound))
+            going = np.array([not case.done for case in left])
+            if not going.any():
                 break
-            state.move(_correction(self.M, C, y, state.lam.hi))
-        assert best is not None
-        return best
+            left, C, state = [case for case in left if not case.done], C[:, going], state.only(going)
+            columns = zip(C.T, state.s.value.T, state.lam.hi.T, strict=True)
+            state.move(np.column_stack([_correction(self.M, *column) for column in columns]))
+        return [case.found for case in cases if case.found]
 
-    def _bound(self, state: _State, C: NDArray[np.bool_]) -> float:
-        s, r = state.s, state.r
+    def _bound(self, state: _State) -> Vector:
+        """(k,) mm, of each column."""
+        s, r, at_junction = state.s, state.r, self.prepared.assembly.at_junction
         pressing = state.lam.hi > 0
-        if (state.lam.hi < 0).any():
-            return np.inf
         delta = np.where(pressing, abs(s.value), np.maximum(-s.value, 0.0)) + s.error * (
             pressing | (s.value < s.error)
         )
-        force = float(length(self.D * (abs(r.value) + r.error)))
-        distance = float(length(delta)) * np.sqrt(self.stiffest / self.sigma2)
+        force = length(self.D * (abs(r.value) + r.error))
+        distance = length(delta) * np.sqrt(self.stiffest / self.sigma2)
         error = SAFE * (force / np.sqrt(self.kappa) + distance) / np.sqrt(self.kappa)
-        of_each = self.prepared.assembly.at_junction(self.D * error + abs(state.x.lo))
-        bound = SAFE * float(of_each.max(initial=0.0))
-        return bound if np.isfinite(bound) else np.inf
+        of_each = at_junction(self.D) * error + abs(at_junction(state.x.lo))
+        bound = SAFE * of_each.max(axis=0, initial=0.0)
+        return np.where(np.isfinite(bound) & ~(state.lam.hi < 0).any(axis=0), bound, np.inf)
+
+
+@dataclass
+class _Progress:
+    """The smallest bound of a load case so far, mm. worse : steps in a row that improved nothing."""
+
+    least: float | None = None
+    worse: int = 0
+    renewed: bool = False
+    done: bool = False
+    found: Proven | None = None
+
+    def halting(self, bound: float) -> bool:
+        """Whether this bound is no better, for the first time."""
+        first = self.least is not None and not bound < self.least and not self.renewed
+        self.renewed |= first
+        return first
+
+    def take(self, bound: float, last: bool) -> bool:
+        """Whether the answer is to be kept: it proves enough and more than before, or is the last one."""
+        better = self.least is None or bound < self.least
+        self.least = bound if better else self.least
+        self.worse = 0 if better else self.worse + 1
+        self.done = last or bound <= ENOUGH_MM or self.worse == MAX_WORSE
+        return (better and bound <= PROVEN_ENOUGH_MM) or (self.done and self.found is None)
 
 
 class _State:
-    """x and λ with enclosures of r = f − Kx − Aλ and s = g − Aᵀx."""
+    """x (n, k) and λ (m, k) with enclosures of r = f − Kx − Aλ and s = g − Aᵀx."""
 
-    def __init__(self, bound: SparseBound, load: LoadCase, lam: Vector) -> None:
-        prepared, self.sizes, self.A_size = bound.prepared, bound.sizes, bound.A_size
-        self.prepared, self.load = prepared, load
+    def __init__(self, bound: SparseBound, loads: LoadCase, lam: Matrix, x: Matrix | None = None) -> None:
+        self.bound, self.assembly, self.f, self.g = bound, bound.prepared.assembly, loads.f, loads.g
+        self.forces = SlicedForces(self.assembly, bound.D)
         # The most terms in a row of Kx + Aλ; K is symmetric.
-        self.depth = 4 + int(np.bincount(self.A_size.indices, minlength=1).max())
-        self.depth += max(int(np.diff(K.indptr).max(initial=0)) for K in self.sizes)
+        self.depth = 4 + int(np.bincount(bound.A_size.indices, minlength=1).max())
+        self.depth += max(int(np.diff(K.indptr).max(initial=0)) for K in self.assembly.sparse_blocks)
         self.lam = DoubleDouble(lam, np.zeros_like(lam))
-        x = prepared.solve_K(load.f - prepared.assembly.A @ lam)
+        known = x is not None
+        if x is None:
+            x = bound.prepared.solve_K(self.f - self.assembly.A @ lam)
         self.x = DoubleDouble(x, np.zeros_like(x))
-        self.r = forces(prepared.assembly, load.f, self.x, self.lam)
-        self._move(prepared.solve_K(self.r.value), np.zeros_like(lam))
+        self.r = self.forces(self.f, self.x, self.lam)
+        if known:
+            self.s: Enclosure = gaps(self.assembly, self.g, self.x)
+        else:
+            self.move(np.zeros_like(lam))
 
-    def move(self, dlam: Vector) -> None:
+    def only(self, columns: NDArray[np.bool_]) -> _State:
+        """The state of some load cases."""
+        if columns.all():
+            return self
+        some = copy(self)
+        some.f, some.g = self.f if self.f.shape[1] == 1 else self.f[:, columns], self.g[:, columns]
+        some.x, some.lam = (DoubleDouble(v.hi[:, columns], v.lo[:, columns]) for v in (self.x, self.lam))
+        some.r, some.s = (Enclosure(v.value[:, columns], v.error[:, columns]) for v in (self.r, self.s))
+        return some
+
+    def renew(self, columns: NDArray[np.bool_]) -> None:
+        """r of some load cases from the original data, without the rounding of the steps."""
+        some = self.only(columns)
+        r = self.forces(some.f, some.x, some.lam)
+        self.r.value[:, columns], self.r.error[:, columns] = r.value, r.error
+
+    def move(self, dlam: Matrix) -> None:
         """To λ + dλ, and x with it."""
         # What is stored is λ + dλ but for the rounding of its second part, which counts below.
-        self._move(self.prepared.solve_K(self.r.value - self.prepared.assembly.A @ dlam), dlam)
+        self._move(self.bound.prepared.solve_K(self.r.value - self.assembly.A @ dlam), dlam)
 
-    def renew(self) -> None:
-        """r from the original data, without the rounding of the steps."""
-        self.r = forces(self.prepared.assembly, self.load.f, self.x, self.lam)
-
-    def _move(self, dx: Vector, dlam: Vector) -> None:
+    def _move(self, dx: Matrix, dlam: Matrix) -> None:
         """r − K dx − A dλ in float64: dx and dλ are small, and so is the rounding."""
-        assembly, depth = self.prepared.assembly, self.depth
-        self.x, self.lam = self.x.plus(dx), self.lam.plus(dlam)
-        x_size = gamma(depth) * abs(dx) + 2 * U * abs(self.x.lo)
-        lam_size = gamma(depth) * abs(dlam) + 2 * U * abs(self.lam.lo)
-        slices = zip(self.sizes, assembly.slices, strict=True)
-        rounding = np.concatenate([K @ x_size[rows] for K, rows in slices]) + self.A_size @ lam_size
-        value = self.r.value - assembly.multiply_K(dx) - assembly.A @ dlam
-        error = self.r.error + rounding + gamma(depth) * abs(self.r.value) + depth * ETA
-        self.r = Enclosure(value, SAFE * error)
-        self.s: Enclosure = gaps(assembly, self.load.g, self.x)
+        assembly, A, depth, D = self.assembly, self.assembly.A, self.depth, self.bound.D
+        product, self.lam = assembly.multiply_K(dx), self.lam.plus(dlam)
+        force, lam_size = A @ dlam, gamma(depth) * abs(dlam) + 2 * U * abs(self.lam.lo)
+        of_force, most = self.bound.A_size @ lam_size, np.zeros(dx.shape[1])
+        for rows in self._rows():
+            x = DoubleDouble(self.x.hi[rows], self.x.lo[rows]).plus(dx[rows])
+            self.x.hi[rows], self.x.lo[rows] = x.hi, x.lo
+            x_size = gamma(depth) * abs(dx[rows]) + 2 * U * abs(x.lo)
+            most = np.maximum(most, (x_size / D[rows]).max(axis=0))
+        for rows in self._rows():
+            value, error = self.r.value[rows], self.r.error[rows]
+            # |K| x_size ≤ |K|D max(x_size / D)
+            error += self.bound.stiffness[rows] * most + of_force[rows]
+            error += gamma(depth) * abs(value) + depth * ETA
+            error *= SAFE
+            value -= product[rows]
+            value -= force[rows]
+        self.s = gaps(assembly, self.g, self.x)
+
+    def _rows(self) -> Iterator[slice]:
+        n, k = self.x.hi.shape
+        height = max(ENTRIES_AT_A_TIME // k, 1)
+        return (slice(start, start + height) for start in range(0, n, height))
+
+    def proven(self, column: int, bound_mm: float) -> Proven:
+        x, lam = (DoubleDouble(v.hi[:, column].copy(), v.lo[:, column].copy()) for v in (self.x, self.lam))
+        return Proven(x, lam, lam.hi > 0, bound_mm)
 
 
 def _size(M: sp.csc_array) -> sp.csc_array:

@@ -123,8 +123,9 @@ def in_form(prepared: Prepared, form: Form) -> Problem:
 
 def stacked(cases: Sequence[LoadCase]) -> LoadCase:
     """Load cases as columns: f (n, k), or (n, 1) if all share it, and g (m, k)."""
-    shared = all(case.f is cases[0].f for case in cases)
-    f = cases[0].f[:, None] if shared else np.column_stack([case.f for case in cases])
+    first = cases[0].f
+    shared = all(case.f is first or np.array_equal(case.f, first) for case in cases)
+    f = first[:, None] if shared else np.column_stack([case.f for case in cases])
     return LoadCase(f, np.column_stack([case.g for case in cases]))
 
 

@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from .assembly import Matrix
+from .band_solve import band_solve
 
 Order = NDArray[np.intp]
 
@@ -133,8 +134,7 @@ class BandFactor:
         return int(self.L.size)
 
     def solve(self, b: Matrix) -> Matrix:
-        x: Matrix = lapack.dpbtrs(self.L, b, lower=1)[0]
-        return x
+        return band_solve(self.L, b)
 
 
 class Renumbered:
