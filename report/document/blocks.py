@@ -11,6 +11,8 @@ from matplotlib.figure import Figure as Drawing
 
 from .numbers import MISSING, significant
 
+WIDEST = 8  # columns of a table
+
 
 @dataclass(frozen=True)
 class Text:
@@ -44,23 +46,31 @@ def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: its `columns` in the report, all of `data` with all digits in NAME.csv beside it."""
+    """A table: its `columns` in the report, all of `data` with all digits in NAME.csv beside it.
+
+    More than WIDEST columns continue in further tables, each of which begins with the first `keys` columns.
+    """
 
     kind: ClassVar[str] = "table"
     name: str
     caption: str
     data: pd.DataFrame
     columns: list[Column]
+    keys: int = 1
 
     @property
     def markdown(self) -> str:
+        keys, others = self.columns[: self.keys], self.columns[self.keys :]
+        room = WIDEST - self.keys
+        parts = -(-len(others) // room) or 1
+        width = -(-len(others) // parts)  # of equal width
+        return "\n\n".join(self._part([*keys, *others[k * width : (k + 1) * width]]) for k in range(parts))
+
+    def _part(self, columns: list[Column]) -> str:
         lines = records(self.data)
-        shown = pd.DataFrame(
-            {c.heading: [c.show(line) for line in lines] for c in self.columns}, dtype=object
-        )
-        align = [c.align for c in self.columns]
-        text = shown.to_markdown(index=False, disable_numparse=True, colalign=align)
-        return str(text)
+        shown = pd.DataFrame({c.heading: [c.show(line) for line in lines] for c in columns}, dtype=object)
+        align = [c.align for c in columns]
+        return str(shown.to_markdown(index=False, disable_numparse=True, colalign=align))
 
 
 @dataclass(frozen=True)

@@ -37,5 +37,6 @@ function openRow(cell) {
     el("div", {class: "scroll"}, el("table", {class: "facts"}, facts.map(([name, value]) =>
       el("tr", {}, el("th", {scope: "row"}, words(name)), el("td", {}, typeof value === "number" ? String(value) : value))))),
     el("button", {type: "button", onclick: () => dialog.close()}, "close"));
-  dialog.showModal();
+  if (!dialog.open) dialog.showModal();
+  remember({row: cell.key ?? ""});
 }

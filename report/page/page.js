@@ -71,9 +71,17 @@ function show() {
   }
 }
 
+// The row that the address names.
+function openNamed() {
+  const cell = STATE.row && CELLS.find(each => each.key === STATE.row);
+  if (cell) openRow(cell);
+}
+
 document.getElementById("controls").addEventListener("submit", event => event.preventDefault());
-addEventListener("hashchange", () => { document.getElementById("row").close(); readAddress(); show(); });
+document.getElementById("row").addEventListener("close", () => remember({row: ""}));
+addEventListener("hashchange", () => { document.getElementById("row").close(); readAddress(); show(); openNamed(); });
 addEventListener("keydown", event => event.key === "Escape" && noTip());
 readAddress();
 banner();
 show();
+openNamed();

@@ -4,7 +4,7 @@ const DEFAULTS = {
   view: "", limit: String(DATA.limit ?? 1e-7), metric: (DATA.scenes ?? []).every(scene => scene.ladder) ? "error" : "load_case_s", rows: "best", sort: "rank", down: "",
   base: "", solver: "", machine: "", size: "", contact: "", form: "", threads: "", owner: "", tolerance: "",
   status: "", ladder: "", map: "0", field: "", scale: "linear", low: "", high: "", threshold: "", node: "",
-  change: "", search: "",
+  change: "", search: "", row: "",
 };
 const STATE = {...DEFAULTS};
 
@@ -16,11 +16,15 @@ function readAddress() {
 
 // Change the state, the address and what is shown.
 function update(changes) {
+  remember(changes);
+  show();
+}
+
+function remember(changes) {
   Object.assign(STATE, changes);
   const kept = Object.entries(STATE).filter(([name, value]) => value !== DEFAULTS[name]);
   const hash = new URLSearchParams(kept).toString();
   history.replaceState(null, "", hash ? `#${hash}` : location.pathname + location.search);
-  show();
 }
 
 // An element with attributes and children; text is never taken for markup.

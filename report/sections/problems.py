@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import pandas as pd
 
-from report.document.blocks import Block, Place, Section, Table, number, word
-from report.document.numbers import MISSING, as_number, power, signed, whole
+from report.document.blocks import Block, Column, Place, Section, Table, number, word
+from report.document.contents import scene_anchor
+from report.document.numbers import as_number, power, signed, whole
 from report.results.printed import TABLE_4
 from report.results.reader import Results
 
@@ -60,16 +64,15 @@ def _scenes(table: pd.DataFrame) -> Table:
     own = [f"sparse_{name}" for name in SPARSE]
     names += own if (sparse := table["sparse_unknowns"].notna().any()) else []
     columns = [
-        word("scene", "scene"),
+        Column("scene", _linked, "left"),
         word("title", "title"),
-        number("active", "active", whole),
-        number("% of m", "active_share", _percent),
+        Column("active (% of m)", _active),
         number("reference error bound, mm", "reference_bound_mm", power),
         word("reference computed by", "reference_route"),
     ]
     caption = (
-        "*The scenes.* Active: contacts closed in the reference answer. An answer is judged only if the "
-        "reference error bound is well below the limit."
+        "*The scenes*, each with a link to its table. Active: contacts closed in the reference answer. An "
+        "answer is judged only if the reference error bound is well below the limit."
     )
     if sparse:
         columns += [
@@ -85,6 +88,10 @@ def _scenes(table: pd.DataFrame) -> Table:
     return Table("scenes", caption, table[names], columns)
 
 
-def _percent(share: object) -> str:
-    number = as_number(share)
-    return MISSING if number is None else f"{100 * number:.1f}"
+def _linked(row: Mapping[str, Any]) -> str:
+    return f"[{row['scene']}](#{scene_anchor(row['scene'])})"
+
+
+def _active(row: Mapping[str, Any]) -> str:
+    share = as_number(row["active_share"])
+    return whole(row["active"]) + ("" if share is None else f" ({100 * share:.1f} %)")

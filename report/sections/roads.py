@@ -22,6 +22,7 @@ from report.results.reader import Results
 
 PLACE = Place(125)
 
+MADE = ("model_s", "K_s", "factors_s", "Q_s")  # before the solver's own preparation
 COLUMNS = 2  # of panels
 ROW = 0.19  # inches
 DRAWN = 12  # lines per panel, at most
@@ -133,7 +134,7 @@ def _table(lines: pd.DataFrame) -> Table:
     ]
     kept += ["load_case_s", "time_limit_s"]
     columns = [word("scene", "scene"), word("solver (form)", "label")]
-    columns += [Column(f"{LOOK[name][0]}, s", partial(_stage, name=name)) for name in STAGES]
+    columns.append(Column("matrices, s", _matrices))
     columns += [
         Column(f"total of {counted(k, 'load case')}, s", partial(_total, load_cases=k)) for k in LOAD_CASES
     ]
@@ -143,15 +144,16 @@ def _table(lines: pd.DataFrame) -> Table:
     ]
     caption = (
         "*From scene to answer*, in seconds, medians of the repeats. The totals of several load cases "
-        "are extrapolated from the one measured. An answer outside the limit has none. Dense matrices: K, "
+        "are extrapolated from the one measured. An answer outside the limit has none. Matrices: the "
+        "finite-element model, condensation, factors of K and Q; the CSV has each. Dense matrices: K, "
         "and the factors and Q if used, which the process maps from the cache. Peak: of the measuring "
         "process, which in the sparse form makes the model, and in the dense forms condenses nothing."
     )
     return Table("roads", caption, table[kept], columns)
 
 
-def _stage(line: Mapping[str, Any], name: str) -> str:
-    return significant(line[name] or None)
+def _matrices(line: Mapping[str, Any]) -> str:
+    return significant(sum(line[name] for name in MADE) or None)
 
 
 def _total(line: Mapping[str, Any], load_cases: int) -> str:

@@ -55,11 +55,10 @@ def _taken(results: Results, known: pd.DataFrame) -> Table:
         number("cond(K)", "cond_K", power),
         number("limit, mm", "limit_mm", power),
         number("reference error bound, mm", "reference_bound_mm", power),
-        word("reference computed by", "reference_route"),
     ]
     caption = (
-        "*The measured rungs.* Chosen, exact: K, f and g were made from a chosen answer without rounding, so "
-        "the reference is exact; otherwise the bound is proven with the reference."
+        "*The measured rungs.* Where the bound is 0, K, f and g were made from a chosen answer without "
+        "rounding, so the reference is exact; otherwise it is proven with the reference."
     )
     return Table("rungs", caption, table, columns)
 

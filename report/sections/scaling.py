@@ -93,7 +93,6 @@ def _figures(cells: pd.DataFrame) -> Table:
         number("per assembly, s", "once_s"),
         number("Cholesky of Q, s", "cholesky_s"),
         number("working memory, MiB", "working_mib", whole),
-        number("Q, MiB", "q_mib", whole),
     ]
     caption = "*The data of the fits*, medians of the repeats. >: stopped at the time limit."
     return Table("scaling", caption, table, columns)

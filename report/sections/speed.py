@@ -87,7 +87,6 @@ def _ratios(cases: pd.DataFrame, from_scene: Mapping[tuple[float, float, str], f
         number("threads", "threads", whole),
         word("solver (form)", "method"),
         number("scenes", "scenes", whole),
-        number("runs", "runs", whole),
         Column("per load case, relative to the fastest library", spread("to_library")),
         Column("with preparation, relative to the fastest library", spread("total_to_library")),
         number("from the scene on, relative to the fastest library", "scene_to_library"),
@@ -112,11 +111,9 @@ def _machine(rows: pd.DataFrame) -> Table:
         number("m", "m", whole),
         number("threads", "threads", whole),
         number("runs", "runs", whole),
-        number("Cholesky of Q, s", "cholesky_s"),
-        Column("10 to 90 %", _range("cholesky_s")),
+        Column("Cholesky of Q, s (10 to 90 %)", _range("cholesky_s")),
         number("10⁹ operations/s", "gflops"),
-        number("product Qv, s", "product_s"),
-        Column("10 to 90 % ", _range("product_s")),
+        Column("product Qv, s (10 to 90 %)", _range("product_s")),
         number("GB/s read", "gb_per_s"),
     ]
     caption = (
@@ -128,7 +125,11 @@ def _machine(rows: pd.DataFrame) -> Table:
 
 
 def _range(name: str) -> Callable[[Mapping[str, Any]], str]:
-    return lambda line: span(significant(line[f"{name}_low"]), significant(line[f"{name}_high"]))
+    def text(line: Mapping[str, Any]) -> str:
+        low, high = (significant(line[f"{name}_{end}"], 2) for end in ("low", "high"))
+        return f"{significant(line[name])} ({span(low, high)})"
+
+    return text
 
 
 def _figure(results: Results, cases: pd.DataFrame) -> Figure:

@@ -36,7 +36,6 @@ def section(results: Results) -> Section | None:
         columns.append(number("cannot be judged", "cannot_be_judged", whole))
     columns.append(number("worst error, mm", "worst_error_mm", power))
     columns += [number(f"s per load case, n = {n}", f"load_case_s_{n}") for n in results.sizes]
-    columns.append(number("peak memory, MiB", "peak_rss_mib", whole))
 
     compared = [
         f"n = {c.n}: {len(c.common)} of {counted(len(c.scenes), 'scene')}" for c in comparisons if c.seconds

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from report.analysis.checks import warnings
 from report.document.blocks import Block, Figure, Section, Table
+from report.document.contents import contents
 from report.document.escape import csv_frame, picture
 from report.figures import style
 from report.page.run import run_data
@@ -15,6 +16,8 @@ from report.results.reader import Results, read
 
 from .discovery import sections
 from .pages import rendered
+
+LONG = 4  # sections, from which a report begins with links to them
 
 
 def write(directory: Path) -> Path:
@@ -34,7 +37,9 @@ def write(directory: Path) -> Path:
         for i, part in enumerate(results.by_machine()):
             parts.append((part, [_save(section, target, i) for section in _made(part)]))
     path = target / "report.md"
-    page = rendered("report.md.j2", results=results, parts=parts, warnings=warnings(results))
+    titles = [section.title for _, made in parts for section in made]
+    links = contents(titles) if len(titles) >= LONG else ""
+    page = rendered("report.md.j2", results=results, parts=parts, warnings=warnings(results), contents=links)
     path.write_text(page, "utf-8")
     title = str(results.suite.get("title") or "Results")
     write_page(target / "index.html", title, run_data(results), directory)

@@ -41,13 +41,10 @@ def write(directory: Path) -> Path:
     target.mkdir(exist_ok=True)
     for stale in [*target.glob("*.png"), *target.glob("*.csv")]:
         stale.unlink()
-    blocks: list[Block] = [Text(_summary(series))]
+    sections = [Section("Summary", [Text(_summary(series))])]
     with style.applied():
         if len(series.cases):
-            blocks.append(_statistics(series))
-        sections = [Section("Summary", blocks)]
-        if len(series.cases):
-            sections.append(Section("The remaining gap", _pictures(series, target)))
+            sections.append(Section("The remaining gap", [*_pictures(series, target), _statistics(series)]))
         saved = [Section(s.title, [save_block(block, target) for block in s.blocks]) for s in sections]
     path = target / "report.md"
     title = f"Series on {series.facts['scene']}: {series.facts['cases']} load cases"
@@ -67,6 +64,13 @@ def _summary(series: Series) -> str:
         f"{counted(facts['threads'], 'thread')}) on {facts['machine']}: {counts}."
     ]
     if len(cases):
+        worst = int(cases["max_gap_mm"].to_numpy().argmax())
+        lines.insert(
+            0,
+            f"**The largest gap left in any case is {significant(cases['max_gap_mm'].iloc[worst])} mm, in "
+            f"case {cases['case'].iloc[worst]}; in half of the cases the largest is at most "
+            f"{significant(cases['max_gap_mm'].median())} mm.**",
+        )
         proven = int(cases["bound_mm"].notna().sum())
         bound = significant(cases["bound_mm"].max()) if proven else None
         if proven == len(cases):

@@ -147,7 +147,6 @@ def _systems(cells: pd.DataFrame) -> Table | None:
         word("CG iterations", "cg_text"),
         word("largest in second half", "late_text"),
         word("V = I, times as many", "ratio_text"),
-        number("factorisations", "factorisations", whole),
         word("s per load case", "seconds"),
     ]
     caption = (
