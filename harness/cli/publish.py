@@ -38,6 +38,7 @@ def publish(
                 130 interrupted.
     """
     with error_reporting() as console:
+        from harness.planning.suite import read_suite
         from harness.results import published as results
         from harness.terminal.exit_codes import DONE, FAILED, INTERRUPTED
         from report.writers.published import write_index
@@ -46,6 +47,9 @@ def publish(
         chosen = results.chosen(names or [])
         before = {name: results.rows_of(results.PUBLISHED / name) for name in chosen}
         due = [name for name in chosen if not results.is_of(before[name], code)]
+        for name in due:
+            if name not in results.SERIES:
+                read_suite(name)  # refuses solvers that are not installed, now rather than in hours
         done = [name for name in chosen if name not in due]
         if done:
             console.print(f"Published already, with commit {code}: {', '.join(done)}", style="dim")
