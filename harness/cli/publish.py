@@ -25,8 +25,9 @@ def publish(
     """Measure every published suite with this commit, into results/published, and write an index.
 
     Takes hours. In a clone without changes to the code: commits of results and documents do not count as
-    another code. What is published with it already is not measured again; what was published before stays
-    until the new rows are whole. Stop with Ctrl-C and run the same command again to continue.
+    another code, nor do those of reports. Of what is published with it already, only the report is written
+    anew; what was published before stays until the new rows are whole. Stop with Ctrl-C and run the same
+    command again to continue.
 
     \b
     Examples:
@@ -51,8 +52,10 @@ def publish(
             if name not in results.SERIES:
                 read_suite(name)  # refuses solvers that are not installed, now rather than in hours
         done = [name for name in chosen if name not in due]
-        if done:
-            console.print(f"Published already, with commit {code}: {', '.join(done)}", style="dim")
+        for name in done:
+            console.print(f"Published already, with commit {code}: {name}; its report anew.", style="dim")
+            if _ended(["report", str(results.PUBLISHED / name)]) == INTERRUPTED:
+                raise KeyboardInterrupt
         failed = []
         for k, name in enumerate(due):
             console.print(f"Suite {k + 1} of {len(due)}: {name}. {_left({n: before[n] for n in due[k:]})}")

@@ -12,8 +12,8 @@ from problems import __version__
 
 #: The folder that holds the project's packages.
 ROOT = Path(__file__).resolve().parents[2]
-#: What can change a number; results that are written meanwhile are not part of it.
-CODE = ("problems", "solvers", "harness", "report", "pyproject.toml")
+#: What can change a row; what only shows rows, and results that are written meanwhile, are not part of it.
+CODE = ("problems", "solvers", "harness", "pyproject.toml")
 #: Tracked in a work tree of this project; a tree that merely contains an installed copy tracks neither.
 OWN_FILES = ("pyproject.toml", "harness/results/provenance.py")
 #: Set by git for its hooks, to the tree that the hook is for.
