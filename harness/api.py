@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 import harness.verification.judge as referee
 from harness.conformance.check import run as check_solver
-from harness.planning.estimate import refuse_what_cannot_fit
+from harness.planning.road import chosen_form
 from harness.scene.answer import answer_of, form_of
 from harness.series.session import Job, Result, SeriesSession
 from harness.verification.judge import LIMIT_MM, Judgement
@@ -38,7 +38,7 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.dual_alone import DualAlone, load_of
 from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.forms.names import Form
+from problems.forms.names import FORMS, Form
 from problems.input.user_matrices import SYMMETRY, checked
 from problems.load_cases.base import LoadCases
 from problems.load_cases.listed import Listed
@@ -46,7 +46,7 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import MadeScene, Scene
 from problems.scene import read_scene, scene_of
 from solvers.base import Answer, Solver
-from solvers.registry import make_solver
+from solvers.registry import in_house, make_solver
 
 __all__ = [
     "Answer",
@@ -127,24 +127,32 @@ def solve(
 
     solver : a name (`python -m harness list solvers`) or an object of your own; by default the certified
         reference, as also where the answer without contact violates no gap and so no solver is called for.
-    form : "primal" or "dual"; by default the dual where the solver takes it.
+    form : "primal", "dual" or "sparse"; by default the cheaper one that the solver takes, as of the command.
     tolerance : passed to the solver, with its options.
     """
     scene = load_scene(scene)
-    refuse_what_cannot_fit(scene, scene.name)
-    data, load = prepared(scene), load_case(scene)
     named = None if solver is None else _solver(solver, options)
-    known = reference_of(scene, data, load)
+    own = not (solver is None or (isinstance(solver, str) and in_house(solver)))
+    forms = FORMS if named is None else named[1].forms
+    asked = form_of(named[0], forms, form) if form and named else form
+    taken = chosen_form(scene, forms, asked, in_house=not own).form
+    data, load = prepared(scene, form=taken), load_case(scene, taken)
+    has_contact = bool((data.dual_load(load) > 0).any())
+    guess = None
+    if has_contact and taken == "sparse":
+        guess = answer_of("newton", make_solver("newton", {}), data, "sparse", load, tolerance).lam
+    known = reference_of(scene, data, load, guess=guess)
     answer = Answer("solved", known.lam, known.x)
-    if named is not None and (data.dual_load(load) > 0).any():
+    if named is not None and has_contact:
         name, chosen = named
-        answer = answer_of(name, chosen, data, form_of(name, chosen.forms, form), load, tolerance)
+        answer = answer_of(name, chosen, data, taken, load, tolerance)
     x = np.asarray(answer.x, dtype=float)
     lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
     judgement = referee.judge(data, load, known, x, lam, LIMIT_MM)
     error = judgement.displacement_error_mm
     bound = np.inf if error is None else error + known.bound_mm
     gap = load.g - data.assembly.A.T @ x
+    x = data.assembly.at_junction(x)
     return Solution(x, lam, gap, answer.status, answer.iterations, judgement, bound)
 
 

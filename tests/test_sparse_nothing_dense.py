@@ -98,3 +98,49 @@ def test_from_the_scene_to_the_verdict_nothing_dense_is_made(tmp_path: Path) -> 
     of_order_m = 8 * nodes**2
     assert int(solving) < of_order_m
     assert int(proving) < 2 * of_order_m
+
+
+#: The same for the Python interface, which chooses the form by itself.
+RUN_API = """
+import resource, sys
+from harness import load_scene, solve
+from problems.forms.prepared import Prepared
+from problems.forms.sparse_prepared import SparsePrepared
+
+
+def dense(self):
+    raise AssertionError("a dense matrix was asked for")
+
+
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+for kind in (Prepared, SparsePrepared):
+    kind.factors = kind.Q = property(dense)
+solve(load_scene(sys.argv[1]), form="sparse")
+before = peak()
+for solver in (None, "newton"):
+    found = solve(load_scene(sys.argv[2]), solver)
+    print(found.judgement.verdict, len(found.x), len(found.lam), found.error_bound_mm, peak() - before)
+"""
+
+
+def test_solving_from_python_makes_nothing_dense(tmp_path: Path) -> None:
+    scenes = [tmp_path / "small.toml", tmp_path / "strip.toml"]
+    scenes[0].write_text(SCENE.replace(str(list(NODES)), "[20, 4]"))
+    scenes[1].write_text(SCENE)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN_API, *map(str, scenes)],
+        cwd=ROOT,
+        env={"RIVETBENCH_CACHE": str(tmp_path / "cache"), "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    nodes = NODES[0] * NODES[1]
+    for line in done.stdout.splitlines():
+        verdict, n, m, bound_mm, memory = line.split()
+        assert (verdict, int(n), int(m)) == ("within", 2 * nodes, nodes)
+        assert float(bound_mm) <= 1e-9
+        assert int(memory) < 2 * 8 * nodes**2

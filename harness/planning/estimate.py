@@ -35,6 +35,7 @@ GENERAL = 31 / 4 / 2 * 4 * 2 * 1.5
 FACTORS = 2  # at a time: to solve with, and to prove λmin
 PROOFS = 3  # factorisations in that proof, and of the coarser model
 SOLUTIONS = 400  # K̂⁻¹v, of an answer with its bound
+SOLUTIONS_OF_CASE = 25  # the same of each load case of a series, which shares them with others
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class SparseEstimate(Estimate):
-    """The same in the sparse form: unknowns of the finite-element model, the largest half-bandwidth of K̂."""
+    """The same in the sparse form: unknowns of the finite-element model, the largest half-bandwidth of K̂;
+    seconds of each load case of a series.
+    """
 
     unknowns: int
     half_bandwidth: int
+    case_s: float
 
 
 def stored_mib(scene: Scene, form: Form = "dual") -> float:
@@ -135,15 +139,17 @@ def estimated_sparse(scene: JointScene, flops_per_s: float) -> SparseEstimate:
     entries = sum(size * (width + 1) for size, width in bands)
     factoring = BAND_SLOWER * sum(size * (width + 1) ** 2 for size, width in bands) / flops_per_s
     peak = 150 + (MODEL_BYTES * unknowns + 8 * FACTORS * entries) / MIB
+    solution = BAND_SLOWER * 4 * entries / flops_per_s
     return SparseEstimate(
         n,
         m,
         8 * entries / MIB,
         peak,
         MODEL_S * unknowns + factoring,
-        SOLUTIONS * BAND_SLOWER * 4 * entries / flops_per_s + PROOFS * factoring,
+        SOLUTIONS * solution + PROOFS * factoring,
         unknowns,
         max(width for _, width in widths),
+        SOLUTIONS_OF_CASE * solution,
     )
 
 
