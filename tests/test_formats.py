@@ -38,6 +38,7 @@ QUIET = Console(file=StringIO())
 SCENE = "gallery/installed-fasteners"  # springs join both parts into one block of K
 FOLDERS = ("mtx", "abaqus")
 PATHS = {"npz": "p.npz", "op4": "p.op4", "dmig": "p.pch", "qpsolvers": "q.npz", "mtx": "m", "abaqus": "a"}
+PATHS |= {"mat": "p.mat", "qps": "p.qps"}
 
 
 def files_of(form: str, path: Path) -> list[str]:
