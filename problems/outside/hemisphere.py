@@ -4,8 +4,10 @@ On (−2, 2)², v ≥ ψ = √(1 − r²) where r < 1, and v = u on the edge, wi
 
     u = ψ for r ≤ a,   u = A log(2/r) for r > a,   a² (log 2 − log a) = 1 − a²,   A = a²/√(1 − a²)
 
-of E. Bueler, PETSc, src/snes/tutorials/ex9.c. Contacts are the nodes with r < 1; beyond, u is above ψ. The
-edge's values are in f; the objective is the energy less that of the held edge.
+of E. Bueler, PETSc, src/snes/tutorials/ex9.c. Contacts are the nodes with r < 1; beyond, u is above ψ.
+
+The unknowns are x = v − w, where w is the membrane without the hemisphere, so that f = 0; the objective is
+the energy that the hemisphere adds.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.sparse.linalg import spsolve
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.manufactured_problem import ManufacturedProblem
@@ -35,17 +38,22 @@ def _lines(cells: int) -> Vector:
     return np.linspace(-2.0, 2.0, cells + 1)
 
 
-def _problem(cells: int) -> ManufacturedProblem:
+def alone(cells: int) -> Vector:
+    """w at the inner nodes: the membrane without the hemisphere."""
     line, size = _lines(cells), cells - 1
     f = np.zeros((size, size))
     for edge in (0, -1):
         beyond = exact(np.column_stack([np.full(size, line[edge]), line[1:-1]]))
         f[edge] += beyond
         f[:, edge] += beyond
-    at = nodes(line[1:-1], line[1:-1])
-    covered = _covered(cells)
-    lowest = np.sqrt(1 - (at[covered] ** 2).sum(axis=1))
-    return above(five_point(size), f.ravel(), at, lowest, covered)
+    return np.asarray(spsolve(five_point(size), f.ravel()))
+
+
+def _problem(cells: int) -> ManufacturedProblem:
+    line, size, covered = _lines(cells)[1:-1], cells - 1, _covered(cells)
+    at = nodes(line, line)
+    lowest = np.sqrt(1 - (at[covered] ** 2).sum(axis=1)) - alone(cells)[covered]
+    return above(five_point(size), np.zeros(size**2), at, lowest, covered)
 
 
 def _covered(cells: int) -> np.ndarray:
