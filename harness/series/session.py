@@ -76,10 +76,10 @@ class Result:
 Assess = Callable[[Sequence[LoadCase], Sequence[Vector], Sequence[Vector | None]], list[Assessment]]
 
 
-def assessor(data: Prepared) -> Assess:
-    """What judges a block of answers."""
+def assessor(data: Prepared, limit_mm: float) -> Assess:
+    """What judges a block of answers, with bounds far below the limit where that is no trouble."""
     if isinstance(data, SparsePrepared):
-        return SparseAssessor(data)
+        return SparseAssessor(data, limit_mm / 10)
     return partial(assess, Bound.of(data))
 
 
@@ -101,7 +101,7 @@ class SeriesSession:
         self.job = job
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)
-        self.assess = assessor(self.data)
+        self.assess = assessor(self.data, job.limit_mm)
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.options, job.plugin)
         self.row: Row = {}  # of the case being solved

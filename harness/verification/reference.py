@@ -157,25 +157,30 @@ def _code() -> str:
     return fingerprint([Path(__file__), Path(balance.__file__)], within=["harness/verification"])
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def refined_active_set(
     prepared: Prepared,
     load: LoadCase,
     limit_s: float | None = None,
     guess: Vector | None = None,
-    bound: SparseBound | None = None,
 ) -> Reference:
     """The active set, refined and certified.
 
     guess : λ (m,) N of an answer, from whose set the search starts; with a sparse K the answer itself is
         refined, if that proves enough. The proof does not depend on where it came from.
-    bound : of this assembly with a sparse K; made unless given.
     """
     if guess is not None and isinstance(prepared, SparsePrepared):
-        bound = bound or sparse_bound(prepared)
+        bound = sparse_bound(prepared)
         refined = bound.proven([load], [guess])[0] if bound else None
         if refined is not None and refined.bound_mm <= PROVEN_ENOUGH_MM:
             return of_refined(refined)
+    return certified_active_set(prepared, load, limit_s, guess)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def certified_active_set(
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, guess: Vector | None = None
+) -> Reference:
+    """The same by factorisations for contact sets, the first that of the guess."""
     p = prepared.dual_load(load)
     active = np.zeros(len(p), dtype=bool)
     limit_s = default_limit_s(len(p)) if limit_s is None else limit_s

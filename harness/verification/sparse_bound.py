@@ -129,21 +129,22 @@ class _Progress:
     """The smallest bound of a load case so far, mm. worse : steps in a row that improved nothing."""
 
     least: float | None = None
+    steps: int = 0
     worse: int = 0
     renewed: bool = False
     done: bool = False
     found: Proven | None = None
 
     def halting(self, bound: float) -> bool:
-        """Whether this bound is no better, for the first time."""
-        first = self.least is not None and not bound < self.least and not self.renewed
+        """Whether this bound is hardly better, for the first time. The first step corrects x more than λ."""
+        first = self.steps > 1 and self.least is not None and not bound < self.least / 2 and not self.renewed
         self.renewed |= first
         return first
 
     def take(self, bound: float, last: bool) -> bool:
         """Whether the answer is to be kept: it proves enough and more than before, or is the last one."""
         better = self.least is None or bound < self.least
-        self.least = bound if better else self.least
+        self.least, self.steps = bound if better else self.least, self.steps + 1
         self.worse = 0 if better else self.worse + 1
         self.done = last or bound <= ENOUGH_MM or self.worse == MAX_WORSE
         return (better and bound <= PROVEN_ENOUGH_MM) or (self.done and self.found is None)

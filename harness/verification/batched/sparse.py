@@ -14,8 +14,8 @@ import numpy as np
 
 from harness.verification.reference import (
     Reference,
+    certified_active_set,
     of_refined,
-    refined_active_set,
     sparse_bound,
 )
 from harness.verification.sparse_bound import PROVEN_ENOUGH_MM, SparseBound
@@ -26,10 +26,13 @@ from .assess import Assessment
 
 
 class SparseAssessor:
-    """Of answers to load cases of an assembly, whose common part of the proofs is made once."""
+    """Of answers to load cases of an assembly, whose common part of the proofs is made once.
 
-    def __init__(self, prepared: SparsePrepared) -> None:
-        self.prepared = prepared
+    enough_mm : a wider bound is tried to be improved by a factorisation for the contact set.
+    """
+
+    def __init__(self, prepared: SparsePrepared, enough_mm: float = PROVEN_ENOUGH_MM) -> None:
+        self.prepared, self.enough_mm = prepared, enough_mm
 
     def __call__(
         self, loads: Sequence[LoadCase], lams: Sequence[Vector], xs: Sequence[Vector | None]
@@ -46,12 +49,12 @@ class SparseAssessor:
     ) -> list[Reference]:
         if self.bound is None:
             pairs = zip(loads, lams, strict=True)
-            return [refined_active_set(self.prepared, load, guess=lam) for load, lam in pairs]
+            return [certified_active_set(self.prepared, load, guess=lam) for load, lam in pairs]
         refined = self.bound.proven(loads, lams, xs)
         return [
             of_refined(found)
-            if found.bound_mm <= PROVEN_ENOUGH_MM
-            else refined_active_set(self.prepared, load, guess=lam, bound=self.bound)
+            if found.bound_mm <= self.enough_mm
+            else certified_active_set(self.prepared, load, guess=lam)
             for found, load, lam in zip(refined, loads, lams, strict=True)
         ]
 
