@@ -4,7 +4,8 @@
 
 R. Dembo and U. Tulowitzki, On the minimization of quadratic functions subject to box constraints, Yale
 University (1983); J. Moré and G. Toraldo, SIAM J. Optim. 1:93–113 (1991). Linear triangles. The bound
-v ≤ 2000 is never active.
+v ≤ 2000 is never active. Near the corner (1, 1) the obstacle is above zero and the edge is not: the energy of
+that step grows as 1/h, so that there is no limit under refinement.
 
 CUTEst's OBSTCLAE sums over the four differences of each inner node, so that those to the edge count half.
 """
