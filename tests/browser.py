@@ -30,6 +30,7 @@ def browser(profile: Path) -> Iterator[Any]:
     for flag in (*FLAGS, f"user-data-dir={profile}"):
         options.add_argument(f"--{flag}")
     found = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    found.execute_cdp_cmd("Emulation.setFocusEmulationEnabled", {"enabled": True})  # else no event of focus
     try:
         yield found
     finally:

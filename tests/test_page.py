@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from synthetic_results import everything, no_answer, row, write_rows
 from test_hostile_text import HOSTILE, MADE
@@ -17,7 +18,7 @@ from test_series_report import made as made_series
 
 from report.analysis.remaining_gaps import QUANTILES, quantile_maps
 from report.figures import style
-from report.page import maps, run
+from report.page import answer, comparison, maps, run
 from report.page.packed import packed
 from report.page.run import run_data
 from report.page.write import write
@@ -201,3 +202,17 @@ def test_a_directory_without_an_answer_has_a_page(tmp_path: Path) -> None:
     assert column(data, "load_case_s") == [None]
     empty = page_of(write_rows(tmp_path / "empty", []), tmp_path / "index.html").data
     assert column(empty, "key") == []
+
+
+def test_the_banner_of_an_answer_and_of_a_comparison_names_the_code() -> None:
+    record = {"method": "newton", "machine": "CPU", "commit": "a" * 40, "recorded_at": "2026-01-02T03:04:05"}
+    clean = answer._banner([record | {"clean": True}])
+    assert (clean["machines"], clean["measured"]) == (["CPU"], "2026-01-02 03:04 UTC")
+    assert clean["commits"] == "a" * 40 + " (clean)"
+    assert not clean["warnings"]
+    assert "uncommitted" in answer._banner([record | {"clean": False}])["warnings"][0]
+    assert answer._banner([{"method": "newton"}])["commits"] == "not recorded"
+    rows = pd.DataFrame([record | {"clean": True, "side": "old"}, record | {"clean": False, "side": "new"}])
+    both = comparison._banner(rows.assign(machine=["CPU", "other"]))
+    assert "old: " + "a" * 40 in both["commits"]
+    assert [warning.split()[-2] for warning in both["warnings"]] == ["uncommitted", "machine"], both

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, urlencode
 
 import numpy as np
 import pandas as pd
@@ -23,6 +24,7 @@ from report.figures import style
 from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
+from report.results.series import read as read_series
 from report.sections.profiles import compared, ratios
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
@@ -270,3 +272,45 @@ def test_a_map_of_a_series_has_the_curve_of_a_contact(
     assert "x = 1 mm, y = 1 mm" in chromium.execute_script(
         "return document.getElementById('exceedance').textContent"
     )
+
+
+def test_headings_stay_in_sight(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
+    opened(chromium, made[1], "rows=all")
+    chromium.execute_script("document.querySelector('.scroll').style.maxHeight = '200px'")
+    top = "document.querySelector('thead th').getBoundingClientRect().top"
+    before = chromium.execute_script(f"return {top}")
+    chromium.execute_script("document.querySelector('.scroll').scrollTop = 150")
+    assert chromium.execute_script("return document.querySelector('.scroll').scrollTop") > 50
+    assert chromium.execute_script(f"return {top}") == pytest.approx(before, abs=1)
+
+
+def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:
+    keys = ["4386/0052 gi tol=1e-9", "4386/0052 ipm tol=1e-9"]
+    rows = [row(solver=key.split()[1], key=key) for key in keys]
+    page = write(tmp_path / "index.html", "", run_data(read(write_rows(tmp_path, rows))))
+    dialog = "document.getElementById('row')"
+    opened(chromium, page, urlencode({"row": keys[1]}))
+    assert keys[1] in chromium.execute_script(f"return {dialog}.open ? {dialog}.textContent : ''")
+    chromium.execute_script(f"{dialog}.close()")
+    assert eventually(chromium, "!location.hash.includes('row=')")
+    chromium.execute_script(f"{SEEN}.find(td => td.dataset.key === arguments[0]).click()", keys[0])
+    assert parse_qs(chromium.execute_script("return location.hash.slice(1)"))["row"] == [keys[0]]
+
+
+def test_a_ladder_says_where_a_solver_breaks(chromium: Any, tmp_path: Path) -> None:
+    rungs = {"1e+00": "within", "1e-02": "no_answer", "1e-04": "within"}
+    rows = [row(verdict=verdict) | {"scene": f"hard/supports/{name}"} for name, verdict in rungs.items()]
+    rows.append(row() | {"scene": "hard/refinement/08"})
+    found = read(write_rows(tmp_path, rows))
+    opened(chromium, write(tmp_path / "index.html", "", run_data(found)), "view=solver")
+    text = chromium.execute_script("return document.getElementById('breaks').textContent")
+    assert text == "Breaks at supports/1e-02. Correct on every rung of refinement."
+
+
+def test_the_worst_case_of_a_series_is_one_click_away(chromium: Any, tmp_path: Path) -> None:
+    made_series(tmp_path)
+    write_series(tmp_path)
+    worst = read_series(tmp_path).cases.sort_values("max_gap_mm")["case"].iloc[-1]
+    opened(chromium, tmp_path / "report" / "index.html")
+    chromium.execute_script("document.getElementById('worst').click()")
+    assert f"case {worst}, mm" in eventually(chromium, "document.getElementById('about-map').textContent")

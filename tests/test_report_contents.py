@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from urllib.parse import parse_qs
@@ -37,6 +38,8 @@ def columns(page: str) -> list[int]:
 
 def made(folder: Path) -> tuple[str, pd.DataFrame]:
     results = everything(folder, SCENES)
+    lines = map(json.loads, (results / "measurements.jsonl").read_text("utf-8").splitlines())
+    write_rows(results, [line | {"key": f"{line['scene']} no={k}"} for k, line in enumerate(list(lines))])
     return write(results).read_text("utf-8"), read(results).cells
 
 
@@ -48,7 +51,8 @@ def test_contents_scenes_and_rows_can_be_followed(tmp_path: Path, monkeypatch: p
     assert sum(link.startswith("scene-") for link in links) == len(set(cells["scene"]))
     assert set(links) <= resolved(page)
     rows = [parse_qs(query)["row"][0] for query in re.findall(r"\]\(index\.html#([^)]+)\)", page)]
-    assert sorted(rows) == sorted(key for key in cells["key"] if key)
+    assert sorted(rows) == sorted(cells["key"])
+    assert len(rows) > 20
     assert page.index("Contents: ") < page.index("## Summary")
     assert len(columns(page)) > 5
     assert max(columns(page)) <= 8

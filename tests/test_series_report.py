@@ -77,7 +77,7 @@ def test_the_interval_of_a_quantile_covers_it_as_often_as_it_says(tmp_path: Path
     hits = 0
     for _ in range(200):
         cases = pd.DataFrame({"max_gap_mm": rng.uniform(size=100)})
-        found = convergence(Series({}, {}, cases, series.gaps, None, series.fasteners, []))
+        found = convergence(Series({}, {}, cases, series.gaps, None, series.fasteners, [], series.code))
         row = found[(found["cases"] == 100) & (found["quantile"] == 0.5)].iloc[0]
         ordered = np.sort(cases["max_gap_mm"])
         assert (row["low_mm"], row["high_mm"]) == (ordered[39], ordered[60])

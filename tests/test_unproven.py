@@ -106,5 +106,7 @@ def test_the_report_of_a_series_says_how_many_bounds_are_missing(bounds: list[fl
     cases = pd.DataFrame({"case": [0, 1], **{name: [1e-3, 1e-3] for name in FIGURES}, "bound_mm": bounds})
     identity = {"solver": "newton", "form": "dual", "tolerance": 1e-9, "limit_mm": 1e-7}
     facts = {"title": "t", "cases": 2, "threads": 1, "machine": "m", "identity": identity, "scene": "s"}
-    series = Series(facts, {"within": 2}, cases, np.zeros((2, 3), np.float32), None, np.zeros((0, 2)), [])
+    code = pd.DataFrame({"commit": ["", ""], "clean": [None, None]})
+    gaps, nowhere = np.zeros((2, 3), np.float32), np.zeros((0, 2))
+    series = Series(facts, {"within": 2}, cases, gaps, None, nowhere, [], code)
     assert sentence in _summary(series)

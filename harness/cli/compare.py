@@ -62,6 +62,8 @@ def compare(
 
 
 def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float | None) -> Comparison:
+    import pandas as pd
+
     from harness.results.incomparable import Incomparable
     from harness.results.sides import measurement, refuse_incomparable
     from report.analysis.comparison import compared
@@ -79,4 +81,6 @@ def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float 
         of_records([row | {"measurement": measurement(row)} for row in side.rows]) for side in (old, new)
     )
     table = compared(before, after, timed, max_digits_lost, max_slowdown or MAX_SLOWDOWN)
-    return Comparison(quoted(old.name), quoted(new.name), table, untimed)
+    names = quoted(old.name), quoted(new.name)
+    both = pd.concat([rows.assign(side=side) for rows, side in zip((before, after), names, strict=True)])
+    return Comparison(*names, table, untimed, both)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,8 @@ from rich.console import Console
 from rich.text import Text
 
 from harness.planning.road import Choice, chosen_form
-from harness.results.machine import resident_mib
+from harness.results.machine import machine, resident_mib
+from harness.results.provenance import provenance
 from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import reference_of
@@ -163,6 +165,9 @@ def solve(
         "skipped": list(_skipped(scene, steps, road, has_contact, solver, p)),
         "steps": steps.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
+        "machine": machine()["machine"],
+        **provenance(),
+        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     gap = load.g - data.assembly.A.T @ x
     if allow_gap_mm is not None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from report.document.numbers import significant
+import pandas as pd
+
+from report.document.numbers import listed, significant
 from report.results.series import Array
 
+from .banner import banner
 from .maps import answer_maps, two_answers_maps
 from .packed import Data
+
+CODE = ("machine", "commit", "clean", "recorded_at")
 
 
 def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
@@ -24,7 +29,7 @@ def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
     }
     return {
         "kind": "answer",
-        "banner": banner([str(record["method"])]),
+        "banner": _banner([record]),
         "facts": [[name, str(value)] for name, value in facts.items() if value is not None],
         "maps": answer_maps(record, arrays),
     }
@@ -37,13 +42,16 @@ def two_answers_data(records: list[Data], answers: list[dict[str, Array]], names
         for which, record in zip(("first", "second"), records, strict=True)
     ]
     maps = two_answers_maps(records[0], answers)
-    return {"kind": "answer", "banner": banner(names), "facts": facts, "maps": maps}
+    return {"kind": "answer", "banner": _banner(records), "facts": facts, "maps": maps}
 
 
-def banner(lines: list[str], **more: object) -> Data:
-    """A banner without warnings; lines : what is known of machine and solver."""
-    empty = {"commits": "", "measured": "", "versions": [], "counts": "", "warnings": []}
-    return {"machines": lines} | empty | more
+def _banner(records: list[Data]) -> Data:
+    rows = pd.DataFrame([{name: record.get(name) for name in CODE} for record in records])
+    rows = rows.assign(**{name: rows[name].fillna("") for name in CODE if name != "clean"})
+    changed = (rows["clean"] == 0).any()
+    warned = ["Computed with uncommitted changes to that commit."] if changed else []
+    methods = dict.fromkeys(str(record["method"]) for record in records)
+    return banner(rows, counts=f"solved by: {listed(list(methods))}", warnings=warned)
 
 
 def _known(value: object) -> str | None:

@@ -6,10 +6,12 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.code import commits_text
 from report.analysis.comparison import ADDED, BETTER, CHANGED, SAME, WORSE
 from report.document.blocks import records
+from report.document.numbers import listed
 
-from .answer import banner
+from .banner import banner
 from .packed import Data
 
 GROUPS = {
@@ -40,18 +42,29 @@ COLUMNS = [
 ]
 
 
-def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]]) -> Data:
-    """What the page of a comparison shows. pairs : old, new, summary, and the table of each."""
-    names = sorted({side for old, new, *_ in pairs for side in (old, new)})
+def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]], rows: pd.DataFrame) -> Data:
+    """What the page of a comparison shows. pairs : old, new, summary, and the table of each; rows : of all
+    runs, with their `side`.
+    """
     return {
         "kind": "compare",
-        "banner": banner([" / ".join(names)]),
+        "banner": _banner(rows),
         "columns": [list(column) for column in COLUMNS],
         "comparisons": [
             {"old": old, "new": new, "summary": summary, "lines": [_line(line) for line in records(table)]}
             for old, new, summary, table in pairs
         ],
     }
+
+
+def _banner(rows: pd.DataFrame) -> Data:
+    sides = [(str(side), of_side) for side, of_side in rows.groupby("side", sort=False)]
+    changed = [side for side, of_side in sides if (of_side["clean"] == 0).any()]
+    warned = [f"Rows of {listed(changed)} were measured with uncommitted changes."] if changed else []
+    if rows["machine"].nunique() > 1:
+        warned.append("The rows come from several machines; times are compared within one machine only.")
+    code = "; ".join(f"{side}: {commits_text(of_side)}" for side, of_side in sides)
+    return banner(rows, commits=code, counts=f"{len(rows)} rows", warnings=warned)
 
 
 def _line(line: dict[str, Any]) -> Data:

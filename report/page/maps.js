@@ -23,6 +23,7 @@ async function mapView(main) {
     maps.length > 1 ? options("map", "map", maps.map((each, k) => [String(k), each.name]), "") : "",
     options("field", "show", others.map(each => [each.name, each.name]), field.case == null ? "" : field.name),
     cases.length ? el("label", {}, `case (${cases.length} of them) `, slider) : "",
+    map.worst == null ? "" : el("button", {type: "button", id: "worst", onclick: () => update({field: `case ${map.worst}`})}, `worst case: ${map.worst}`),
     options("scale", "scale", Object.entries(SCALES), ""), entry("low", `from, ${field.unit}`), entry("high", `to, ${field.unit}`), entry("threshold", `contour at, ${field.unit}`));
   const place = el("div", {class: "map"}), about = el("p", {class: "note", id: "about-map"});
   main.append(controls, about, place);

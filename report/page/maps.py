@@ -7,7 +7,6 @@ A map has `nodes` (one per group of maps on the same contacts), `fields` by name
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from report.results.series import Array, Series
 
 from .packed import Data, exact, packed
 
+NO_MARKS = np.zeros((0, 2))
 BUDGET = 1_100_000  # characters of all maps of a page
 MOST = 20_000  # contacts of a map; of more, every k-th is shown
 CASES = 60  # of a series, at most
@@ -25,52 +25,41 @@ SHARES = (1.0, 0.99, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.
 
 def scene_maps(results: Results) -> Data:
     """The maps of a run's scenes as far as they fit, and the names of those left out."""
-    maps: list[Data] = []
-    left_out: list[str] = []
-    shared: dict[str, int] = {}
-    groups: list[str] = []
+    page = _empty()
     spent = 0
     for scene in results.cells.sort_values(["n", "active", "scene"])["scene"].unique():
         arrays = results.scene_arrays(scene)
         if not arrays or "contact_nodes" not in arrays:
             continue
-        made = _map(scene, arrays["contact_nodes"], arrays, arrays.get("fasteners"))
-        place, fields = made.pop("nodes"), made["fields"]
-        new = 0 if place in shared else len(place)
-        size = new + sum(len(field["values"]) for field in fields)
+        made = _fields_map(scene, arrays["contact_nodes"], arrays, arrays.get("fasteners", NO_MARKS))
+        new = 0 if made["nodes"] in page["groups"] else len(made["nodes"])
+        size = new + sum(len(field["values"]) for field in made["fields"])
         if spent + size > BUDGET:
-            left_out.append(scene)
+            page["left_out"].append(scene)
             continue
         spent += size
-        if place not in shared:
-            shared[place] = len(groups)
-            groups.append(place)
-        maps.append(made | {"group": shared[place]})
-    return {"groups": groups, "maps": maps, "left_out": left_out}
+        _add(page, made)
+    return page
 
 
 def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     """The maps of one answer, one per pair of parts in contact."""
     if "contact_nodes" not in arrays or not record["m"]:
-        return {"groups": [], "maps": [], "left_out": []}
-    groups: list[str] = []
-    maps: list[Data] = []
+        return _empty()
+    page = _empty()
     for pair in record["pairs"]:
         own = slice(pair["start"], pair["stop"])
         of_pair = {name: arrays[name][own] for name in ("gap_before", "gap_after", "lam")}
         marks = [point for points in record["marks"].values() for point in points]
-        made = _map(pair_name(pair), arrays["contact_nodes"][own], of_pair, np.array(marks).reshape(-1, 2))
-        groups.append(made.pop("nodes"))
-        maps.append(made | {"group": len(groups) - 1})
-    return {"groups": groups, "maps": maps, "left_out": []}
+        _add(page, _fields_map(pair_name(pair), arrays["contact_nodes"][own], of_pair, np.array(marks)))
+    return page
 
 
 def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
     """The maps of two answers on one junction, one per pair of parts: both gaps, and what the second adds."""
     if "contact_nodes" not in answers[0]:
-        return {"groups": [], "maps": [], "left_out": []}
-    groups: list[str] = []
-    maps: list[Data] = []
+        return _empty()
+    page = _empty()
     for pair in record["pairs"]:
         own = slice(pair["start"], pair["stop"])
         first, second = (arrays["gap_after"][own] for arrays in answers)
@@ -78,18 +67,8 @@ def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
         step = _step(len(nodes))
         fields = [_field("first", first[::step]), _field("second", second[::step])]
         fields.append(_field("second − first", (second - first)[::step]) | {"signed": True})
-        maps.append(
-            {
-                "name": pair_name(pair),
-                "contacts": len(nodes),
-                "every": step,
-                "fields": fields,
-                "marks": [],
-                "group": len(groups),
-            }
-        )
-        groups.append(exact(nodes[::step]))
-    return {"groups": groups, "maps": maps, "left_out": []}
+        _add(page, _map(pair_name(pair), nodes, fields))
+    return page
 
 
 def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
@@ -99,7 +78,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
     quantiles : (len(names), m), mm.
     """
     if series.nodes is None or not len(series.cases) or not len(series.gaps):
-        return {"groups": [], "maps": [], "left_out": []}
+        return _empty()
     step = _step(len(series.nodes))
     numbers = series.cases["case"].to_numpy()
     fields = [_field(name, values[::step]) for name, values in zip(names, quantiles, strict=True)]
@@ -112,17 +91,9 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
             break
         fields.append(field | {"case": int(case)})
     fields[len(names) :] = sorted(fields[len(names) :], key=lambda field: field["case"])
-    made = {
-        "name": f"{len(numbers)} cases",
-        "contacts": len(series.nodes),
-        "every": step,
-        "fields": fields,
-        "marks": series.fasteners.tolist(),
-        "shares": list(SHARES),
-        "exceeded": curves,
-        "group": 0,
-    }
-    return {"groups": [exact(series.nodes[::step])], "maps": [made], "left_out": []}
+    worst = next(_chosen(series))
+    made = _map(f"{len(numbers)} cases", series.nodes, fields, series.fasteners)
+    return _add(_empty(), made | {"shares": list(SHARES), "exceeded": curves, "worst": worst})
 
 
 def _chosen(series: Series) -> Iterator[int]:
@@ -146,20 +117,37 @@ def _exceeded(series: Series, step: int) -> str:
     return packed(np.concatenate(found))
 
 
-def _map(name: str, nodes: Array, arrays: dict[str, Array], marks: Array | None) -> Data:
+def _empty() -> Data:
+    return {"groups": [], "maps": [], "left_out": []}
+
+
+def _add(page: Data, made: Data) -> Data:
+    """The page's maps with one more; maps on the same contacts share their places."""
+    place = made.pop("nodes")
+    if place not in page["groups"]:
+        page["groups"].append(place)
+    page["maps"].append(made | {"group": page["groups"].index(place)})
+    return page
+
+
+def _map(name: str, nodes: Array, fields: list[Data], marks: Array = NO_MARKS) -> Data:
     step = _step(len(nodes))
-    known = {"gap_before": ("gap before", "mm"), "gap_after": ("gap after", "mm"), "lam": ("force", "N")}
-    fields: list[dict[str, Any]] = [
-        _field(text, arrays[key][::step], unit) for key, (text, unit) in known.items() if key in arrays
-    ]
     return {
         "name": name,
         "contacts": len(nodes),
         "every": step,
         "fields": fields,
-        "marks": [] if marks is None else marks.tolist(),
+        "marks": marks.tolist(),
         "nodes": exact(nodes[::step]),
     }
+
+
+def _fields_map(name: str, nodes: Array, arrays: dict[str, Array], marks: Array) -> Data:
+    """The map of what is known of the gaps and forces."""
+    step = _step(len(nodes))
+    known = {"gap_before": ("gap before", "mm"), "gap_after": ("gap after", "mm"), "lam": ("force", "N")}
+    fields = [_field(text, arrays[key][::step], unit) for key, (text, unit) in known.items() if key in arrays]
+    return _map(name, nodes, fields, marks)
 
 
 def _field(name: str, values: Array, unit: str = "mm") -> Data:

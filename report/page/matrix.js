@@ -12,7 +12,7 @@ function matrix(main) {
   const counted = errors ? "Error over the limit, the largest of the repeats. " : `Seconds (${METRICS[STATE.metric]}), medians of the repeats. `;
   const shade = errors ? "the darker the smaller the error" : "the darker the nearer to the fastest of the scene (bold)";
   main.append(el("p", {class: "note"},
-    counted, base ? `Ratios to ${base.name}. ` : "",
+    scenes.some(scene => scene.ladder) ? "" : "Each scene with its share of closed contacts. ", counted, base ? `Ratios to ${base.name}. ` : "",
     `Blue: within the limit, ${shade}; × outside the limit; ⊗ outside, though reported as solved; `
     + (lines.some(line => [...line.cells.values()].some(cell => cell.least_mm)) ? "on a rung, the limit is at least what conditioning allows; " : "")
     + "? cannot be judged, because the reference error bound is above a tenth of the limit; otherwise why there is no answer. "
@@ -21,7 +21,7 @@ function matrix(main) {
   const heads = [["rank", "#", "place in the ranking: share of scenes within the limit, then time over the fastest"],
     ["name", "solver (form)", ""], ["within", "within", "scenes within the limit, of those measured"],
     ["slower", "× fastest", "geometric mean of time over the fastest, on the scenes answered within the limit"],
-    ...scenes.map(scene => [`scene ${scene.scene}`, scene.ladder ? scene.scene.split("/").slice(1).join("/") : scene.scene, `${scene.title} n = ${scene.n}, m = ${scene.m}, active ${scene.active}`])];
+    ...scenes.map(scene => [`scene ${scene.scene}`, scene.ladder ? scene.scene.split("/").slice(1).join("/") : scene.scene + closed(scene), `${scene.title} n = ${scene.n}, m = ${scene.m}, active ${scene.active}`])];
   const head = el("tr", {}, heads.map(([name, text, hint], place) => el("th", {
     scope: "col", class: place < 2 ? `stuck${place}` : place > 3 ? upright : "",
     "aria-sort": STATE.sort === name ? (STATE.down ? "descending" : "ascending") : "none",
@@ -64,6 +64,7 @@ function textOf(cell, judged, against, pinned) {
   return [number(value, pinned ? 2 : 3), claimed(cell, judged) ? "⊗" : VERDICTS[judged][1]].filter(Boolean).join(" ");
 }
 
+const closed = scene => scene.active == null || !scene.m ? "" : ` · ${Math.round(100 * scene.active / scene.m)} %`;
 const claimed = (cell, judged) => judged === "outside" && cell.status === "solved";
 
 function cellOf(cell, limit, fastest, against, pinned) {

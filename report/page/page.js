@@ -54,13 +54,13 @@ function judgedControls() {
 function show() {
   noTip();
   const name = current(), main = document.getElementById("view"), at = document.activeElement, sort = at?.dataset?.sort, pin = at?.dataset?.pin, method = at?.dataset?.method;
-  const scrolled = main.querySelector(".scroll")?.scrollLeft ?? 0;
+  const box = main.querySelector(".scroll"), scrolled = box ? [box.scrollLeft, box.scrollTop] : [0, 0];
   document.getElementById("views").replaceChildren(...Object.entries(VIEWS).filter(([view]) => view !== "maps" || DATA.maps.maps.length).map(([view, [text]]) =>
     el("button", {type: "button", "aria-current": view === name ? "page" : null, "data-view": view, onclick: () => update({view})}, text)));
   controls();
   main.replaceChildren();
   VIEWS[name][1](main);
-  if (main.querySelector(".scroll")) main.querySelector(".scroll").scrollLeft = scrolled;
+  main.querySelector(".scroll")?.scrollTo(...scrolled);
   const again = [["sort", sort], ["pin", pin], ["method", method]].find(([, value]) => value);
   if (again) [...document.querySelectorAll(`[data-${again[0]}]`)].find(node => node.dataset[again[0]] === again[1])?.focus({preventScroll: true});
   const counts = document.getElementById("counts");

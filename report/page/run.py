@@ -17,7 +17,6 @@ import pandas as pd
 
 from harness.results.schema import LADDERS
 from report.analysis.checks import warnings
-from report.analysis.code import commits_text
 from report.analysis.roads import STAGES, roads
 from report.document.blocks import records
 from report.document.numbers import listed
@@ -26,6 +25,7 @@ from report.results.labels import in_order
 from report.results.reader import Results
 from report.results.rows import CELL
 
+from .banner import banner
 from .maps import scene_maps
 from .packed import Data, column
 
@@ -94,20 +94,13 @@ def _look(style: dict[str, Any]) -> dict[str, str]:
 
 def _banner(results: Results) -> Data:
     rows = results.rows
-    times = sorted(time for time in rows["recorded_at"] if time)
     versions = rows[rows["solver_version"] != ""].groupby("solver")["solver_version"].unique()
-    return {
-        "machines": [name or "not recorded" for name in rows["machine"].unique()],
-        "commits": commits_text(rows) if len(rows) else "",
-        "measured": f"{_minute(times[0])} to {_minute(times[-1])} UTC" if times else "not recorded",
-        "versions": [f"{solver} {listed(sorted(found))}" for solver, found in versions.items()],
-        "counts": f"{len(rows)} rows",
-        "warnings": warnings(results),
-    }
-
-
-def _minute(time: str) -> str:
-    return time[:16].replace("T", " ")
+    return banner(
+        rows,
+        counts=f"{len(rows)} rows",
+        versions=[f"{solver} {listed(sorted(found))}" for solver, found in versions.items()],
+        warnings=warnings(results),
+    )
 
 
 def _scenes(results: Results) -> list[Data]:

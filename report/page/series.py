@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
+from report.analysis.code import code_warnings
 from report.results.series import Array, Series
 
-from .answer import banner
+from .banner import banner
 from .maps import series_maps
 from .packed import Data
 
@@ -21,10 +22,15 @@ def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.Da
     """
     facts = series.facts
     versions = facts.get("versions") or {}
+    identity = facts["identity"]
+    known = {"machine": str(facts["machine"]), "recorded_at": "", "solver": identity["solver"]}
+    rows = series.code.assign(**known, solver_code=identity.get("solver_code") or "")
+    rows["clean"] = rows["clean"].astype(float)
     return {
         "kind": "series",
         "banner": banner(
-            [str(facts["machine"])],
+            rows,
+            warnings=code_warnings(rows),
             counts=f"{len(series.cases)} of {facts['cases']} load cases answered",
             versions=[f"{name} {version}" for name, version in versions.items()],
         ),

@@ -11,7 +11,7 @@ function solverView(main) {
   const counts = Object.entries(VERDICTS).map(([name, [text]]) => [cells.filter(cell => verdict(cell, limit) === name).length, text]).filter(([count]) => count);
   const versions = [...new Set(cells.map(cell => [cell.solver_version && `version ${cell.solver_version}`, cell.solver_code && `code ${cell.solver_code}`].filter(Boolean).join(", ")))];
   main.append(el("p", {}, `${cells.length} measurements at the limit ${tidy(limit)} mm: ${counts.map(([count, text]) => `${count} ${text}`).join(", ")}. ${versions.filter(Boolean).join("; ")}`),
-    el("p", {class: "note"}, "A row can be opened by a click or Enter."));
+    breaks(cells, limit), el("p", {class: "note"}, "A row can be opened by a click or Enter."));
   const columns = [
     ["scene", cell => cell.scene], ["tolerance", cell => tidy(cell.tolerance), 1], ["threads", cell => number(cell.threads), 1],
     ["verdict", cell => VERDICTS[verdict(cell, limit)][0]], ["reported", cell => words(cell.status)],
@@ -29,4 +29,15 @@ function solverView(main) {
     })))));
   moves(table);
   main.append(el("div", {class: "scroll"}, table));
+}
+
+// On ladders: the first rung of each without a correct answer.
+function breaks(cells, limit) {
+  const rungs = DATA.scenes.filter(scene => scene.ladder && cells.some(cell => cell.scene === scene.scene));
+  if (!rungs.length) return "";
+  const missed = scene => !cells.some(cell => cell.scene === scene.scene && verdict(cell, limit) === "within");
+  const first = d3.nest().key(scene => scene.ladder).entries(rungs).map(({key, values}) => [key, values.find(missed)]);
+  const at = first.filter(([, scene]) => scene).map(([, scene]) => scene.scene.split("/").slice(1).join("/"));
+  const never = first.filter(([, scene]) => !scene).map(([name]) => name);
+  return el("p", {id: "breaks"}, el("b", {}, at.length ? `Breaks at ${at.join(", ")}. ` : ""), never.length ? `Correct on every rung of ${never.join(", ")}.` : "");
 }

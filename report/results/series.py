@@ -25,7 +25,9 @@ FIGURES = ("max_gap_mm", "mean_gap_mm", "bound_mm", "displacement_error_mm", "se
 
 @dataclass(frozen=True)
 class Series:
-    """A series. cases : those with an answer, in order; gaps : (cases, m), mm, on disk."""
+    """A series. cases : those with an answer, in order; gaps : (cases, m), mm, on disk; code : the `commit`
+    of each case, and whether it was `clean`.
+    """
 
     facts: dict[str, Any]
     counts: dict[str, int]
@@ -34,6 +36,7 @@ class Series:
     nodes: Array | None
     fasteners: Array
     swept: list[str]
+    code: pd.DataFrame
 
 
 def read(directory: Path) -> Series:
@@ -43,11 +46,13 @@ def read(directory: Path) -> Series:
     rows: dict[int, tuple[Any, ...] | None] = {}
     verdicts: dict[int, str] = {}
     swept: list[str] = []
+    code: dict[int, tuple[str, bool | None]] = {}
     for row in _rows(directory / "cases.jsonl"):  # of equal cases the last
         case = row["case"]
         if case >= count:
             continue
         verdicts[case], rows[case] = row["verdict"], None
+        code[case] = row.get("commit") or "", row.get("clean")
         if row.get("max_gap_mm") is not None:
             swept = swept or [key for key in row if "." in key]
             rows[case] = (case, *(row.get(name) for name in FIGURES), *(row[key] for key in swept))
@@ -62,7 +67,8 @@ def read(directory: Path) -> Series:
     path = directory / "gaps.f4"
     stored = path.stat().st_size // (4 * m) if path.exists() else 0
     gaps = np.memmap(path, np.float32, "r", shape=(stored, m)) if stored else np.zeros((0, m), np.float32)
-    return Series(facts, quoted(Counter(verdicts.values())), cases, gaps, nodes, fasteners, swept)
+    made = pd.DataFrame(quoted(list(map(list, code.values()))), columns=["commit", "clean"])
+    return Series(facts, quoted(Counter(verdicts.values())), cases, gaps, nodes, fasteners, swept, made)
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:

@@ -23,12 +23,15 @@ from .pages import rendered
 
 @dataclass(frozen=True)
 class Comparison:
-    """One run against an older one. untimed : a sentence that says why times are not compared, or ""."""
+    """One run against an older one. untimed : a sentence that says why times are not compared, or ""; rows :
+    of both, with their `side`.
+    """
 
     old: str
     new: str
     table: pd.DataFrame
     untimed: str
+    rows: pd.DataFrame
 
     def count(self, *kinds: int) -> int:
         return int(self.table["kind"].isin(kinds).sum())
@@ -113,7 +116,9 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
     title = f"Compared with {comparisons[0].old}"
     path.write_text(rendered("sections.md.j2", title=title, sections=sections, csv=False), "utf-8")
     pairs = [(each.old, each.new, each.summary, each.table) for each in comparisons]
-    write_page(out / "index.html", title, comparison_data(pairs))
+    write_page(
+        out / "index.html", title, comparison_data(pairs, pd.concat([each.rows for each in comparisons]))
+    )
     return path
 
 
