@@ -41,6 +41,7 @@ def test_the_sections_stand_in_their_order() -> None:
     assert names == [
         *("ladders", "rungs"),
         *(
+            "outside",
             "summary",
             "recommendation",
             "roads",

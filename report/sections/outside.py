@@ -13,7 +13,7 @@ from report.document.blocks import Block, Column, Place, Section, Table, Text, n
 from report.document.numbers import MISSING, counted, power, significant, whole
 from report.results.reader import Results
 
-PLACE = Place(20)
+PLACE = Place(100)
 
 PREFIX = "outside/"
 DIGITS = 9  # of an objective as shown
