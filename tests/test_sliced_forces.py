@@ -70,3 +70,21 @@ def test_columns_are_the_residuals_of_each() -> None:
         assert (abs(r.value[:, column] - of_one.value) <= r.error[:, column] + of_one.error).all()
         np.testing.assert_array_equal(s.value[:, column], gaps(made, g[:, column], x_k).value)
         np.testing.assert_array_equal(s.error[:, column], gaps(made, g[:, column], x_k).error)
+
+
+def test_the_rounding_of_the_smallest_products_counts() -> None:
+    """Rows so long, and forces so well balanced, that nothing else is left of the error."""
+    random, n = np.random.default_rng(3), 500
+    B = random.random((n, n))
+    K = sp.csc_array((B + B.T) / 2 + n * np.eye(n))
+    made = Assembly((K,), sp.csc_array((n, 1)))
+    x, D, nothing = random.random((n, 1)), balanced_units(made)[:, None], np.zeros((1, 1))
+    f = K @ x
+    for _ in range(3):
+        found = SlicedForces(made, D)(f, DoubleDouble(x, 0 * x), DoubleDouble(nothing, nothing))
+        balanced, f = f, f - found.value
+    whole, exactly = K.toarray(), [Fraction(float(value)) for value in x[:, 0]]
+    for row in range(0, n, 20):
+        products = (Fraction(float(a)) * v for a, v in zip(whole[row], exactly, strict=True))
+        off = Fraction(float(balanced[row, 0])) - sum(products) - Fraction(float(found.value[row, 0]))
+        assert abs(off) <= Fraction(float(found.error[row, 0]))
