@@ -78,6 +78,15 @@ def test_displacements_without_forces() -> None:
     assert found.backward_error is None
 
 
+@pytest.mark.filterwarnings("ignore:overflow|invalid value:RuntimeWarning")
+@pytest.mark.parametrize("x", [[1.7e308, 0.0], [1.7e308, 1.7e308]])
+def test_what_overflows_is_infinite_and_outside(x: list[float]) -> None:
+    found = judged(np.array(x), LAM)
+    assert found.verdict == "outside"
+    shown = (found.dual_residual, found.duality_gap, found.backward_error, found.objective)
+    assert not any(np.isnan(np.array(shown, dtype=float)))
+
+
 def test_lengths_in_other_units_are_judged_in_millimetres() -> None:
     """The first unknown in units of 2 mm, the gap in units of 1/4 mm."""
     springs = (np.array([[8.0]]), np.array([[2.0]]))

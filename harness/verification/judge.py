@@ -79,9 +79,9 @@ def judge(
     Kx = prepared.assembly.multiply_K(x)
     if lam.shape == (A.shape[1],) and np.isfinite(lam).all():
         force = Kx - load.f + A @ lam
-        dual_residual = float(max(np.max(np.abs(force)), np.max(-lam, initial=0.0)))
-        backward_error = _backward_error(prepared, load, x, lam, force, y)
-        duality_gap = float(abs(x @ Kx - load.f @ x + load.g @ lam))
+        dual_residual = _or_overflow(float(max(np.max(np.abs(force)), np.max(-lam, initial=0.0))))
+        backward_error = _or_overflow(_backward_error(prepared, load, x, lam, force, y))
+        duality_gap = _or_overflow(float(abs(x @ Kx - load.f @ x + load.g @ lam)))
     if not reference.bound_mm <= REFERENCE_SHARE * limit_mm:
         verdict: Verdict = "cannot_be_judged"
     else:
@@ -96,8 +96,13 @@ def judge(
         dual_residual=dual_residual,
         duality_gap=duality_gap,
         backward_error=backward_error,
-        objective=float(x @ Kx / 2 - load.f @ x),
+        objective=_or_overflow(float(x @ Kx / 2 - load.f @ x)),
     )
+
+
+def _or_overflow(value: float) -> float:
+    """∞ for a NaN, which in sums of finite numbers is an overflow."""
+    return float("inf") if np.isnan(value) else value
 
 
 def _backward_error(
