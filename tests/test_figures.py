@@ -66,7 +66,9 @@ def drawn_ladders(folder: Path, **answer: object) -> Figure:
     return ladder_map(cells, list(cells["label"]), {"conditioning": ["1e+10"]})
 
 
-@pytest.mark.parametrize(("error", "shown"), [(3e-6, "1"), (9e-5, "2"), (2.1e-3, "4"), (math.inf, "∞")])
+@pytest.mark.parametrize(
+    ("error", "shown"), [(3e-6, "1"), (9e-5, "2"), (2.1e-3, "4"), (1e200, "∞"), (math.inf, "∞")]
+)
 def test_a_wrong_answer_on_a_rung_says_by_how_much(tmp_path: Path, error: float, shown: str) -> None:
     drawing = drawn_ladders(tmp_path, displacement_error_mm=error, limit_mm=1e-6, limit_asked_mm=1e-7)
     (axes,) = drawing.axes

@@ -1,7 +1,7 @@
 """Every solver on every rung of every ladder, as one picture.
 
-A wrong answer says by how much: k if its error is up to 10ᵏ times the limit. A rung whose limit is wider
-than the one asked for has it below its name.
+A wrong answer says by how much: k if its error is up to 10ᵏ times the limit, ∞ beyond 10⁹⁹. A rung
+whose limit is wider than the one asked for has it below its name.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ LOOKS: dict[str, tuple[str, str, str]] = {
     WRONG_CLAIMED: (style.VERMILLION, "", ""),
 }
 WRONG = (WRONG_UNCLAIMED, WRONG_CLAIMED)
+LARGEST = 1e99  # times the limit: the cell has room for two digits
 
 #: What the rungs of a ladder count, and its unit.
 COUNTED = {
@@ -49,7 +50,7 @@ COUNTED = {
     "conditioning": "cond(K)",
     "contact_scale": "2^±k in g",
     "degeneracy": "weak, %",
-    "denormal": "in units of",
+    "denormal": "K, g or f times",
     "duplicates": "apart",
     "pivoting": "family, m",
     "refinement": "nodes along",
@@ -84,7 +85,7 @@ def _text(cell: Mapping[str, Any]) -> str:
     if cell["outcome"] not in WRONG:
         return LOOKS[cell["outcome"]][2]
     share = cell["displacement_error_mm"] / cell["limit_mm"]
-    return f"{math.ceil(math.log10(share))}" if 1 <= share < math.inf else "∞"
+    return f"{math.ceil(math.log10(share))}" if 1 <= share < LARGEST else "∞"
 
 
 def _panels(ladders: dict[str, list[str]]) -> list[list[str]]:

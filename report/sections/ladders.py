@@ -42,7 +42,7 @@ def section(results: Results) -> Section | None:
             "*Every solver on every rung; each ladder grows harder to the right.* Dark: correct and reported "
             "as solved; pale: correct, but not reported as solved; hatched: wrong, and not reported as "
             "solved; red: wrong, but reported as solved; –: no answer; empty: not run. A k in a wrong "
-            "answer: its error is up to 10ᵏ times the limit. A rung whose limit is wider than "
+            "answer: its error is up to 10ᵏ times the limit, ∞ beyond 10⁹⁹. A rung whose limit is wider than "
             f"{results.limit} has it below the figure.",
             ladder_map(cells, order, ladders),
         ),
