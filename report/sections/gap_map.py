@@ -17,6 +17,7 @@ from report.results.reader import Results
 
 PLACE = Place(410)
 
+TALLEST = 4.5  # inches
 BAR: dict[str, Any] = {"aspect": 6, "pad": 0.015, "fraction": 0.05}
 RING: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "none", "markeredgecolor": style.VERMILLION}
 
@@ -38,15 +39,18 @@ def _figure(scene: str, n: int, arrays: dict[str, Array]) -> Figure:
     closed = lam > 0
     width, height = np.ptp(nodes, axis=0)
     strip = 7.6 * height / width  # inches
-    drawing = style.figure(3 * (max(strip, 0.5) + 0.42) + 0.8)
-    panels: list[Axes] = list(drawing.subplots(3, 1, sharex=True, sharey=True))
+    upright = height > width  # side by side, else below each other
+    drawing = style.figure(TALLEST if upright else 3 * (max(strip, 0.5) + 0.42) + 0.8)
+    places = drawing.subplots(*((1, 3) if upright else (3, 1)), sharex=True, sharey=True)
+    panels: list[Axes] = list(places)
 
     gaps = (("gap before", before), ("gap after", after))
     for axes, (title, values) in zip(panels, gaps, strict=False):
         norm = Normalize(min(0.0, float(values.min())), max(float(values.max()), 0.0) or 1.0)
         drawn = draw(axes, nodes, values, norm, "viridis")
         drawing.colorbar(drawn, ax=axes, label="gap, mm", **BAR)
-        axes.plot(*fasteners.T, "o", label="fasteners", **RING)
+        if len(fasteners):
+            axes.plot(*fasteners.T, "o", label="fasteners", **RING)
         axes.set_title(title)
     force = PowerNorm(0.5, 0.0, float(lam.max()) or 1.0)
     drawn = draw(panels[2], nodes, np.where(closed, lam, np.nan), force, "magma_r")
