@@ -103,7 +103,7 @@ def own(root: Path, form: str, suffix: str) -> Target:
         (folder / "scene.toml").write_text(f"[matrices]\n{text}")
         files.append("scene.toml")
         commands += [("validate", "@scene.toml"), ("solve", "@scene.toml", "--out", "@out")]
-    return Target(form, 0.08, folder, tuple(files), tuple(commands), checked=archive_is_whole)
+    return Target(form, 0.06, folder, tuple(files), tuple(commands), checked=archive_is_whole)
 
 
 def archive_is_whole(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
