@@ -30,14 +30,14 @@ from solvers.kkt import kkt_status, rounding_of
 from solvers.linear_algebra.product import products
 
 from .banded_sets import BandedSets
-from .block_pivoting import ROUNDING_FACTOR, block_pivoting, wrong_signs
+from .block_pivoting import block_pivoting, wrong_signs
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
 MAX_SWEEPS = 20  # enough even if a sweep only halves the error
 SETS_PER_SWEEP = 3  # contact sets per sweep: where a product with Q is cheap, more do not pay off
 RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further sweep
-STALLED = 2  # sweeps that do not halve |y_C|: what is left may be rounding
+STALLED = 2  # sweeps that do not halve |y_C|: what is left is rounding
 STEP_RANGE = 0.5, 2.0  # beyond it, a step is rounding
 MIN_CLOSED = 1 / 16  # of the contacts: with fewer closed, solving case by case is faster
 
@@ -124,12 +124,14 @@ class BatchedSweeps:
 
     def enough(self, case: Case, tolerance: float) -> float:
         """The KKT residual, mm, that ends the sweeps of a case: −1 as long as |y_C| is neither far below the
-        tolerance nor within rounding, of which long sums leave several times as much.
+        tolerance nor within rounding nor, where it no longer shrinks, within the tolerance.
+
+        M multiplies the rounding of y in stiff modes, and its error carries that into soft ones, up to
+        √cond(Q) times as large: |y_C| can stall far above the rounding of y itself.
         """
-        rounding = rounding_of(case.p, case.trial.y)
-        target = max(RESIDUAL_TARGET * tolerance, rounding)
+        target = max(RESIDUAL_TARGET * tolerance, rounding_of(case.p, case.trial.y))
         if case.stalled >= STALLED:
-            target = max(target, min(tolerance, ROUNDING_FACTOR * rounding))
+            target = max(target, tolerance)
         return target if case.trial.rounding <= target else -1.0
 
     def pay(self, cases: Sequence[Case]) -> bool:
