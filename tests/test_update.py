@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from small import make_load, make_prepared, solve_by_nnls
-from solving import OF_THE_OBJECTIVE
+from solving import MINIMISERS
 
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
@@ -22,6 +22,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
 CASES = [(name, options, form) for name, options in VARIANTS for form in make_solver(name, options).forms]
 TOLERANCE = 1e-9
 BALANCED_TOLERANCE = 1e-10  # where loads and gaps are a hundredth in size
+ALLOWED_MM = {"trust-constr": 1e-7}  # it leaves forces λᵢ = tolerance/yᵢ at the open contacts; 1e-8 of others
 
 
 def near_of(prepared: Prepared, case: LoadCase, form: Form) -> WarmStart:
@@ -54,10 +55,10 @@ def test_a_series_agrees_with_nnls(name: str, options: dict[str, Any], form: For
         got = solver.solve(ready, load, tolerance)
         x, lam = solve_by_nnls(prepared, case)
         assert got.lam is not None
-        assert got.status == "solved" or name in OF_THE_OBJECTIVE
+        assert got.status == "solved" or name in MINIMISERS
         found = got.x if form != "dual" else prepared.recover(got.lam, case)
         assert found is not None
-        np.testing.assert_allclose(found, x, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(found, x, rtol=0, atol=ALLOWED_MM.get(name, 1e-8))
         np.testing.assert_allclose(got.lam, lam, rtol=0, atol=1e-3)
         nears.append(near_of(prepared, case, form))
 
