@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 import harness.verification.judge as referee
 from harness.conformance.check import run as check_solver
 from harness.planning.road import chosen_form
-from harness.scene.answer import answer_of, form_of
+from harness.scene.answer import answer_of, form_of, guess_of
 from harness.series.session import Job, Result, SeriesSession
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference import reference_of
@@ -137,13 +137,9 @@ def solve(
     asked = form_of(named[0], forms, form) if form and named else form
     taken = chosen_form(scene, forms, asked, in_house=not own).form
     data, load = prepared(scene, form=taken), load_case(scene, taken)
-    has_contact = bool((data.dual_load(load) > 0).any())
-    guess = None
-    if has_contact and taken == "sparse":
-        guess = answer_of("newton", make_solver("newton", {}), data, "sparse", load, tolerance).lam
-    known = reference_of(scene, data, load, guess=guess)
+    known = reference_of(scene, data, load, guess=guess_of(data, load))
     answer = Answer("solved", known.lam, known.x)
-    if named is not None and has_contact:
+    if named is not None and (data.dual_load(load) > 0).any():
         name, chosen = named
         answer = answer_of(name, chosen, data, taken, load, tolerance)
     x = np.asarray(answer.x, dtype=float)
@@ -156,14 +152,25 @@ def solve(
     return Solution(x, lam, gap, answer.status, answer.iterations, judgement, bound)
 
 
-def judge(scene: Source, x: ArrayLike, lam: ArrayLike | None = None, limit_mm: float = LIMIT_MM) -> Judgement:
-    """Judge x (n,) in mm, and λ (m,) in N if there is one, against the certified reference of the scene."""
+def judge(
+    scene: Source,
+    x: ArrayLike,
+    lam: ArrayLike | None = None,
+    limit_mm: float = LIMIT_MM,
+    form: Form = "primal",
+) -> Judgement:
+    """Judge x (n,) in mm, and λ (m,) in N if there is one, against the certified reference of the scene.
+
+    In the sparse form x are all unknowns of the model, and nothing dense is made.
+    """
     scene = load_scene(scene)
-    data, load = prepared(scene), load_case(scene)
+    form = chosen_form(scene, FORMS, form).form
+    data, load = prepared(scene, form=form), load_case(scene, form)
     n, m = data.assembly.n, data.assembly.m
     x = _vector("judge", "x", x, n)
     forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)
-    return referee.judge(data, load, reference_of(scene, data, load), x, forces, limit_mm)
+    known = reference_of(scene, data, load, guess=guess_of(data, load))
+    return referee.judge(data, load, known, x, forces, limit_mm)
 
 
 def solve_dual(
@@ -210,19 +217,20 @@ def solve_series(
 
     cases : made by `random_gaps` or another file of problems/load_cases; or each a LoadCase(f, g), best with
         the same array f if the forces are the same.
+    form : in "sparse", f and the generated cases have all unknowns of the model, and nothing dense is made.
     check : every so many cases are compared with the certified reference; 0: none.
     Yields for each case, in order, its `row` (status, iterations, seconds, residuals, the proven bound_mm,
     verdict) and the remaining `gap`, (m,) mm in float32; None without an answer.
     """
     scene = load_scene(scene)
-    assembly = prepared(scene).assembly
+    name, chosen = _solver(solver, options)
+    taken = form_of(name, chosen.forms, form)
+    assembly = prepared(scene, form=taken).assembly
     if not isinstance(cases, LoadCases):
         given = list(cases)
         f = {id(case.f): _vector(f"case {k}", "f", case.f, assembly.n) for k, case in enumerate(given)}
         g = [_vector(f"case {k}", "g", case.g, assembly.m) for k, case in enumerate(given)]
         cases = Listed(tuple(LoadCase(f[id(case.f)], mine) for case, mine in zip(given, g, strict=True)))
-    name, chosen = _solver(solver, options)
-    taken = form_of(name, chosen.forms, form)
     job = Job(
         scene, cases, name, taken, tolerance, limit_mm, check, threads=None, options=dict(options or {})
     )

@@ -27,7 +27,9 @@ from harness import (
     solve_dual,
     solve_series,
 )
+from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
+from problems.condensation import build as condensation
 from problems.effects.fasteners import Fasteners
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.prepared import Prepared
@@ -211,6 +213,20 @@ def test_a_series_of_random_gaps_by_an_object() -> None:
     first = cases.load(0)
     assert prepared(scene).assembly.m == len(first.g)
     np.testing.assert_array_equal(first.f, load_case(scene).f)
+
+
+def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load_scene(tomllib.loads(STRIP))
+    gaps = [found.gap for found in solve_series(scene, random_gaps(scene, 2, seed=5))]
+    load = load_case(scene, "sparse")
+    x = reference_of(scene, prepared(scene, form="sparse"), load).x
+    monkeypatch.setattr(condensation, "prepared", lambda *given: pytest.fail("condensed"))
+    cases = random_gaps(scene, 2, seed=5, form="sparse")
+    found = list(solve_series(scene, cases, form="sparse"))
+    assert [result.row["verdict"] for result in found] == ["within"] * 2
+    np.testing.assert_allclose([result.gap for result in found], gaps, atol=1e-7)
+    assert judge(scene, x, form="sparse").verdict == "within"
+    assert judge(scene, x + 1e-6, form="sparse").verdict == "outside"
 
 
 def test_the_callers_loads_stay_writable() -> None:

@@ -94,11 +94,12 @@ def series(
     with error_reporting() as console:
         from harness.measurement.describe import described
         from harness.planning.road import chosen_form
+        from harness.results.records import CASES
         from harness.scene.allowed_gap import refuse_unusable
         from harness.series.allowed_gap import check as check_allowed_gap
         from harness.series.run import run
         from harness.series.session import Job
-        from harness.series.store import CASES, SERIES, read_series
+        from harness.series.store import SERIES, read_series
         from harness.terminal.exit_codes import DONE
         from harness.terminal.waiting import waiting
         from problems.errors import Fault, InputError

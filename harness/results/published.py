@@ -28,10 +28,10 @@ FIRST = ("default", "speed", "series", "gaps", "methods", "uncondensed", "scalin
 LAST = ("paper", "accuracy")
 #: For a user's own runs and for the CI.
 NOT_PUBLISHED = ("gate", "scenes")
-CASES, GAPS = "cases.jsonl", "gaps.f4"
 DIGITS = 12  # of a commit, in the name of a folder
-#: The answers of a suite are kept, for the gate to judge anew, if they take at most this together.
-KEPT_MIB = 3
+#: The answers of a suite are kept, for the gate to judge anew, if they take at most this together; of the
+#: scenes' arrays, for their pictures, each that takes at most as many kB.
+KEPT_MIB, KEPT_SCENE_KB = 3, 500
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
 
@@ -77,7 +77,7 @@ def command(name: str, directory: Path) -> list[str]:
 
 def rows_of(directory: Path) -> list[records.Row]:
     """The rows of a suite or a series; none if there is no such directory."""
-    return records.read(directory / CASES) or records.read(directory / records.MEASUREMENTS)
+    return records.read(directory / records.CASES) or records.read(directory / records.MEASUREMENTS)
 
 
 def is_of(rows: Sequence[Mapping[str, Any]], digits: str) -> bool:
@@ -110,9 +110,10 @@ def publish(name: str, directory: Path, published: Path) -> None:
 
 
 def _unwanted(directory: Path) -> Iterator[Path]:
-    """What is not published: locks, gaps of a series, answers that are large."""
+    """What is not published: locks, gaps of a series, answers and scenes that are large."""
     yield from directory.glob("**/*.lock")
-    yield from directory.glob(GAPS)
+    yield from directory.glob(records.GAPS)
+    yield from (path for path in directory.glob("scenes/*.npz") if path.stat().st_size > KEPT_SCENE_KB * 1000)
     answers = directory / "answers"
     if sum(path.stat().st_size for path in answers.glob("*")) > KEPT_MIB * 2**20:
         yield answers

@@ -39,7 +39,7 @@ from problems.scene import read_scene
 from solvers.base import Solver
 
 from . import allowed_gap
-from .answer import answer_of
+from .answer import answer_of, guess_of
 from .fastener_forces import fastener_forces
 from .few_digits import digits_sentence
 from .layout import layout
@@ -49,7 +49,6 @@ from .outcome import save, show
 ACTIVE_SET = "active set (block principal pivoting), refined"
 SPARSE_ACTIVE_SET = "active set (newton on the sparse form), refined"
 LINEAR = "linear solve with the Cholesky factors of K"
-TOLERANCE = 1e-11  # of newton, mm
 
 
 class Steps:
@@ -125,7 +124,7 @@ def solve(
     guess = None
     if has_contact and road.form == "sparse":
         with steps.step("contact set"):
-            guess = answer_of("newton", _solver("newton"), data, "sparse", load, TOLERANCE).lam
+            guess = guess_of(data, load)
     with steps.step("answer with a proven bound"):
         known = reference_of(scene, data, load, reference_limit_s, guess)
     if solver and chosen and has_contact:

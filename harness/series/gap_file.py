@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from harness.results import records
+from harness.results.records import GAPS
 from problems.input.bounded import regular_file
 
 from .session import Gaps
 
-GAPS = "gaps.f4"
 CRC = "gaps_crc32"  # of a row
 BYTES = np.dtype(np.float32).itemsize
 

@@ -66,9 +66,7 @@ def solve_isolated(job: Job, numbers: Sequence[int]) -> Generator[list[Result], 
 
     Raises InputError if the plug-in cannot be imported or made.
     """
-    assessor(
-        prepared(job.scene, form=job.form), job.limit_mm
-    )  # what the cache lacks is built here, without a limit
+    assessor(prepared(job.scene, form=job.form), job.limit_mm)  # builds what is not cached: without a limit
     with Isolated(job, numbers) as child:
         while not child.over():
             child.listen(POLL_S)

@@ -22,16 +22,17 @@ from numpy.typing import NDArray
 
 from harness.results import records
 from harness.results.checksums import DAMAGED, Damaged, arrays_in, parsed
+from harness.results.records import CASES, GAPS
 from harness.results.schema import VERDICTS
 from problems.errors import Fault, InputError
 from problems.input.bounded import LARGEST, regular_file
 from problems.load_cases.base import LoadCases
 from problems.storage.cache import digest
 
-from .gap_file import CRC, GAPS, GapFile, checksum, write_gaps
+from .gap_file import CRC, GapFile, checksum, write_gaps
 from .session import Result
 
-CASES, CONTACTS, SERIES = "cases.jsonl", "contacts.npz", "series.json"
+CONTACTS, SERIES = "contacts.npz", "series.json"
 UNITS = ("_mm", "_s")  # of the fields that are numbers
 AGAIN = "run the same `series` command again"
 DELETE = f"delete it, and {AGAIN}"

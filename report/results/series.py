@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from harness.results.records import CASES, GAPS
 from report.document.escape import quoted
 
 Array = NDArray[np.float64]
@@ -47,7 +48,7 @@ def read(directory: Path) -> Series:
     verdicts: dict[int, str] = {}
     swept: list[str] = []
     code: dict[int, tuple[str, bool | None]] = {}
-    for row in _rows(directory / "cases.jsonl"):  # of equal cases the last
+    for row in _rows(directory / CASES):  # of equal cases the last
         case = row["case"]
         if case >= count:
             continue
@@ -64,7 +65,7 @@ def read(directory: Path) -> Series:
         m = int(arrays["m"])
         nodes = arrays.get("contact_nodes")
         fasteners = arrays.get("fasteners", np.zeros((0, 2)))
-    path = directory / "gaps.f4"
+    path = directory / GAPS
     stored = path.stat().st_size // (4 * m) if path.exists() else 0
     gaps = np.memmap(path, np.float32, "r", shape=(stored, m)) if stored else np.zeros((0, m), np.float32)
     made = pd.DataFrame(quoted(list(map(list, code.values()))), columns=["commit", "clean"])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from harness.results.published import rows_of
 from report.analysis.outcomes import WRONG_CLAIMED, with_outcomes
 from report.analysis.precision import ACCURACIES, swept
 from report.analysis.relative import load_cases
@@ -137,8 +138,7 @@ def accuracy_cost(accuracy: Results) -> pd.DataFrame:
 
 def gaps(directory: Path) -> Mapping[str, Any]:
     """Of a series: `cases`, `within`, `rate` (cases per second of set-up, solve, x and bound), `bound_mm`."""
-    with (directory / "cases.jsonl").open("rb") as file:
-        rows: Sequence[Mapping[str, Any]] = [json.loads(line) for line in file]
+    rows = rows_of(directory)
     spent = sum(row.get(step) or 0.0 for row in rows for step in ("setup_s", "solve_s", "form_s"))
     return {
         "cases": len(rows),
