@@ -1,12 +1,19 @@
-"""What is installed: every file of the packages that is not code."""
+"""What is installed: every file of the packages that is not code, and versions within the bounds."""
 
 from __future__ import annotations
 
+import re
 import subprocess
+import tomllib
 from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 ROOT = Path(__file__).parents[1]
 SUFFIXES = {".toml", ".j2", ".js", ".css", ".csv"}
+LINTERS = {"ruff", "mypy", "import-linter", "pandas-stubs", "types-psutil"}
 
 
 def test_every_file_beside_the_code_is_in_a_package_that_is_installed() -> None:
@@ -19,3 +26,36 @@ def test_every_file_beside_the_code_is_in_a_package_that_is_installed() -> None:
         ["git", "check-ignore", "--stdin"], cwd=ROOT, input=names, capture_output=True, text=True
     )
     assert ignored.stdout == ""
+
+
+def lower_bounds(*without: str) -> dict[str, Version]:
+    """Of the requirements and of the extras but those named."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = project["optional-dependencies"].items()
+    stated = [
+        *project["dependencies"],
+        *(line for name, lines in extras if name not in without for line in lines),
+    ]
+    found = {}
+    for requirement in map(Requirement, stated):
+        if requirement.name != "rivetbench":
+            (bound,) = requirement.specifier
+            assert bound.operator == ">="
+            found[canonicalize_name(requirement.name)] = Version(bound.version)
+    return found
+
+
+def pinned(file: str) -> dict[str, Version]:
+    lines = re.findall(r"^([\w.-]+)==(\S+)$", (ROOT / file).read_text("utf-8"), re.MULTILINE)
+    return {canonicalize_name(name): Version(version) for name, version in lines}
+
+
+def test_the_oldest_versions_are_the_lower_bounds() -> None:
+    bounds = lower_bounds("more-solvers")
+    assert pinned("constraints-oldest.txt") == {name: bounds[name] for name in bounds.keys() - LINTERS}
+
+
+def test_the_versions_measured_with_are_within_the_bounds() -> None:
+    versions = pinned("constraints.txt")
+    for name, bound in lower_bounds("more-solvers").items():
+        assert versions[name] >= bound, name
