@@ -162,6 +162,14 @@ def test_every_command_is_in_the_readme() -> None:
         assert re.search(rf"`(?:python -m harness )?{name}\b", text), name
 
 
+def test_the_main_suite_takes_as_long_on_every_page() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    table = re.search(r"^\| `default` \|.*\| (\d+) min \|$", text, re.MULTILINE)
+    assert table is not None
+    assert f"run the main suite ({table[1]} minutes on two cores)" in text
+    assert f"the suite `default` ({table[1]} minutes)" in str(get_command(app).help)
+
+
 def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     code = re.search(r"```python\n(.*?)```", text[text.index("## From Python") :], re.DOTALL)
