@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.problem import Problem, stacked
+from problems.forms.problem import Problem
 from problems.forms.sparse_factor import NotPositiveDefinite
 from problems.forms.sparse_prepared import FEW, SparsePrepared
 from solvers.base import Answer, Batch, WarmStart, failed
-from solvers.kkt import EPS
+from solvers.sparse_dual import gaps, with_p, with_x
 
 from .approached_set import approached_set
 from .augmented_sets import AugmentedSets
@@ -73,19 +73,19 @@ class SparseState:
 
     def solve(self, load: LoadCase, tolerance: float) -> Answer:
         """The answer with x."""
-        given = self._with_p([load])[0]
+        given = with_p(self.prepared, [load])[0]
         if self.sweeps is None:
             C = approached_set(self.prepared, given) if self.prepared.assembly.m > FEW else None
-            return self._with_x([self.by_sets(C, given, tolerance)], [load], tolerance)[0]
+            return with_x(self.prepared, [self.by_sets(C, given, tolerance)], [load], tolerance)[0]
         if self.start is None:
             case = self.sweeps.cold(given, tolerance)
         else:
-            (before,) = self._with_p([self.start.load])
+            (before,) = with_p(self.prepared, [self.start.load])
             case = self.sweeps.warm(self.sweeps.case_of(self.start, before), given, tolerance)
-        (answer,) = self._with_x([self.sweeps.answer(case, given, tolerance)], [load], tolerance)
+        (answer,) = with_x(self.prepared, [self.sweeps.answer(case, given, tolerance)], [load], tolerance)
         if answer.status == "solved" or answer.lam is None or not case.settled:
             return answer
-        (other,) = self._with_x([self.by_sets(answer.lam > 0, given, tolerance)], [load], tolerance)
+        (other,) = with_x(self.prepared, [self.by_sets(answer.lam > 0, given, tolerance)], [load], tolerance)
         return min(answer, other, key=lambda each: each.details["kkt_residual_mm"])
 
     def batched(self) -> Batch | None:
@@ -94,48 +94,14 @@ class SparseState:
         sweeps = self.sweeps
 
         def solve(loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
-            return self._with_x(sweeps(self._with_p(loads), tolerance), loads, tolerance)
+            return with_x(self.prepared, sweeps(with_p(self.prepared, loads), tolerance), loads, tolerance)
 
         return solve
-
-    def _with_p(self, loads: Sequence[LoadCase]) -> list[LoadCase]:
-        """With p = AᵀK⁻¹f − g, (m,) mm; K⁻¹f is computed once if they share their f."""
-        columns = self.prepared.dual_load(stacked(loads)).T
-        return [LoadCase(load.f, load.g, p) for load, p in zip(loads, columns, strict=True)]
-
-    def _with_x(self, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
-        """With x = K⁻¹(f − Aλ) refined by δ, and judged by it: "solved" if the KKT residual of y = g − Aᵀx is
-        at most max(tolerance, 4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|)).
-        """
-        known = [k for k, answer in enumerate(answers) if answer.lam is not None]
-        found = list(answers)
-        if not known:
-            return found
-        assembly, cases = self.prepared.assembly, stacked([loads[k] for k in known])
-        lam = np.column_stack([np.asarray(answers[k].lam) for k in known])
-        b = cases.f - assembly.A @ lam
-        x = self.prepared.solve_K(b)
-        delta = self.prepared.solve_K(b - assembly.multiply_K(x))
-        x = x + delta
-        y, size = cases.g - assembly.A.T @ x, abs(assembly.A).T
-        rounding = 4 * (EPS * (abs(cases.g) + size @ abs(x)) + size @ abs(delta)).max(axis=0)
-        missed = np.where(lam > 0, abs(y), -y).max(axis=0, initial=0.0)
-        for column, k in enumerate(known):
-            status, residual = found[k].status, float(missed[column])
-            if status in ("solved", "inaccurate"):
-                status = "solved" if residual <= max(tolerance, rounding[column]) else "inaccurate"
-            details = found[k].details | {"kkt_residual_mm": residual}
-            if status == "solved":
-                details.pop("cause", None)
-            elif "cause" not in details:
-                details["cause"] = f"rounding: optimal only to {residual:.1e} mm"
-            found[k] = replace(found[k], status=status, x=x[:, column], details=details)
-        return found
 
 
 @dataclass(kw_only=True)
 class SparseSweeps(BatchedSweeps):
-    """Sweeps with y = g − AᵀK⁻¹(f − Aλ): Qλ and p alone can be large, and cancel."""
+    """Sweeps with y = g − AᵀK⁻¹(f − Aλ)."""
 
     prepared: SparsePrepared
 
@@ -154,10 +120,3 @@ class SparseSweeps(BatchedSweeps):
     def pay(self, cases: Sequence[Case]) -> bool:
         """Always: the alternative is a factorisation per contact set."""
         return True
-
-
-def gaps(prepared: SparsePrepared, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
-    """y = g − AᵀK⁻¹(f − Aλ), (m, k) mm."""
-    A, cases = prepared.assembly.A, stacked(loads)
-    y: Matrix = cases.g - A.T @ prepared.solve_K(cases.f - A @ lam)
-    return y

@@ -19,11 +19,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.compliance import AnyQ
+from problems.forms.sparse_prepared import SparsePrepared
 from solvers.active_set.bordered_factor import Set
 from solvers.kkt import kkt_residual, rounding_of
 from solvers.linear_algebra.product import product
+from solvers.sparse_dual import gaps
 
 from .metric import Metric
 
@@ -61,7 +63,7 @@ class Proportioning:
             since += 1
             if moved and since < RECOMPUTED:
                 continue
-            self.y, self.before, since = self._times_Q(self.lam) - self.p, None, 0
+            self.y, self.before, since = self._gap(), None, 0
             residual = kkt_residual(self.lam, self.y)
             stalled = 0 if moved or residual < best[0] / 2 else stalled + 1
             best = min(best, (residual, self.lam, self.y), key=lambda each: each[0])
@@ -118,6 +120,22 @@ class Proportioning:
         self.lam, self.y = np.maximum(self.lam + length * d, 0.0), self.y + length * change
         return True
 
+    def _gap(self) -> Vector:
+        """y of λ, computed anew."""
+        return self._times_Q(self.lam) - self.p
+
     def _times_Q(self, v: Vector) -> Vector:
         self.products += 1
         return product(self.Q, v)
+
+
+@dataclass(kw_only=True)
+class SparseProportioning(Proportioning):
+    """A load case of the sparse form. load : with p."""
+
+    prepared: SparsePrepared
+    load: LoadCase
+
+    def _gap(self) -> Vector:
+        self.products += 1
+        return gaps(self.prepared, self.lam[:, None], [self.load])[:, 0]

@@ -19,23 +19,43 @@ from typing import Any, ClassVar
 import numpy as np
 
 from problems.errors import Fault, InputError
-from problems.forms.assembly import Matrix, Vector
-from problems.forms.banded_inverse import banded_inverse
+from problems.forms.assembly import Vector
+from problems.forms.banded_inverse import BandedInverse, banded_inverse
+from problems.forms.compliance import AnyQ
+from problems.forms.sparse_factor import NotPositiveDefinite
+from problems.forms.sparse_prepared import SparsePrepared
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
 from solvers.dense_dual import first_point
 from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
-from solvers.gradient_projection.proportioning import Proportioning
+from solvers.gradient_projection.proportioning import Proportioning, SparseProportioning
 from solvers.kkt import kkt_status
+from solvers.sparse_dual import with_p, with_x
 
 PRECONDITIONERS = ("band", "face", "none")
 
 
 @dataclass(frozen=True)
 class _Ready:
-    Q: Matrix
+    """diagonal : of Q, or about that. metric : makes a load case's own. prepared : of the sparse form."""
+
+    Q: AnyQ
     diagonal: Vector
     metric: Callable[[], Metric]
+    prepared: SparsePrepared | None = None
     start: WarmStart | None = None
+
+    def proportioning(self, load: LoadCase, metric: Metric) -> Proportioning:
+        """load : with p."""
+        if self.prepared is None:
+            point = first_point(self.start, load)
+            return Proportioning(self.Q, load.p, self.diagonal, metric, *point)
+        start = self.start
+        if start is not None:
+            start = replace(start, load=with_p(self.prepared, [start.load])[0])
+        point = first_point(start, load)
+        return SparseProportioning(
+            self.Q, load.p, self.diagonal, metric, *point, prepared=self.prepared, load=load
+        )
 
 
 class Mprgp(Solver):
@@ -53,7 +73,7 @@ class Mprgp(Solver):
     max_products : limit on the products with Q.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+    forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
 
     def __init__(self, *, preconditioner: str = "band", max_products: int = 100_000) -> None:
         faults = []
@@ -68,18 +88,40 @@ class Mprgp(Solver):
         self.preconditioner, self.max_products = preconditioner, max_products
 
     def prepare(self, data: Problem) -> _Ready | Answer:
-        """M and ᾱ, by 30 products, as the option needs them; a failed answer if M finds Q indefinite."""
+        """M and ᾱ, by 30 products, as the option needs them.
+
+        A failed answer if M finds Q indefinite, and in the sparse form if K is, or has no M.
+        """
+        if data.form == "sparse":
+            return self._sparse(data)
         Q, nodes = data.Q, data.assembly.contact_nodes
         diagonal = np.diag(Q).copy()
         if self.preconditioner == "none":
-            return _Ready(Q, diagonal, partial(Diagonal, diagonal, step_length(Q, diagonal)))
+            return _Ready(Q, diagonal, self._metric(Q, diagonal, None))
         try:
             M = banded_inverse(Q, nodes)
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
+        return _Ready(Q, diagonal, self._metric(Q, diagonal, M))
+
+    def _sparse(self, data: Problem) -> _Ready | Answer:
+        prepared = data.prepared
+        assert isinstance(prepared, SparsePrepared)
+        try:
+            near = prepared.approximate_inverse
+        except NotPositiveDefinite as error:
+            return failed(f"K is not positive definite: {error}")
+        if near is None:
+            return failed("no banded M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
+        Q = prepared.compliance
+        return _Ready(Q, near.diagonal, self._metric(Q, near.diagonal, near.M), prepared)
+
+    def _metric(self, Q: AnyQ, diagonal: Vector, M: BandedInverse | None) -> Callable[[], Metric]:
+        if M is None or self.preconditioner == "none":
+            return partial(Diagonal, diagonal, step_length(Q, diagonal))
         if self.preconditioner == "band":
-            return _Ready(Q, diagonal, partial(Band, M, diagonal))
-        return _Ready(Q, diagonal, partial(Face, M, diagonal, step_length(Q, diagonal)))
+            return partial(Band, M, diagonal)
+        return partial(Face, M, diagonal, step_length(Q, diagonal))
 
     def update(
         self, state: _Ready | Answer, ready: object, load: LoadCase, tolerance: float, start: WarmStart
@@ -97,9 +139,10 @@ class Mprgp(Solver):
 
     def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
         metric = ready.metric()
-        case = Proportioning(ready.Q, load.p, ready.diagonal, metric, *first_point(ready.start, load))
+        given = load if ready.prepared is None else with_p(ready.prepared, [load])[0]
+        case = ready.proportioning(given, metric)
         enough = case.solve(tolerance, self.max_products)
-        status, residual = kkt_status(ready.Q, load.p, case.lam, case.y, tolerance)
+        status, residual = kkt_status(ready.Q, given.p, case.lam, case.y, tolerance)
         details: dict[str, Any] = {"products": case.products, "kkt_residual_mm": residual}
         details |= {"steps": case.steps}
         if status == "inaccurate":
@@ -107,4 +150,5 @@ class Mprgp(Solver):
             tried = "rounding" if enough else f"max_products = {self.max_products}"
             details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
         steps = sum(case.steps.values())
-        return Answer(status, case.lam, iterations=steps, inner_iterations=metric.sets, details=details)
+        answer = Answer(status, case.lam, iterations=steps, inner_iterations=metric.sets, details=details)
+        return answer if ready.prepared is None else with_x(ready.prepared, [answer], [load], tolerance)[0]

@@ -1,0 +1,96 @@
+"""`mprgp` on the sparse form, where a product with Q is a solution with K's factors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from small import make_load, make_strips, solve_by_nnls
+
+from harness.measurement.solver_session import SolverSession
+from harness.verification.reference import refined_active_set
+from problems.build import load_case, prepared
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from problems.forms.sparse_prepared import SparsePrepared
+from problems.scene import read_scene
+from solvers.base import Answer, WarmStart
+from solvers.registry import make_solver
+
+LIMIT_MM = 1e-7 / 4
+
+
+def session_of(data: Prepared, **options: Any) -> SolverSession:
+    made = SolverSession(make_solver("mprgp", options), in_form(data, "sparse"), 1e-10)
+    made.open(batched=False)
+    return made
+
+
+def strips() -> tuple[Prepared, SparsePrepared]:
+    """Dense, and the same as sparse blocks."""
+    dense = make_strips(150)
+    blocks = tuple(sp.csc_array(K) for K in dense.assembly.blocks)
+    return dense, SparsePrepared(Assembly(blocks, dense.assembly.A))
+
+
+@pytest.mark.parametrize("kind", ["band", "face", "none"])
+def test_cold_and_warm_are_the_answer_of_nnls(kind: str) -> None:
+    dense, data = strips()
+    first, _ = make_load(3, dense)
+    second = LoadCase(first.f * 1.02, first.g)
+    session = session_of(data, preconditioner=kind)
+    cold = session.next(first, None)
+    check(cold, dense, first)
+    assert cold.x is not None
+    assert cold.lam is not None
+    start = WarmStart(first, cold.lam, first.g - data.assembly.A.T @ cold.x, cold.x)
+    warm = session.next(second, start)
+    check(warm, dense, second)
+    again = session_of(data, preconditioner=kind).next(second, None)
+    assert warm.details["products"] <= again.details["products"]
+
+
+def check(answer: Answer, dense: Prepared, load: LoadCase) -> None:
+    x, lam = solve_by_nnls(dense, load)
+    assert 0 < np.count_nonzero(lam) < len(lam)
+    assert answer.status == "solved"
+    np.testing.assert_allclose(answer.x, x, rtol=0, atol=LIMIT_MM)
+    np.testing.assert_allclose(answer.lam, lam, rtol=0, atol=1e-5 * lam.max())
+
+
+@pytest.mark.parametrize("name", ["4386/1471", "gallery/three-part-stack"])
+def test_a_scene_in_a_few_products(name: str) -> None:
+    scene = read_scene(name)
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    answer = session_of(data).next(load, None)
+    assert answer.status == "solved"
+    known = refined_active_set(data, load, guess=answer.lam)
+    assert known.bound_mm < LIMIT_MM
+    assert abs(np.asarray(answer.x) - known.x).max() < LIMIT_MM
+    assert answer.details["products"] <= 20
+
+
+def test_a_limit_on_the_products_is_said() -> None:
+    dense, data = strips()
+    answer = session_of(data, preconditioner="none", max_products=3).next(make_load(3, dense)[0], None)
+    assert answer.status == "iteration_limit"
+    assert "max_products = 3" in answer.details["cause"]
+
+
+def test_contacts_all_over_an_area_are_refused_with_the_reason() -> None:
+    """For them M would take longer than the factorisations of K that `newton` needs."""
+    scene = read_scene("outside/obstacle/80")
+    session = session_of(prepared(scene, form="sparse"))
+    answer = session.next(load_case(scene, "sparse"), None)
+    assert (answer.status, answer.lam) == ("failed", None)
+    assert "all over an area" in answer.details["cause"]
+
+
+def test_an_indefinite_K_is_refused_with_the_reason() -> None:
+    K = sp.csc_array(sp.diags_array([[1.0] * 9 + [-1.0]], offsets=[0]))
+    data = SparsePrepared(Assembly((K,), sp.eye_array(10, 3, format="csc")))
+    answer = session_of(data).next(LoadCase(np.ones(10), np.zeros(3)), None)
+    assert "K is not positive definite" in answer.details["cause"]
