@@ -64,7 +64,8 @@ class Mprgp(Solver):
     Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with y = Qλ − p
     computed anew, or when such a computation has not halved what is below the tolerance, or five what is
     above. "solved" if it then is at most max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations
-    are steps, inner iterations contact sets tried with M; details count the products with Q per load case.
+    are steps, inner iterations contact sets tried with M; details count the products with Q per load case. In
+    the sparse form the status is that of the refined x (solvers/sparse_dual.py).
 
     Options
     -------
