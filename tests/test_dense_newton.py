@@ -12,8 +12,7 @@ from problems.forms.assembly import LoadCase
 from problems.forms.banded_inverse import banded_inverse
 from problems.forms.dual_alone import DualAlone, load_of
 from problems.forms.problem import Problem, in_form
-from solvers.active_set.batched import STALLED, BatchedSweeps, Case
-from solvers.active_set.contact_sets import TrialSolution
+from solvers.active_set.batched import BatchedSweeps
 from solvers.base import Answer, WarmStart
 from solvers.interior_point.banded import Banded
 from solvers.kkt import rounding_of
@@ -128,20 +127,24 @@ def test_an_indefinite_matrix_fails() -> None:
         assert "not positive definite" in answer.details["cause"]
 
 
-@pytest.mark.parametrize(
-    ("stalled", "times", "ends"), [(0, 5, False), (STALLED, 5, True), (STALLED, 40, False)]
-)
-def test_sweeps_end_at_what_long_sums_leave(stalled: int, times: float, ends: bool) -> None:
-    """p so large that rounding, here 1.8e-10 mm, is not far below the tolerance."""
-    p = np.full(M_CONTACTS, 1e5)
-    y = np.zeros(M_CONTACTS)
-    trial = TrialSolution(y, y, times * rounding_of(p, y))
-    load = LoadCase(p, p, p)
-    M = approximate_inverse(decaying(), None)
+@pytest.mark.parametrize("size", [1.0, 1e5])
+def test_sweeps_settle_on_gaps_computed_from_the_forces(size: float) -> None:
+    """Of a p as large as 1e5 mm, rounding is not far below the tolerance."""
+    Q, rng = decaying(), np.random.default_rng(10)
+    p = size * rng.uniform(-1, 1, M_CONTACTS)
+    tolerance = 20 * rounding_of(p, p)
+    M = approximate_inverse(Q, None)
     assert M is not None
-    sweeps = BatchedSweeps(decaying(), np.ones(M_CONTACTS), M, lambda *given: pytest.fail("not asked for"))
-    case = Case(load, p, p > 0, trial, stalled=stalled)
-    assert (sweeps.enough(case, 5e-9) > 0) == ends
+    sweeps = BatchedSweeps(Q, np.diag(Q), M, lambda *given: pytest.fail("not asked for"))
+    case = sweeps.cold(LoadCase(p, p, p), tolerance)
+    lam = np.empty(M_CONTACTS)
+    lam[M.order] = case.trial.lam
+    y = (Q @ lam - p)[M.order]
+    assert case.settled
+    np.testing.assert_allclose(case.trial.y, y, atol=tolerance / 10)
+    assert abs(y[case.C]).max() <= tolerance
+    assert y[~case.C].min() > 0
+    assert case.trial.lam[case.C].min() > 0
 
 
 def test_the_banded_preconditioner_is_the_inverse_of_its_definition() -> None:

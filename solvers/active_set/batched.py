@@ -7,17 +7,22 @@ replaced by M⁻¹ and y exact at the current λ: y⁺ = y + M⁻¹(λ⁺ − λ
 
     λ⁺ = (λ − My) + My⁺ ≥ 0,   y⁺ ≥ 0,   λ⁺ᵀy⁺ = 0,
 
-by block principal pivoting with band factorisations, whose cost is negligible. Then y = Qλ⁺ − p for all
+by block principal pivoting with band factorisations, whose cost is negligible. Then y + Q(λ⁺ − λ) for all
 cases in one product. Each sweep reduces the error by a factor max|1 − eig(MQ)|, about 0.1 on a joint of
 plates, and by less on a set that no longer changes, where the sweeps are steps of the conjugate gradient
 method with M as preconditioner. A case starts from a solved one and its change in p, since p itself is
 large if a load presses on soft parts.
+
+The rounding of a change shrinks with it. That of Qλ⁺ − p does not: M multiplies it in stiff modes, and M's
+error carries it into soft ones, up to √cond(Q) times as large, so that the sweeps would stall far above it.
+Qλ⁺ − p itself is computed in the last sweep, and decides.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -30,14 +35,13 @@ from solvers.kkt import kkt_status, rounding_of
 from solvers.linear_algebra.product import products
 
 from .banded_sets import BandedSets
-from .block_pivoting import block_pivoting, wrong_signs
+from .block_pivoting import ROUNDING_FACTOR, block_pivoting, wrong_signs
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
 
 MAX_SWEEPS = 20  # enough even if a sweep only halves the error
 SETS_PER_SWEEP = 3  # contact sets per sweep: where a product with Q is cheap, more do not pay off
-RESIDUAL_TARGET = 0.1  # of the tolerance: |y_C| that needs no further sweep
-STALLED = 2  # sweeps that do not halve |y_C|: what is left is rounding
+SIGNS_FROM = 0.1  # of the tolerance: a smaller value has no wrong sign
 STEP_RANGE = 0.5, 2.0  # beyond it, a step is rounding
 MIN_CLOSED = 1 / 16  # of the contacts: with fewer closed, solving case by case is faster
 
@@ -52,8 +56,10 @@ class Case:
 
     load : the case as it was given. p : (m,) mm. C : its contact set. trial : λ (m,) N and y = Qλ − p (m,)
     mm. factor : of M on the open set. unchanged : its set in the last sweep. before : the step of the last
-    sweep and Q times it, if the set was unchanged. settled : no sign is wrong, and |y_C| is far below the
-    tolerance or within rounding. stalled : the last sweeps that did not halve |y_C|.
+    sweep and Q times it, if the set was unchanged. anew : y is computed from λ, not by its change; replaced :
+    and was by changes in the sweep before. known : |y_C| when it last was computed anew; stalled : how often
+    in succession that was not half of the value before. settled : with a y computed anew no sign is wrong,
+    and |y_C| is within the tolerance or rounding.
     """
 
     load: LoadCase
@@ -63,8 +69,11 @@ class Case:
     factor: BandFactor | None = None
     unchanged: bool = False
     before: tuple[Vector, Vector] | None = None
-    settled: bool = False
+    anew: bool = True
+    replaced: bool = False
+    known: float = inf
     stalled: int = 0
+    settled: bool = False
     sweeps: int = 0
     sets: int = 0
 
@@ -73,6 +82,7 @@ class Case:
 class BatchedSweeps:
     """Q (m, m) or its products, its diagonal, M ≈ Q⁻¹.
 
+    near : of the tolerance: from such a |y_C| one more sweep settles a case, and y is computed anew.
     last : the cases of the previous call, which warm-start the next ones.
     solve_one : for unsettled cases; for all cases, once most of a call's were unsettled or few contacts are
         closed, so that the small systems of each case are faster.
@@ -84,6 +94,7 @@ class BatchedSweeps:
     solve_one: SolveOne
     max_sweeps: int = MAX_SWEEPS
     sets_per_sweep: int = SETS_PER_SWEEP
+    near: float = 1.0
     last: list[Case] = field(default_factory=list)
     use_sweeps: bool = True
 
@@ -123,16 +134,11 @@ class BatchedSweeps:
         return products(self.Q, lam) - np.column_stack([load.p for load in loads])
 
     def enough(self, case: Case, tolerance: float) -> float:
-        """The KKT residual, mm, that ends the sweeps of a case: −1 as long as |y_C| is neither far below the
-        tolerance nor within rounding nor, where it no longer shrinks, within the tolerance.
-
-        M multiplies the rounding of y in stiff modes, and its error carries that into soft ones, up to
-        √cond(Q) times as large: |y_C| can stall far above the rounding of y itself.
+        """The KKT residual, mm, of a y computed anew that ends the sweeps of a case: what stalls can be
+        rounding, of which long sums leave several times as much.
         """
-        target = max(RESIDUAL_TARGET * tolerance, rounding_of(case.p, case.trial.y))
-        if case.stalled >= STALLED:
-            target = max(target, tolerance)
-        return target if case.trial.rounding <= target else -1.0
+        rounding = rounding_of(case.p, case.trial.y)
+        return max(tolerance, ROUNDING_FACTOR * rounding if case.stalled else rounding)
 
     def pay(self, cases: Sequence[Case]) -> bool:
         """Whether sweeps settle such cases, and faster than case by case."""
@@ -144,26 +150,40 @@ class BatchedSweeps:
         return ((load, load.p[self.M.order]) for load in loads)
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
-        order, compliance = self.M.order, self.diagonal[self.M.order]
+        compliance = self.diagonal[self.M.order]
         unsettled = cases
         for _ in range(self.max_sweeps):
-            lam = np.empty((len(order), len(unsettled)), order="F")
-            for column, case in enumerate(unsettled):
-                lam[order, column] = self._banded_step(case, compliance, tolerance)
-            y = self.gaps(lam, [case.load for case in unsettled])
-            for column, case in enumerate(unsettled):
-                self._update(case, lam[order, column], y[order, column], compliance, tolerance)
+            found = [self._banded_step(case, compliance, tolerance) for case in unsettled]
+            for case in unsettled:
+                anew = case.trial.rounding <= self.near * tolerance
+                case.anew, case.replaced = anew, anew and not case.anew
+            for case, lam, y in zip(unsettled, found, self._gaps_at(unsettled, found), strict=True):
+                self._update(case, lam, y, compliance, tolerance)
             unsettled = [case for case in unsettled if not case.settled]
             if not unsettled:
                 break
         return cases
 
+    def _gaps_at(self, cases: Sequence[Case], forces: Sequence[Vector]) -> list[Vector]:
+        """y (m,) mm of each case at λ (m,) N, anew or by its change."""
+        order, gaps = self.M.order, [case.trial.y for case in cases]
+        for anew in (True, False):
+            chosen = [k for k, case in enumerate(cases) if case.anew == anew]
+            columns = np.empty((len(order), len(chosen)), order="F")
+            for column, k in enumerate(chosen):
+                columns[order, column] = forces[k] if anew else forces[k] - cases[k].trial.lam
+            if chosen and anew:
+                columns = self.gaps(columns, [cases[k].load for k in chosen])
+            elif chosen:
+                columns = products(self.Q, columns)
+            for column, k in enumerate(chosen):
+                gaps[k] = columns[order, column] if anew else gaps[k] + columns[order, column]
+        return gaps
+
     def _banded_step(self, case: Case, compliance: Vector, tolerance: float) -> Vector:
         """λ (m,) of the case with Q replaced by M⁻¹; conjugate to the step before on an unchanged set."""
         banded = BandedSets(self.M, case.trial, case.factor)
-        found = block_pivoting(
-            banded.at, case.C, compliance, RESIDUAL_TARGET * tolerance, self.sets_per_sweep
-        )
+        found = block_pivoting(banded.at, case.C, compliance, SIGNS_FROM * tolerance, self.sets_per_sweep)
         case.unchanged = not (case.C ^ found.C).any()
         case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
         if not case.unchanged or case.before is None:
@@ -173,22 +193,23 @@ class BatchedSweeps:
 
     def _update(self, case: Case, lam: Vector, y: Vector, compliance: Vector, tolerance: float) -> None:
         """Take λ and y, on an unchanged set at the minimum along the step, and decide whether the case is
-        settled.
+        settled. Where y is replaced, its change is not Q times the step.
         """
         step, change = lam - case.trial.lam, y - case.trial.y
         case.before = None
-        if case.unchanged and step @ change > 0:
+        if case.unchanged and not case.replaced and step @ change > 0:
             share = float(np.clip(-(step @ case.trial.y) / (step @ change), *STEP_RANGE))
             lam, y = case.trial.lam + share * step, case.trial.y + share * change
             case.before = step, change
         rounding = float(abs(y[case.C]).max(initial=0.0))
-        stagnating = rounding > case.trial.rounding / 2
-        case.stalled = case.stalled + 1 if stagnating else 0
+        if case.anew:
+            case.stalled = case.stalled + 1 if rounding > case.known / 2 else 0
+            case.known = rounding
         case.trial, case.sweeps = TrialSolution(lam, y, rounding), case.sweeps + 1
         right = not wrong_signs(case.C, case.trial, compliance, 0.0).any()
         residual = max(rounding, float(-y.min(initial=0.0))) + _cut_off(lam, compliance)
         # Of a case with a larger residual the answer would be inaccurate.
-        case.settled = right and residual <= self.enough(case, tolerance)
+        case.settled = case.anew and right and residual <= self.enough(case, tolerance)
 
     def answer(self, case: Case, load: LoadCase, tolerance: float) -> Answer:
         """The answer of a case; one that is unsettled is solved from its set."""

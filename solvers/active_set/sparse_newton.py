@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
@@ -59,7 +60,9 @@ class SparseState:
         M, diagonal = approximate.M, approximate.diagonal
         state = cls(prepared, diagonal, None, max_sets)
         Q = prepared.compliance
-        sweeps = SparseSweeps(Q, diagonal, M, state.by_sets, MAX_SWEEPS, SETS_PER_SWEEP, prepared=prepared)
+        sweeps = SparseSweeps(
+            Q, diagonal, M, state.by_sets, MAX_SWEEPS, SETS_PER_SWEEP, inf, prepared=prepared
+        )
         return replace(state, sweeps=sweeps)
 
     def by_sets(self, C: Set | None, load: LoadCase, tolerance: float) -> Answer:
@@ -101,7 +104,9 @@ class SparseState:
 
 @dataclass(kw_only=True)
 class SparseSweeps(BatchedSweeps):
-    """Sweeps with y = g − AᵀK⁻¹(f − Aλ)."""
+    """Sweeps with y = g − AᵀK⁻¹(f − Aλ), computed in every one: the rounding of K⁻¹ is nearly the same for
+    nearly the same λ, and stalls nothing.
+    """
 
     prepared: SparsePrepared
 
