@@ -35,6 +35,7 @@ from problems.forms.assembly import Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.model.joint import Joint
+from solvers.base import failed
 from solvers.registry import modules
 
 
@@ -168,6 +169,18 @@ def test_a_solver_object_is_judged_and_its_nonsense_named() -> None:
         solve(scene, Idle(np.zeros(1)))
     with pytest.raises(InputError, match="has its options already"):
         solve(scene, Idle(), options={"lam": None})
+
+
+class Unable(Idle):
+    """Gives no answer, and says why."""
+
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        return failed("Q has no band")
+
+
+def test_why_a_solver_gave_no_answer_is_said() -> None:
+    with pytest.raises(InputError, match=r"solver Unable: status = 'failed: Q has no band'.* or form"):
+        solve(own_matrices(*matrices()[2]), Unable())
 
 
 def test_without_contact_no_solver_is_called() -> None:

@@ -16,7 +16,7 @@ from problems.forms.sparse_prepared import SparsePrepared
 from solvers.base import Answer, Solver
 
 GUESS_MM = 1e-11  # tolerance of newton
-NO_ANSWER = "gave no answer; try another solver"
+NO_ANSWER = "gave no answer; try another solver or form"
 
 
 def form_of(name: str, taken: Sequence[Form], form: Form | None = None) -> Form:
@@ -54,5 +54,6 @@ def answer_of(
         raise InputError.one(f"solver {name}", "answer", str(error), NO_ANSWER) from error
     (x,) = session.problem.recover([answer.lam], [answer.x], [load])
     if x is None:
-        raise InputError.one(f"solver {name}", "status", answer.status, NO_ANSWER)
+        said = f"{answer.status}: {answer.details['cause']}" if "cause" in answer.details else answer.status
+        raise InputError.one(f"solver {name}", "status", said, NO_ANSWER)
     return replace(answer, x=x)
