@@ -46,8 +46,8 @@ def solve(
     \b
     Examples:
       python -m harness solve gallery/heavy-sheet-on-tool --out results/sheet
-      python -m harness solve my-scene.toml --solver piqp --out results/mine
-      python -m harness solve my-scene.toml --allow-gap 0.05 --out results/mine
+      python -m harness solve my-scene.toml --solver piqp --out results/my-scene
+      python -m harness solve my-scene.toml --allow-gap 0.05 --out results/my-scene
       python -m harness solve before.toml after.toml --out results/both
 
     \b

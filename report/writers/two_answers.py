@@ -89,7 +89,8 @@ def _pair(pair: dict[str, Any], one: dict[str, Array], other: dict[str, Array]) 
             f"force_{side}_N": float(np.nansum(force)),
         }
     change = other["gap_after"][own] - one["gap_after"][own]
-    return line | {"most_closed_mm": -change.min(), "most_opened_mm": change.max()}
+    closed, opened = (np.maximum(0.0, most) + 0.0 for most in (-change.min(), change.max()))  # no -0
+    return line | {"most_closed_mm": closed, "most_opened_mm": opened}
 
 
 def _columns() -> list[Column]:
