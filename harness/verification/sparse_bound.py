@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.balance import balanced_units
-from problems.forms.banded_inverse import BandedInverse
+from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.problem import stacked
 from problems.forms.sparse_prepared import SparsePrepared
 
@@ -105,8 +105,8 @@ class SparseBound:
             if not going.any():
                 break
             left, C, state = [case for case in left if not case.done], C[:, going], state.only(going)
-            columns = zip(C.T, state.s.value.T, state.lam.hi.T, strict=True)
-            state.move(np.column_stack([_correction(self.M, *column) for column in columns]))
+            columns = zip(left, C.T, state.s.value.T, state.lam.hi.T, strict=True)
+            state.move(np.column_stack([case.correction(self.M, *column) for case, *column in columns]))
         return [case.found for case in cases if case.found]
 
     def _bound(self, state: _State) -> Vector:
@@ -126,7 +126,10 @@ class SparseBound:
 
 @dataclass
 class _Progress:
-    """The smallest bound of a load case so far, mm. worse : steps in a row that improved nothing."""
+    """The smallest bound of a load case so far, mm. worse : steps in a row that improved nothing.
+
+    factor : of M on the open contacts, which are the same ones in most steps.
+    """
 
     least: float | None = None
     steps: int = 0
@@ -134,6 +137,30 @@ class _Progress:
     renewed: bool = False
     done: bool = False
     found: Proven | None = None
+    factor: BandFactor | None = None
+
+    def correction(self, M: BandedInverse, C: NDArray[np.bool_], y: Vector, lam: Vector) -> Vector:
+        """dλ with λ + dλ ≥ 0 and Q_CC dλ ≈ −y_C − Q_CN dλ_N; λ_N, outside C, becomes zero.
+
+        With t_N = M_NN⁻¹ ((M y_C)_N − λ_N) it is dλ_C = (M t − M y_C)_C. What it would make negative
+        leaves C.
+        """
+        order = M.order
+        C, lam = C[order], lam[order]
+        for _ in range(MAX_SETS):
+            v = M.product(np.where(C, y[order], 0.0))
+            if self.factor is None or (self.factor.S == C).any():
+                self.factor = None  # before the next one is made
+                self.factor = M.factor(~C)
+            t = self.factor.solve(np.where(C, 0.0, v - lam))
+            change = M.product(t) - v
+            negative = C & (lam + change < 0)
+            if not negative.any():
+                break
+            C = C & ~negative
+        dlam = np.empty_like(lam)
+        dlam[order] = np.maximum(np.where(C, change, -lam), -lam)
+        return dlam
 
     def halting(self, bound: float) -> bool:
         """Whether this bound is hardly better, for the first time. The first step corrects x more than λ."""
@@ -147,6 +174,8 @@ class _Progress:
         self.least, self.steps = bound if better else self.least, self.steps + 1
         self.worse = 0 if better else self.worse + 1
         self.done = last or bound <= ENOUGH_MM or self.worse == MAX_WORSE
+        if self.done:
+            self.factor = None
         return (better and bound <= PROVEN_ENOUGH_MM) or (self.done and self.found is None)
 
 
@@ -226,23 +255,3 @@ def _size(M: sp.csc_array) -> sp.csc_array:
     """|M|, which shares its indices."""
     M = sp.csc_array(M)
     return sp.csc_array((abs(M.data), M.indices, M.indptr), shape=M.shape)
-
-
-def _correction(M: BandedInverse, C: NDArray[np.bool_], y: Vector, lam: Vector) -> Vector:
-    """dλ with λ + dλ ≥ 0, zero outside C, and Q_CC dλ ≈ −y_C − Q_CN dλ_N; λ_N, of the others, becomes zero.
-
-    With t_N = M_NN⁻¹ ((M y_C)_N − λ_N) it is dλ_C = (M t − M y_C)_C. What it would make negative leaves C.
-    """
-    order = M.order
-    C, lam = C[order], lam[order]
-    for _ in range(MAX_SETS):
-        v = M.product(np.where(C, y[order], 0.0))
-        t = M.factor(~C).solve(np.where(C, 0.0, v - lam))
-        change = M.product(t) - v
-        negative = C & (lam + change < 0)
-        if not negative.any():
-            break
-        C = C & ~negative
-    dlam = np.empty_like(lam)
-    dlam[order] = np.maximum(np.where(C, change, -lam), -lam)
-    return dlam

@@ -97,7 +97,10 @@ class SparseState:
         sweeps = self.sweeps
 
         def solve(loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
-            return with_x(self.prepared, sweeps(with_p(self.prepared, loads), tolerance), loads, tolerance)
+            answers = sweeps(with_p(self.prepared, loads), tolerance)
+            for case in sweeps.last:
+                case.factor = None  # a band as large as M for each; the next cases have other sets
+            return with_x(self.prepared, answers, loads, tolerance)
 
         return solve
 
