@@ -16,7 +16,7 @@ from scipy.linalg import blas, lapack
 from .assembly import Matrix
 
 PANEL = 64  # rows; a narrower band is solved by dpbtrs
-FEW = 4  # right-hand sides, for which dpbtrs is as fast
+FEW = 2  # right-hand sides, for which dpbtrs is as fast
 
 
 def band_solve(L: Matrix, b: Matrix) -> Matrix:
