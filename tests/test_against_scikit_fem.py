@@ -10,7 +10,7 @@ import numpy as np
 import skfem
 from joints import make_joint, make_scene
 from numpy.typing import NDArray
-from skfem.helpers import dd, ddot, eye, trace
+from scikit_fem_plates import UNIT, deflections, plate
 
 from problems.build import load_case, prepared
 from problems.effects.self_weight import SelfWeight
@@ -19,7 +19,6 @@ from problems.effects.supports import Supports
 LENGTH, SOUTH, NORTH, THICKNESS = 300.0, -200.0, 200.0, 3.0  # mm
 SPRINGS = {(0.0, SOUTH): 50.0, (LENGTH, SOUTH): 200.0, (0.0, NORTH): 120.0, (LENGTH, NORTH): 80.0}  # N/mm
 POINTS = np.array([[0.0, 0.0], [150.0, 0.0], [150.0, 100.0], [0.0, 200.0], [150.0, 200.0], [300.0, 200.0]])
-UNIT = 200.0  # mm; scikit-fem inverts matrices of powers of the coordinates, which are best near one
 
 
 def ours() -> NDArray[np.float64]:
@@ -37,26 +36,19 @@ def ours() -> NDArray[np.float64]:
 
 
 def theirs() -> NDArray[np.float64]:
-    mesh = skfem.MeshTri.init_tensor(np.linspace(0, LENGTH, 7) / UNIT, np.linspace(SOUTH, NORTH, 9) / UNIT)
-    basis = skfem.Basis(mesh, skfem.ElementTriArgyris(), intorder=8)
-    rigidity = 70e3 * THICKNESS**3 / 12 / (1 - 0.33**2)
+    x, y = np.linspace(0, LENGTH, 7), np.linspace(SOUTH, NORTH, 9)
+    basis, K = plate(x, y, THICKNESS, 70e3, 0.33)
     weight = 2700e-9 * 9.80665 * THICKNESS
-
-    @skfem.BilinearForm  # type: ignore[untyped-decorator]
-    def bending(u, v, w):  # type: ignore[no-untyped-def]
-        kappa = dd(u)
-        return ddot(0.67 * kappa + 0.33 * eye(trace(kappa), 2), dd(v))
 
     @skfem.LinearForm  # type: ignore[untyped-decorator]
     def uniform(v, w):  # type: ignore[no-untyped-def]
         return v
 
-    K = bending.assemble(basis) * rigidity / UNIT**2
     for point, k in SPRINGS.items():
-        e = basis.probes(np.array([point]).T / UNIT)
+        e = deflections(basis, np.array([point]))
         K = K + k * (e.T @ e)
     u = skfem.solve(K.tocsc(), uniform.assemble(basis) * weight * UNIT**2)
-    return np.asarray(basis.probes(POINTS.T / UNIT) @ u)
+    return np.asarray(deflections(basis, POINTS) @ u)
 
 
 def test_deflections_agree() -> None:
