@@ -66,8 +66,8 @@ def committed(folder: Path) -> str:
 
 
 def asked(folder: Path, **environment: str) -> tuple[str, bool | None]:
-    """What the packages in that folder say."""
-    variables = {**os.environ, "PYTHONPATH": str(folder), **environment}
+    """What the packages in that folder say. Compiled files would be untracked, as no .gitignore is copied."""
+    variables = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", **environment}
     done = subprocess.run(
         [sys.executable, "-P", "-c", ASK], env=variables, check=True, capture_output=True, cwd=folder.parent
     )

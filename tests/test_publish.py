@@ -12,7 +12,8 @@ from harness.cli import publish as command
 from harness.cli.app import app
 from harness.planning.suite import suite_names
 from harness.results import published
-from harness.results.records import GAPS, MEASUREMENTS, append
+from harness.results.records import MEASUREMENTS, append
+from harness.results.schema import GAPS
 from problems.errors import InputError
 
 CODE = "c" * 40

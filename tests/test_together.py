@@ -182,7 +182,9 @@ def test_what_sweeps_do_not_settle_is_solved_alone_and_soon_at_once() -> None:
 
 
 def test_a_near_case_is_where_the_next_one_begins() -> None:
-    """M = Q⁻¹: from a case with the same contacts a single sweep is right, wherever p has gone."""
+    """M = Q⁻¹: from a case with the same contacts a single sweep is right, wherever p has gone; one more
+    computes y from λ.
+    """
     data = make_prepared(3, 25)
     first = make_load(1, data)[1]
     closed = solve_by_nnls(data, LoadCase(first.f, first.g))[1] > 0
@@ -191,7 +193,7 @@ def test_a_near_case_is_where_the_next_one_begins() -> None:
     batch = BatchedSweeps(data.Q, np.diag(data.Q), banded_inverse(data.Q, None), alone)
     one, two = (batch([load], TOLERANCE)[0] for load in (first, second))
     assert one.lam is not None
-    assert two.iterations == 1
+    assert two.iterations == 2
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
 

@@ -94,7 +94,7 @@ def series(
     with error_reporting() as console:
         from harness.measurement.describe import described
         from harness.planning.road import chosen_form
-        from harness.results.records import CASES
+        from harness.results.schema import CASES
         from harness.scene.allowed_gap import refuse_unusable
         from harness.series.allowed_gap import check as check_allowed_gap
         from harness.series.run import run

@@ -17,6 +17,7 @@ from problems.errors import Fault, InputError
 
 from . import records
 from .provenance import ROOT, commit
+from .schema import CASES, GAPS
 
 PUBLISHED = ROOT / "results" / "published"
 STAGED = ROOT / "results" / "publishing"
@@ -77,7 +78,7 @@ def command(name: str, directory: Path) -> list[str]:
 
 def rows_of(directory: Path) -> list[records.Row]:
     """The rows of a suite or a series; none if there is no such directory."""
-    return records.read(directory / records.CASES) or records.read(directory / records.MEASUREMENTS)
+    return records.read(directory / CASES) or records.read(directory / records.MEASUREMENTS)
 
 
 def is_of(rows: Sequence[Mapping[str, Any]], digits: str) -> bool:
@@ -112,7 +113,7 @@ def publish(name: str, directory: Path, published: Path) -> None:
 def _unwanted(directory: Path) -> Iterator[Path]:
     """What is not published: locks, gaps of a series, answers and scenes that are large."""
     yield from directory.glob("**/*.lock")
-    yield from directory.glob(records.GAPS)
+    yield from directory.glob(GAPS)
     yield from (path for path in directory.glob("scenes/*.npz") if path.stat().st_size > KEPT_SCENE_KB * 1000)
     answers = directory / "answers"
     if sum(path.stat().st_size for path in answers.glob("*")) > KEPT_MIB * 2**20:

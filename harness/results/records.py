@@ -25,7 +25,6 @@ from .checksums import DAMAGED, Damaged, parsed, sealed, with_arrays
 Row = dict[str, Any]
 
 MEASUREMENTS = "measurements.jsonl"
-CASES, GAPS = "cases.jsonl", "gaps.f4"  # of a series, see harness/series/store.py
 TORN = "measurements.torn"
 OUTDATED = "measurements.outdated.jsonl"
 ROWS_MIB = 4096

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
+#: The files of a series, see harness/series/store.py.
+CASES, GAPS = "cases.jsonl", "gaps.f4"
+
 #: An object is a JSON object whose names depend on the solver or the series.
 Kind = Literal["number", "text", "flag", "object"]
 

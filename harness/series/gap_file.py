@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.results import records
-from harness.results.records import GAPS
+from harness.results.schema import GAPS
 from problems.input.bounded import regular_file
 
 from .session import Gaps

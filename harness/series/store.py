@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from harness.results import records
 from harness.results.checksums import DAMAGED, Damaged, arrays_in, parsed
-from harness.results.records import CASES, GAPS
-from harness.results.schema import VERDICTS
+from harness.results.schema import CASES, GAPS, VERDICTS
 from problems.errors import Fault, InputError
 from problems.input.bounded import LARGEST, regular_file
 from problems.load_cases.base import LoadCases

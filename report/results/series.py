@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from harness.results.records import CASES, GAPS
+from harness.results.schema import CASES, GAPS
 from report.document.escape import quoted
 
 Array = NDArray[np.float64]
