@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
@@ -33,6 +34,8 @@ def write_others(path: Path, data: Data) -> None:
 
 
 def write_one(path: Path, matrix: object, symmetry: str) -> None:
+    if isinstance(matrix, np.ndarray) and not matrix.size:
+        matrix = sp.coo_array(matrix)  # of an empty array, SciPy before 1.17 writes without end
     scipy.io.mmwrite(path, matrix, precision=17, symmetry=symmetry)
 
 
