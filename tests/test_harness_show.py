@@ -46,7 +46,7 @@ def test_a_line_says_the_outcome_and_why() -> None:
         nothing = dict.fromkeys(["convert_s", "prepare_s", "solve_s", "displacement_error_mm", "iterations"])
         failed = row(**nothing, status="crashed", verdict="no_answer", message="killed by SIGSEGV\nmore")
         display.finished(plan[1], failed, 1.0)
-    heading, first, second, why = shown.getvalue().splitlines()
+    heading, first, second, why = filter(str.strip, shown.getvalue().splitlines())
     assert heading.split()[:2] == ["scene", "solver"]
     assert " ".join(first.split()) == "small gi dual 1e-09 2 solved 7 0.50 0.75 2.0e-11 within"
     assert " ".join(second.split()) == "small gi dual 1e-09 2 crashed – – – – no_answer"

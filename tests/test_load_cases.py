@@ -116,7 +116,8 @@ def test_a_table_takes_the_place_of_the_gaps(kind: str, scene: Scene, data: Prep
             np.save(path, gaps)
     cases = measured_gaps(scene, path)
     assert cases.count == 30
-    np.testing.assert_array_equal(gaps_of(cases, data), gaps)
+    # pandas before 3.1 reads the last digits of a text inexactly
+    np.testing.assert_allclose(gaps_of(cases, data), gaps, rtol=0, atol=1e-15 if kind == "csv" else 0)
     np.testing.assert_array_equal(cases.load(0).f, load_case(scene).f)
     assert measured_gaps(scene, path, 4).count == 4
     with pytest.raises(InputError, match="has 30 rows"):

@@ -19,7 +19,10 @@ from problems.forms.whole_compliance import whole_compliance
 @pytest.mark.parametrize("seed", range(3))
 def test_it_is_that_of_the_dense_matrices(n: int, half: int, m: int, seed: int) -> None:
     random = np.random.default_rng(seed)
-    K, A = band_matrix(random, n, half), sp.csc_array(sp.random_array((n, m), density=0.05, rng=random))
+    K, A = (
+        band_matrix(random, n, half),
+        sp.csc_array(sp.random_array((n, m), density=0.05, random_state=random)),
+    )
     Q = A.T @ np.linalg.solve(K.toarray(), A.toarray())
     order = random.permutation(n)
     for factor, columns in (
