@@ -36,6 +36,7 @@ def text(page: str) -> str:
     [
         ("README.md", "speed", headlines.ratio_sentence),
         ("README.md", "speed", headlines.contact_sentence),
+        ("README.md", "uncondensed", headlines.road_sentence),
         ("docs/series.md", "series", headlines.series_sentence),
     ],
 )

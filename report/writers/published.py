@@ -20,6 +20,7 @@ from .headlines import (
     gaps_sentence,
     ladder_score,
     ratio_sentence,
+    road_sentence,
     series_rates,
 )
 from .pages import rendered
@@ -70,6 +71,8 @@ def _headlines(folder: Path, results: Mapping[str, Results]) -> list[Block]:
             Text(f"{ratio_sentence(results['speed'])} (the medians over the load cases)."),
             _fastest(results),
         ]
+    if "uncondensed" in results:
+        blocks.append(Text(f"{road_sentence(results['uncondensed'])}."))
     if "accuracy" in results:
         blocks.append(_accuracy(results["accuracy"]))
     if "series" in results:
