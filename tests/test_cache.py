@@ -133,6 +133,15 @@ def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> N
         assert not array.flags.writeable
 
 
+def test_the_seconds_of_what_is_stored_are_known_unopened() -> None:
+    def seconds() -> Any:
+        return build.prepared(SCENE).facts["seconds"]
+
+    assert "Q" not in seconds()
+    _ = build.prepared(SCENE).Q
+    assert seconds()["Q"] > 0
+
+
 def test_prepared_holds_what_it_says() -> None:
     made = build.prepared(SCENE)
     A = made.assembly.A.toarray()

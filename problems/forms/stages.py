@@ -65,7 +65,8 @@ class Stored(Prepared):
     @property
     def facts(self) -> dict[str, object]:
         known = self._factored[1]
-        of_Q = {"Q": self._Q[1]["seconds"]} if "_Q" in vars(self) else {}
+        Q = self._Q if "_Q" in vars(self) else cache.load(self.Q_key)
+        of_Q = {"Q": Q[1]["seconds"]} if Q else {}
         seconds = self.seconds | known["seconds"] | of_Q
         size = {"n": self.assembly.n, "m": self.assembly.m, "parts": self.assembly.parts}
         return size | known | {"seconds": seconds}
