@@ -15,7 +15,8 @@ from pydantic import ValidationError
 
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
-from problems.effects.initial_gap import InitialGap
+from problems.effects.initial_gap import SHIFT, InitialGap
+from problems.effects.initial_gap import _square_root as square_root
 from problems.effects.pressure import Pressure
 from problems.model.joint import Joint
 
@@ -139,6 +140,19 @@ def test_random_gap_has_its_mean_deviation_and_correlation(nodes: tuple[int, int
     ]
     for one, other, distance in pairs:
         assert (one * other).mean() == pytest.approx(np.exp(-((distance / 100) ** 2) / 2), abs=0.03)
+
+
+@pytest.mark.parametrize("length", [30.0, 150.0, 800.0])
+def test_rounding_does_not_change_a_random_gap(length: float) -> None:
+    """A grid and its mirror image, whose rounding differs: of one field the gaps differ by some 1e-10 of its
+    deviation, where roots of eigenvalues near zero differ by 1e-8.
+    """
+    grid = np.linspace(0.0, 4000.0, 258)
+    root, mirrored = square_root(grid, length), square_root(4000.0 - grid[::-1], length)[::-1, ::-1]
+    Z = np.random.default_rng(5).standard_normal((258, 20))
+    np.testing.assert_allclose(mirrored @ Z, root @ Z, rtol=0, atol=1e-9)
+    C = np.exp(-0.5 * ((grid[:, None] - grid) / length) ** 2)
+    np.testing.assert_allclose(root @ root, C, rtol=0, atol=1.1 * SHIFT * np.linalg.norm(C, 2))
 
 
 def test_each_contact_pair_has_a_field_of_its_own() -> None:

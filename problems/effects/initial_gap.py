@@ -13,6 +13,9 @@ from problems.input.bounded import Finite, Positive, Seed
 from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
 from problems.model.joint import Joint, Table
 
+#: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `_square_root`.
+SHIFT = 1e-10
+
 
 class RandomField(Table):
     """Gaussian field: standard deviation and correlation length in mm, and the seed."""
@@ -26,7 +29,8 @@ class InitialGap(GapEffect):
     """g = mean + sd · Lx Z Lyᵀ in mm, Z standard normal, at every contact.
 
     The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
-    roots Lx and Ly of two one-dimensional correlation matrices. A negative gap is an overclosure.
+    roots Lx and Ly of two one-dimensional correlation matrices; it is met to some 1e-10 of its largest
+    eigenvalue. A negative gap is an overclosure.
     `between` names one contact; by default all of them get the gap, each with its own random field.
     """
 
@@ -55,7 +59,12 @@ class InitialGap(GapEffect):
 
 
 def _square_root(grid: Vector, correlation_length: float) -> Matrix:
-    """Symmetric square root of exp(−(x_i − x_j)² / 2ℓ²); unique, so that no sign depends on the machine."""
+    """Symmetric square root of C = exp(−(x_i − x_j)² / 2ℓ²): unique, so that no sign depends on the machine.
+
+    √w of an eigenvalue w within rounding of 0 would differ by some 1e-8 from one processor, or number of
+    threads, to the next, and the gaps as much. w / √(w + s) differs by rounding / √s; its square is w to
+    within s = SHIFT · max w.
+    """
     return _cached_root(grid.tobytes(), correlation_length)
 
 
@@ -64,6 +73,7 @@ def _cached_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     grid = np.frombuffer(grid_bytes)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / correlation_length) ** 2)
     w, V = np.linalg.eigh(C)
-    root: Matrix = (V * np.sqrt(np.clip(w, 0.0, None))) @ V.T
+    w = np.clip(w, 0.0, None)
+    root: Matrix = (V * (w / np.sqrt(w + SHIFT * w[-1]))) @ V.T
     root.flags.writeable = False
     return root
