@@ -137,9 +137,10 @@ def solve(
     asked = form_of(named[0], forms, form) if form and named else form
     taken = chosen_form(scene, forms, asked, in_house=not own).form
     data, load = prepared(scene, form=taken), load_case(scene, taken)
-    known = reference_of(scene, data, load, guess=guess_of(data, load))
+    has_contact = bool((data.dual_load(load) > 0).any())
+    known = reference_of(scene, data, load, guess=guess_of(data, load) if has_contact else None)
     answer = Answer("solved", known.lam, known.x)
-    if named is not None and (data.dual_load(load) > 0).any():
+    if named is not None and has_contact:
         name, chosen = named
         answer = answer_of(name, chosen, data, taken, load, tolerance)
     x = np.asarray(answer.x, dtype=float)

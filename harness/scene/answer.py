@@ -29,9 +29,9 @@ def form_of(name: str, taken: Sequence[Form], form: Form | None = None) -> Form:
 
 def guess_of(data: Prepared, load: LoadCase) -> Vector | None:
     """λ (m,) N by newton in the sparse form, from which its reference starts; None in the dense forms, where
-    the reference finds the contact set itself, and without contact.
+    the reference finds the contact set itself.
     """
-    if not isinstance(data, SparsePrepared) or not (data.dual_load(load) > 0).any():
+    if not isinstance(data, SparsePrepared):
         return None
     from solvers.registry import make_solver  # slow to import
 

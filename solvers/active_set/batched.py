@@ -157,28 +157,28 @@ class BatchedSweeps:
             for case in unsettled:
                 anew = case.trial.rounding <= self.near * tolerance
                 case.anew, case.replaced = anew, anew and not case.anew
-            for case, lam, y in zip(unsettled, found, self._gaps_at(unsettled, found), strict=True):
+            for case, lam, y in zip(unsettled, found, self.gaps_at(unsettled, found), strict=True):
                 self._update(case, lam, y, compliance, tolerance)
             unsettled = [case for case in unsettled if not case.settled]
             if not unsettled:
                 break
         return cases
 
-    def _gaps_at(self, cases: Sequence[Case], forces: Sequence[Vector]) -> list[Vector]:
-        """y (m,) mm of each case at λ (m,) N, anew or by its change."""
-        order, gaps = self.M.order, [case.trial.y for case in cases]
-        for anew in (True, False):
-            chosen = [k for k, case in enumerate(cases) if case.anew == anew]
-            columns = np.empty((len(order), len(chosen)), order="F")
-            for column, k in enumerate(chosen):
-                columns[order, column] = forces[k] if anew else forces[k] - cases[k].trial.lam
-            if chosen and anew:
-                columns = self.gaps(columns, [cases[k].load for k in chosen])
-            elif chosen:
-                columns = products(self.Q, columns)
-            for column, k in enumerate(chosen):
-                gaps[k] = columns[order, column] if anew else gaps[k] + columns[order, column]
-        return gaps
+    def gaps_at(self, cases: Sequence[Case], forces: Sequence[Vector]) -> list[Vector]:
+        """y (m,) mm of each case at λ (m,) N, anew or by its change, in one product."""
+        pairs = list(zip(cases, forces, strict=True))
+        steps = [lam if case.anew else lam - case.trial.lam for case, lam in pairs]
+        changes = products(self.Q, self.numbered(steps))[self.M.order].T
+        return [
+            change - case.p if case.anew else case.trial.y + change
+            for case, change in zip(cases, changes, strict=True)
+        ]
+
+    def numbered(self, vectors: Sequence[Vector]) -> Matrix:
+        """Vectors in the order of M as columns (m, k) in that of Q."""
+        columns = np.empty((len(self.M.order), len(vectors)), order="F")
+        columns[self.M.order] = np.column_stack(vectors)
+        return columns
 
     def _banded_step(self, case: Case, compliance: Vector, tolerance: float) -> Vector:
         """λ (m,) of the case with Q replaced by M⁻¹; conjugate to the step before on an unchanged set."""

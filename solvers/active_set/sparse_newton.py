@@ -116,6 +116,9 @@ class SparseSweeps(BatchedSweeps):
     def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
         return gaps(self.prepared, lam, loads)
 
+    def gaps_at(self, cases: Sequence[Case], forces: Sequence[Vector]) -> list[Vector]:
+        return list(self.gaps(self.numbered(forces), [case.load for case in cases])[self.M.order].T)
+
     def enough(self, case: Case, tolerance: float) -> float:
         """Also what some sweeps have not made smaller, as the rounding of K⁻¹: whether that is enough is said
         by the refined x.
