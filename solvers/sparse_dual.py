@@ -14,6 +14,8 @@ from problems.forms.sparse_prepared import SparsePrepared
 from .base import Answer, LoadCase
 from .kkt import EPS
 
+ROUNDING_MM = 5e-8  # half of what x may be off: a δ beyond is an error, not rounding
+
 
 def with_p(prepared: SparsePrepared, loads: Sequence[LoadCase]) -> list[LoadCase]:
     """With p = AᵀK⁻¹f − g, (m,) mm; K⁻¹f is computed once if they share their f."""
@@ -32,7 +34,7 @@ def with_x(
     prepared: SparsePrepared, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float
 ) -> list[Answer]:
     """With x = K⁻¹(f − Aλ) refined by δ, and judged by it: "solved" if the KKT residual of y = g − Aᵀx is at
-    most max(tolerance, 4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|)).
+    most max(tolerance, min(4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|), ROUNDING_MM)).
     """
     known = [k for k, answer in enumerate(answers) if answer.lam is not None]
     found = list(answers)
@@ -50,7 +52,8 @@ def with_x(
     for column, k in enumerate(known):
         status, residual = found[k].status, float(missed[column])
         if status in ("solved", "inaccurate"):
-            status = "solved" if residual <= max(tolerance, rounding[column]) else "inaccurate"
+            allowed = max(tolerance, min(rounding[column], ROUNDING_MM))
+            status = "solved" if residual <= allowed else "inaccurate"
         details = found[k].details | {"kkt_residual_mm": residual}
         if status == "solved":
             details.pop("cause", None)
