@@ -21,7 +21,8 @@ def cells_of(nodes: Matrix | None, m: int, width: int) -> Cells:
     low, extent = nodes.min(axis=0), np.ptp(nodes, axis=0)
     spacing = np.sqrt(np.prod(extent) / m) if extent.all() else extent.max() / m
     place = np.floor((nodes - low) / (width * spacing or 1.0)).astype(int)
-    return np.unique(place, axis=0, return_inverse=True)[1].ravel()
+    numbers = place[:, 0] * (place[:, 1].max() + 1) + place[:, 1]
+    return np.unique(numbers, return_inverse=True)[1]
 
 
 def representatives(cells: Cells, p: Vector) -> NDArray[np.intp]:
