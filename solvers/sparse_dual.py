@@ -14,7 +14,7 @@ from problems.forms.sparse_prepared import SparsePrepared
 from .base import Answer, LoadCase
 from .kkt import EPS
 
-ROUNDING_MM = 5e-8  # half of what x may be off: a δ beyond is an error, not rounding
+ROUNDING_MM = 1e-7  # what x may be off: a δ beyond is an error, not rounding
 
 
 def with_p(prepared: SparsePrepared, loads: Sequence[LoadCase]) -> list[LoadCase]:
