@@ -17,8 +17,10 @@ from report.analysis.precision import ACCURACIES, swept
 from report.analysis.relative import load_cases
 from report.analysis.roads import roads
 from report.analysis.standings import geometric_mean
+from report.document.blocks import Table, Text
 from report.document.numbers import counted, listed, power, significant
 from report.results.reader import Results
+from report.sections import methods
 from report.sections.ladders import in_house
 from report.sections.recommendation import recommended
 from report.sections.series import compared
@@ -125,6 +127,22 @@ def series_sentence(series: Results) -> str:
     ]
     library = listed([significant(seconds, 2) for seconds in found["library_s"]])
     return f"{listed(rates)}; a case of the fastest library takes {library} s"
+
+
+def methods_advice(results: Results) -> str:
+    """Which method for contact problems to use."""
+    return _of_methods(results, Text)
+
+
+def methods_table(results: Results) -> str:
+    """Their seconds and products with Q."""
+    return _of_methods(results, Table)
+
+
+def _of_methods(results: Results, kind: type[Text] | type[Table]) -> str:
+    section = methods.section(results)
+    blocks = [] if section is None else section.blocks
+    return "".join(block.markdown for block in blocks if isinstance(block, kind))
 
 
 def contact_sentence(speed: Results) -> str:

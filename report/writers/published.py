@@ -19,6 +19,7 @@ from .headlines import (
     fastest,
     gaps_sentence,
     ladder_score,
+    methods_advice,
     ratio_sentence,
     road_sentence,
     series_rates,
@@ -77,6 +78,8 @@ def _headlines(folder: Path, results: Mapping[str, Results]) -> list[Block]:
         blocks.append(_accuracy(results["accuracy"]))
     if "series" in results:
         blocks.append(_series(results["series"]))
+    if "methods" in results:
+        blocks.append(Text(f"`methods`: {methods_advice(results['methods'])}"))
     blocks += [
         Text(f"`{name}`: {ladder_score(results[name])}") for name in ("hard", "hard-full") if name in results
     ]
