@@ -21,7 +21,7 @@ from problems.forms.problem import in_form
 from problems.manufactured.exact import spectrum
 from problems.manufactured.ladder import ManufacturedProblem, make_rung, rung_names
 from problems.scene import read_scene, scene_names
-from solvers.base import Form
+from solvers.base import Answer, Form
 from solvers.registry import make_solver
 
 WHOLE = 2**1200
@@ -135,10 +135,8 @@ def test_every_rung_can_be_judged(name: str) -> None:
     assert base.reference.bound_mm <= 0.1 * base.limit_mm(1e-7)
 
 
-@pytest.mark.parametrize(("solver", "form", "tolerance"), IN_HOUSE, ids=str)
-@pytest.mark.parametrize("name", TAKEN)
-def test_in_house_solvers_hold(name: str, solver: str, form: Form, tolerance: float) -> None:
-    """Up to cond(K) = 1e12 within what conditioning allows; beyond it, or else a status that says so."""
+def judged(name: str, solver: str, form: Form, tolerance: float) -> tuple[Answer, str]:
+    """The answer on a rung and its verdict."""
     base = opened(name)
     data, case = base.prepared, base.load
     made = make_solver(solver, {})
@@ -148,10 +146,25 @@ def test_in_house_solvers_hold(name: str, solver: str, form: Form, tolerance: fl
     assert answer.lam is not None
     assert np.isfinite(answer.lam).all()
     x = answer.x if answer.x is not None else data.recover(answer.lam, case)
-    found = judge(data, case, base.reference, x, answer.lam, base.limit_mm(1e-7))
-    hard = data.facts["cond_K"] > 1.2e12 or (solver, name) in MAY_GIVE_UP  # type: ignore[operator]
-    assert found.verdict == "within" or (hard and answer.status != "solved")
+    return answer, judge(data, case, base.reference, x, answer.lam, base.limit_mm(1e-7)).verdict
+
+
+@pytest.mark.parametrize(("solver", "form", "tolerance"), IN_HOUSE, ids=str)
+@pytest.mark.parametrize("name", TAKEN)
+def test_in_house_solvers_hold(name: str, solver: str, form: Form, tolerance: float) -> None:
+    """Up to cond(K) = 1e12 within what conditioning allows; beyond it, or else a status that says so."""
+    answer, verdict = judged(name, solver, form, tolerance)
+    cond = opened(name).prepared.facts["cond_K"]
+    hard = cond > 1.2e12 or (solver, name) in MAY_GIVE_UP  # type: ignore[operator]
+    assert verdict == "within" or (hard and answer.status != "solved")
     assert answer.status == "solved" or answer.details["cause"]
+
+
+@pytest.mark.parametrize("name", [name for name in TAKEN if "/duplicates/" in name])
+def test_gauss_seidel_with_nearly_dependent_contacts_is_right_or_says_that_it_is_not(name: str) -> None:
+    """Gaps met to 1e-10 mm leave the displacements 5.5e-7 mm off: hence no tolerance above rounding."""
+    answer, verdict = judged(name, "projected-gauss-seidel", "dual", 1e-14)
+    assert verdict == "within" or answer.status != "solved"
 
 
 def test_the_suite_measures_every_rung_with_every_solver() -> None:

@@ -304,7 +304,20 @@ def test_of_tolerances_as_fast_the_tightest_is_advised(
     line = advised(found).loc[1e-9]
     assert line[["use", "tolerance"]].tolist() == ["a (dual)", float(tolerance)]
     assert line["seconds"] == pytest.approx(prices[int(tolerance[3:])])
-    assert f" **a (dual) {tolerance}**:" in (advice(found, 4386) or "")
+    assert f" **a (dual) {tolerance}**:" in advice(found)
+
+
+def test_sizes_at_which_one_method_was_run_share_a_paragraph(tmp_path: Path) -> None:
+    times = {"setup_s": 0.0, "form_s": 0.0}
+    rows = [row("64/0010", solve_s=0.5, **times), row("64/0020", **no_answer("time_limit"))]
+    rows += [row("100/0030", solve_s=2.0, **times)]
+    rows += [row("400/0040", solve_s=2.0, **times), row("400/0040", "newton", solve_s=1.0, **times)]
+    of_400, alone = advice(results(tmp_path, rows)).splitlines()
+    assert of_400.startswith("- **n = 400, 1 scene, 40 active contacts:** **newton (dual)**: within")
+    assert alone == (
+        "- **n = 64 and 100, 3 scenes:** only **ipm (dual)** was run: within 1e-7 mm on 2 of them, "
+        "0.500 to 2.00 s per load case. 1 run of 3 gave no answer (1 time limit)."
+    )
 
 
 def test_ties_are_named(tmp_path: Path) -> None:

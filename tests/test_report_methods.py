@@ -48,5 +48,21 @@ def test_seconds_and_products_stand_together(tmp_path: Path) -> None:
     assert cells["slow (dual)"] == ["> 60", ""]
 
 
+def test_a_method_counts_with_its_best_tolerance(tmp_path: Path) -> None:
+    rows = [measured(LOW, "newton", 0.2, 15), measured(LOW, "mprgp", 0.3, 11)]
+    missed: dict[str, Any] = {"verdict": "outside", "displacement_error_mm": 1.5e-7}
+    rows += [measured(LOW, "piqp", 1.5, None, tolerance=1e-9)]
+    rows += [measured(LOW, "piqp", 1.0, None, tolerance=1e-8, **missed)]
+    rows += [measured(LOW, "piqp", 2.0, None, tolerance=1e-10)]
+    rows += [measured(LOW, "rough", 2.0, None, tolerance=1e-9, **missed | {"displacement_error_mm": 1e-5})]
+    rows += [measured(LOW, "rough", 1.0, None, tolerance=1e-8, **missed | {"displacement_error_mm": 1e-4})]
+    section = told(tmp_path, rows)
+    assert section is not None
+    advice, table = (block.markdown for block in section.blocks)
+    assert advice.endswith("were tried on: rough (dual) (off by up to 1.0e-5 mm).")
+    assert " 1.50 |" in table
+    assert " 2.00 (outside) |" in table
+
+
 def test_one_method_that_counts_is_no_comparison(tmp_path: Path) -> None:
     assert told(tmp_path, [measured(LOW, "newton", 0.2, 15), measured(LOW, "piqp", 1.0, None)]) is None

@@ -32,7 +32,7 @@ NOT_PUBLISHED = ("gate", "scenes")
 DIGITS = 12  # of a commit, in the name of a folder
 #: The answers of a suite are kept, for the gate to judge anew, if they take at most this together; of the
 #: scenes' arrays, for their pictures, each that takes at most as many kB.
-KEPT_MIB, KEPT_SCENE_KB = 3, 500
+KEPT_MIB, KEPT_SCENE_KB = 5, 500
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
 

@@ -7,14 +7,40 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.document.numbers import counted, listed, significant
+from report.document.numbers import counted, listed, significant, span
 from report.results.labels import in_order
 from report.results.reader import Results
 
 from .standings import TIE, geometric_mean, preferred, seconds_within, tie_of
 
 
-def advice(results: Results, n: int) -> str | None:
+def advice(results: Results) -> str:
+    """A paragraph for each size; those of two and more sizes with the same method and no other, in one."""
+    methods = {n: sorted(results.of_size(n)["method"].unique()) for n in results.sizes}
+    lone: dict[str, list[int]] = {}
+    for n, (method, *others) in ((n, names) for n, names in methods.items() if names):
+        if not others:
+            lone.setdefault(method, []).append(n)
+    several = {method: sizes for method, sizes in lone.items() if len(sizes) > 1}
+    shared = {n for sizes in several.values() for n in sizes}
+    words = [_of_size(results, n) for n in results.sizes if n not in shared]
+    words += [_without_rival(results, method, sizes) for method, sizes in several.items()]
+    return "\n".join(line for line in words if line)
+
+
+def _without_rival(results: Results, method: str, sizes: list[int]) -> str:
+    """How often the only method of some sizes is within the limit, and its least and most seconds."""
+    cells = pd.concat([results.of_size(n) for n in sizes])
+    scenes = cells["scene"].nunique()
+    seconds = seconds_within(cells).min(axis=1).dropna()
+    at = f"n = {listed([str(n) for n in sizes])}, {counted(scenes, 'scene')}"
+    words = f"only **{method}** was run: within {results.limit} on {len(seconds)} of them"
+    if len(seconds):
+        words += f", {span(significant(seconds.min()), significant(seconds.max()))} s per load case"
+    return " ".join([f"- **{at}:** {words}.", *_unanswered(cells)])
+
+
+def _of_size(results: Results, n: int) -> str | None:
     """A paragraph for one size: the fastest of the lines within the limit on all its scenes."""
     cells = results.of_size(n)
     if cells.empty:

@@ -38,6 +38,16 @@ def best_tolerances(results: Results) -> pd.DataFrame:
     return cells[cells["label"].isin(table["label"][~table["method"].duplicated()] if len(table) else [])]
 
 
+def with_rivals(cells: pd.DataFrame, methods: pd.Series[int]) -> pd.DataFrame:
+    """The cells where two methods and more stand beside each other, and those of the largest size; all of
+    them if that is nowhere the case.
+
+    methods : how many stand beside each other, by the index of the cells
+    """
+    several = methods.reindex(cells.index) > 1
+    return cells[several | (cells["n"] == cells["n"].max())] if several.any() else cells
+
+
 def tolerance_note(results: Results) -> str:
     """A sentence for captions on `best_tolerances`; empty if every method has one tolerance."""
     several = drawn_cells(results).groupby("method")["tolerance"].nunique() > 1

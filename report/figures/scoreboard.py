@@ -64,12 +64,22 @@ def _strips(scenes: pd.DataFrame) -> list[dict[str, float]]:
 
 def _cells(axes: Axes, cells: pd.DataFrame, labels: list[str], x: dict[str, float]) -> None:
     axes.set_yticks(range(len(labels)), labels)
-    left, right = axes.get_xlim()
-    points = 72 * 6.2 / (right - left)  # a cell's width
+    points = _width(axes)
     fastest = cells[cells["verdict"] == "within"].groupby("scene")["load_case_s"].min()
     for row in cells[cells["label"].isin(labels)].itertuples():
         at = x[str(row.scene)], labels.index(str(row.label))
         _cell(axes, at, row, fastest.get(row.scene, math.nan), points)
+
+
+def _width(axes: Axes) -> float:
+    """The width of a cell, points."""
+    left, right = axes.get_xlim()
+    return 72 * 6.2 / (right - left)
+
+
+def _size(text: str, points: float) -> float:
+    """The size of the type in which a text fits that width."""
+    return min(8.5, points / (0.58 * max(len(text), 4)))
 
 
 def _within(axes: Axes, lines: pd.DataFrame, x: float) -> None:
@@ -83,7 +93,9 @@ def _within(axes: Axes, lines: pd.DataFrame, x: float) -> None:
 
 
 def _headings(axes: Axes, scenes: pd.DataFrame, x: dict[str, float]) -> None:
-    axes.set_xticks([x[scene] for scene in scenes["scene"]], [*map(whole, scenes["active"])])
+    active = [*map(whole, scenes["active"])]
+    size = min(_size(text, _width(axes)) for text in active)
+    axes.set_xticks([x[scene] for scene in scenes["scene"]], active, fontsize=size)
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
     axes.grid(visible=False)
@@ -120,5 +132,5 @@ def _cell(axes: Axes, at: tuple[float, float], row: Any, fastest: float, points:
         text = SHORT.get(row.status, row.status.replace("_", " "))
     axes.add_patch(Rectangle((x - 0.48, y - 0.45), 0.96, 0.9, facecolor=face, hatch=hatch, linewidth=0))
     box = {"facecolor": "white", "pad": 1.0, "linewidth": 0} if hatch else None
-    fontsize = min(8.5, points / (0.58 * max(len(text), 4)))
-    axes.text(x, y, text, ha="center", va="center", fontsize=fontsize, color=ink, bbox=box, in_layout=False)
+    size = _size(text, points)
+    axes.text(x, y, text, ha="center", va="center", fontsize=size, color=ink, bbox=box, in_layout=False)

@@ -52,8 +52,9 @@ KNOWN = {
     "quadprog": (GREEN, "<"),
     "highs": (PURPLE, ">"),
 }
-#: For all other solvers, by name; each pair differs from those above. Open triangles mark unfinished runs.
-SPARE = [(color, marker) for marker in "dvH8" for color in (BLACK, GREY, ORANGE, BLUE, VERMILLION, SKY)]
+#: For all other solvers, by name; each pair differs from those above, and black is newton's alone. Open
+#: triangles mark unfinished runs.
+SPARE = [(color, marker) for marker in "dvH8" for color in (GREY, PURPLE, BLUE, ORANGE, VERMILLION, SKY)]
 #: Marker size, tint (0: the full colour, 1: white) and filled part of the marker of a solver's first,
 #: second, … variant of a form.
 VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "right"]], ...] = (

@@ -18,7 +18,7 @@ from report.analysis.outcomes import (
     with_outcomes,
 )
 from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, word
-from report.document.numbers import MISSING, counted, power, whole
+from report.document.numbers import MISSING, counted, listed, power, whole
 from report.figures.ladder_map import ladder_map
 from report.results.labels import in_order
 from report.results.reader import Results
@@ -74,9 +74,12 @@ def in_house(results: Results, cells: pd.DataFrame) -> str:
     known = results.problems.drop_duplicates("scene", keep="last").set_index("scene")["cond_K"]
     asked = own[own["scene"].map(known) <= CONDITION * (1 + 1e-6)]
     wrong = int((own["outcome"] == WRONG_CLAIMED).sum())
+    missed = asked.loc[~is_correct(asked), "solver"].value_counts()
+    others = listed([f"{name} ({count})" for name, count in missed.items()]) if len(missed) else ""
     return (
-        f"The in-house solvers are correct in {int(is_correct(asked).sum())} of "
-        f"{counted(len(asked), 'row')} up to cond(K) = 1e12; in all their {counted(len(own), 'row')}, "
+        f"The in-house solvers are correct in {len(asked) - missed.sum()} of "
+        f"{counted(len(asked), 'row')} up to cond(K) = 1e12{others and f', the others being of {others}'}; "
+        f"in all their {counted(len(own), 'row')}, "
         f"{wrong or 'no'} wrong {'answers are' if wrong > 1 else 'answer is'} reported as solved."
     )
 

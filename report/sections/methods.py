@@ -17,7 +17,8 @@ PLACE = Place(145)
 
 CAPTION = (
     "*Time and products with Q*: seconds per load case, and in brackets the products with Q per load case, "
-    "where a method counts them. A lower bound where it ran out of time."
+    "where a method counts them. Of several tolerances, the fastest within the limit, else the least wrong. "
+    "A lower bound where it ran out of time."
 )
 
 
@@ -27,6 +28,7 @@ def section(results: Results) -> Section | None:
     cells = cells.assign(products=[_products(cell.get("details")) for cell in records(cells)])
     if cells.loc[cells["products"].notna(), "solver"].nunique() < 2:
         return None
+    cells = _of_best_tolerance(cells)
     scenes = list(cells.sort_values(["n", "active"])["scene"].unique())
     lines = [_line(cells[cells["method"] == method]) for method in in_order(cells, "method")]
     columns = [word("method", "method"), *(Column(scene, _shown(scene)) for scene in scenes)]
@@ -40,6 +42,17 @@ def section(results: Results) -> Section | None:
 def _products(details: object) -> float:
     found = details.get("products") if isinstance(details, Mapping) else None
     return float("nan") if found is None else float(found)
+
+
+def _of_best_tolerance(cells: pd.DataFrame) -> pd.DataFrame:
+    """One cell for each method and scene: of its tolerances the fastest within the limit, else the least
+    wrong.
+    """
+    within = cells["verdict"] == "within"
+    keys = {"missed": ~within, "error": cells["displacement_error_mm"].mask(within, 0)}
+    ranked = cells.assign(**keys).sort_values(["missed", "error", "load_case_s"], kind="stable")
+    best = ranked.drop_duplicates(["method", "scene"]).drop(columns=list(keys))
+    return best.sort_index()
 
 
 def _line(cells: pd.DataFrame) -> dict[str, Any]:

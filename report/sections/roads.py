@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from report.analysis.drawn import with_rivals
 from report.analysis.roads import LOAD_CASES, STAGES, fastest, roads
 from report.analysis.seconds import seconds_text
 from report.analysis.standings import TIE
@@ -182,13 +183,14 @@ def _figure(lines: pd.DataFrame) -> Figure:
     caption = (
         "*From the scene to the answer of one load case*, the fastest first, with the total in seconds; "
         "on the scenes of each size with the fewest and the most active contacts. Answers outside the "
-        "limit are omitted."
+        "limit are omitted, and so are smaller sizes with one method."
     )
     return Figure("roads", caption, drawing)
 
 
 def _drawn_scenes(answered: pd.DataFrame) -> list[str]:
-    """Of each size the scenes with the fewest and the most active contacts."""
+    """Of each size the scenes with the fewest and the most active contacts, where methods can be compared."""
+    answered = with_rivals(answered, answered.groupby("scene")["method"].transform("nunique"))
     found: list[str] = []
     for _, of_size in answered.drop_duplicates("scene").sort_values(["n", "active", "scene"]).groupby("n"):
         ends = of_size["scene"].tolist()

@@ -50,7 +50,7 @@ def section(results: Results) -> Section | None:
         means += f" Of {CURVE_POINTS} or more tolerances of a solver, the best; the tables by scene have all."
     blocks: list[Block] = [
         Text("### The fastest of these solvers"),
-        Text("\n".join(words for n in results.sizes if (words := advice(results, n)))),
+        Text(advice(results)),
         Text(_small_print(results)),
         Figure(
             "summary",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from report.analysis.drawn import best_tolerances, omission_note, tolerance_note
+from report.analysis.drawn import best_tolerances, omission_note, tolerance_note, with_rivals
 from report.document.blocks import Figure, Place, Section
 from report.figures import style, times_panel
 from report.figures.lines import styles_of
@@ -15,17 +15,18 @@ PANEL = 3.0  # inches
 
 def section(results: Results) -> Section | None:
     cells = best_tolerances(results)
-    cells = cells[cells.groupby("n")["active"].transform("nunique") > 1]
+    sizes = cells.groupby(["n", "m"], dropna=False)
+    cells = cells[sizes["active"].transform("nunique") > 1]
     if cells["load_case_s"].notna().sum() == 0:
         return None
-    sizes = sorted(cells["n"].unique())
+    cells = with_rivals(cells, sizes["method"].transform("nunique"))
+    panels = [*cells.groupby(["n", "m"], dropna=False)]
     styles = styles_of(results, cells)
-    drawing = style.figure(PANEL * len(sizes) + 0.3)
-    for axes, n in zip(drawing.subplots(len(sizes), 1, squeeze=False)[:, 0], sizes, strict=True):
-        of_size = cells[cells["n"] == n]
+    drawing = style.figure(PANEL * len(panels) + 0.3)
+    places = drawing.subplots(len(panels), 1, squeeze=False)[:, 0]
+    for axes, ((n, m), of_size) in zip(places, panels, strict=True):
         times_panel.panel(axes, of_size, styles)
         axes.set_ylabel("time per load case, s")
-        m = of_size["m"].iloc[0]
         axes.set_title(f"n = {n:.0f}" + (f", m = {m:.0f}" if m > 0 else ""), pad=5)
     axes.set_xlabel("active contacts")
     handles = [*style.legend_entries(styles), *times_panel.entries(cells)]

@@ -12,16 +12,16 @@ import pandas as pd
 
 from harness.results.published import rows_of
 from harness.results.schema import DENSE_FORMS
-from report.analysis.outcomes import WRONG_CLAIMED, with_outcomes
+from report.analysis.outcomes import with_outcomes
 from report.analysis.precision import ACCURACIES, swept
 from report.analysis.relative import load_cases
 from report.analysis.roads import roads
 from report.analysis.standings import geometric_mean
 from report.document.blocks import Table, Text
-from report.document.numbers import counted, listed, power, significant
+from report.document.numbers import listed, power, significant
 from report.results.reader import Results
 from report.sections import methods
-from report.sections.ladders import in_house
+from report.sections.ladders import in_house, libraries
 from report.sections.recommendation import recommended
 from report.sections.series import compared
 
@@ -155,12 +155,7 @@ def ladder_score(hard: Results) -> str:
     """How often the in-house solvers are correct, and how often a library says solved of a wrong answer."""
     rungs = hard.on_ladders(True)
     cells = with_outcomes(rungs.cells)
-    others = cells[~cells["in_house"]]
-    wrong = int((others["outcome"] == WRONG_CLAIMED).sum())
-    return (
-        f"{in_house(rungs, cells)} Of {counted(len(others), 'row')} of the libraries, {wrong} "
-        f"{'is' if wrong == 1 else 'are'} wrong and reported as solved."
-    )
+    return f"{in_house(rungs, cells)} {libraries(cells)}"
 
 
 def accuracy_cost(accuracy: Results) -> pd.DataFrame:
