@@ -125,8 +125,8 @@ def test_in_house_solvers_are_held_to_their_bound_up_to_1e12(directory: Path) ->
     write_rows(directory, [r | (WRONG if r["solver"] == "ipm" and r["scene"] == EASY else {}) for r in ROWS])
     text = write(directory).read_text("utf-8")
     assert (
-        "correct in 2 of 3 rows up to cond(K) = 1e12, the others being of ipm (1); in all their 4 rows, 1 wrong "
-        "answer is reported" in text
+        "correct in 2 of 3 rows up to cond(K) = 1e12, the others being of ipm (1); in all their 4 rows, 1 "
+        "wrong answer is reported" in text
     )
 
 
