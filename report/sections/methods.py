@@ -87,8 +87,8 @@ def _advice(cells: pd.DataFrame, scenes: list[str]) -> str:
         words.append(
             f"Of the methods within the limit on every scene, the fastest per load case: {listed(wins)}."
         )
-        least = complete.dropna(subset="products").groupby("method")["products"].agg(["min", "max"])
-        least = least.sort_values("max")
+        least = complete.groupby("method")["products"].agg(["count", "min", "max"])
+        least = least[least["count"] == len(scenes)].sort_values("max")
         if len(least):
             few, many = whole(least["min"].iloc[0]), whole(least["max"].iloc[0])
             words.append(

@@ -17,9 +17,9 @@ def section(results: Results) -> Section | None:
     cells = best_tolerances(results)
     sizes = cells.groupby(["n", "m"], dropna=False)
     cells = cells[sizes["active"].transform("nunique") > 1]
+    cells = with_rivals(cells, sizes["method"].transform("nunique"))
     if cells["load_case_s"].notna().sum() == 0:
         return None
-    cells = with_rivals(cells, sizes["method"].transform("nunique"))
     panels = [*cells.groupby(["n", "m"], dropna=False)]
     styles = styles_of(results, cells)
     drawing = style.figure(PANEL * len(panels) + 0.3)
