@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 BLUE, VERMILLION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, ORANGE, BLACK, GREY = "#56B4E9", "#E69F00", "#000000", "#7F7F7F"
 ROSE, INDIGO, BROWN, PINK, CYAN = "#AA4466", "#332288", "#661100", "#FA9FB5", "#33BBEE"
+OLIVE = "#999933"
 
 WIDTH = 9.0  # inches; at 100 pixels per inch the width of a page of text on a screen
 DPI = 160
@@ -54,7 +55,7 @@ KNOWN = {
 }
 #: For all other solvers, by name; each pair differs from those above, and black is newton's alone. Open
 #: triangles mark unfinished runs.
-SPARE = [(color, marker) for marker in "dvH8" for color in (GREY, PURPLE, BLUE, ORANGE, VERMILLION, SKY)]
+SPARE = [(color, marker) for marker in "dvH8" for color in (GREY, OLIVE, BLUE, ORANGE, VERMILLION, SKY)]
 #: Marker size, tint (0: the full colour, 1: white) and filled part of the marker of a solver's first,
 #: second, … variant of a form.
 VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "right"]], ...] = (
