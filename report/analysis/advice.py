@@ -16,11 +16,11 @@ from .standings import TIE, geometric_mean, preferred, seconds_within, tie_of
 
 def advice(results: Results) -> str:
     """A paragraph for each size; those of two and more sizes with the same method and no other, in one."""
-    methods = {n: sorted(results.of_size(n)["method"].unique()) for n in results.sizes}
     lone: dict[str, list[int]] = {}
-    for n, (method, *others) in ((n, names) for n, names in methods.items() if names):
-        if not others:
-            lone.setdefault(method, []).append(n)
+    for n in results.sizes:
+        methods = results.of_size(n)["method"].unique()
+        if len(methods) == 1:
+            lone.setdefault(str(methods[0]), []).append(n)
     several = {method: sizes for method, sizes in lone.items() if len(sizes) > 1}
     shared = {n for sizes in several.values() for n in sizes}
     words = [_of_size(results, n) for n in results.sizes if n not in shared]

@@ -94,7 +94,7 @@ def _within(axes: Axes, lines: pd.DataFrame, x: float) -> None:
 
 def _headings(axes: Axes, scenes: pd.DataFrame, x: dict[str, float]) -> None:
     active = [*map(whole, scenes["active"])]
-    size = min(_size(text, _width(axes)) for text in active)
+    size = _size(max(active, key=len), _width(axes))
     axes.set_xticks([x[scene] for scene in scenes["scene"]], active, fontsize=size)
     axes.xaxis.tick_top()
     axes.tick_params(length=0)

@@ -75,10 +75,11 @@ def in_house(results: Results, cells: pd.DataFrame) -> str:
     asked = own[own["scene"].map(known) <= CONDITION * (1 + 1e-6)]
     wrong = int((own["outcome"] == WRONG_CLAIMED).sum())
     missed = asked.loc[~is_correct(asked), "solver"].value_counts()
-    others = listed([f"{name} ({count})" for name, count in missed.items()]) if len(missed) else ""
+    named = [f"{name} ({count})" for name, count in missed.items()]
+    others = f", the others being of {listed(named)}" if named else ""
     return (
         f"The in-house solvers are correct in {len(asked) - missed.sum()} of "
-        f"{counted(len(asked), 'row')} up to cond(K) = 1e12{others and f', the others being of {others}'}; "
+        f"{counted(len(asked), 'row')} up to cond(K) = 1e12{others}; "
         f"in all their {counted(len(own), 'row')}, "
         f"{wrong or 'no'} wrong {'answers are' if wrong > 1 else 'answer is'} reported as solved."
     )
