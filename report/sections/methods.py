@@ -51,8 +51,7 @@ def _of_best_tolerance(cells: pd.DataFrame) -> pd.DataFrame:
     within = cells["verdict"] == "within"
     keys = {"missed": ~within, "error": cells["displacement_error_mm"].mask(within, 0)}
     ranked = cells.assign(**keys).sort_values(["missed", "error", "load_case_s"], kind="stable")
-    best = ranked.drop_duplicates(["method", "scene"]).drop(columns=list(keys))
-    return best.sort_index()
+    return cells.loc[ranked.drop_duplicates(["method", "scene"]).index.sort_values()]
 
 
 def _line(cells: pd.DataFrame) -> dict[str, Any]:
@@ -92,8 +91,7 @@ def _advice(cells: pd.DataFrame, scenes: list[str]) -> str:
         if len(least):
             few, many = whole(least["min"].iloc[0]), whole(least["max"].iloc[0])
             words.append(
-                f"Where a product with Q is what costs, as in the sparse form, the fewest: "
-                f"**{least.index[0]}**, {span(few, many)} per load case."
+                f"Of products with Q, the fewest: **{least.index[0]}**, {span(few, many)} per load case."
             )
     missed = cells[cells["verdict"] != "within"].groupby("method", sort=False)
     if len(missed):
