@@ -25,9 +25,6 @@ TOLERANCES = {name: 1e-14 if name == "ipm" else 1e-10 for name in modules() if i
 #: These end with the right contact set and solve its equations: no tolerance is left in their answer.
 ACTIVE_SET = ("gi", "newton", "ipm-fast", "quadprog", "daqp", "nnls")
 
-#: SciPy's minimisers, which end where little changes any more, and say that this is inaccurate.
-MINIMISERS = ("l-bfgs-b", "slsqp", "trust-constr")
-
 
 def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Answer, Vector | None]:
     """The solver's answer, and its displacements where it has any."""

@@ -15,7 +15,7 @@ from solvers.registry import in_house, make_solver, modules, solver_names, solve
 
 NAMES = solver_names()
 IN_HOUSE = ["gi", "ipm", "ipm-fast", "lemke", "mprgp", "newton", "projected-gauss-seidel", "projected-newton"]
-LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp", "l-bfgs-b", "nnls", "slsqp", "trust-constr")
+LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp", "l-bfgs-b", "nnls")
 
 
 def test_solvers_are_found_by_their_files() -> None:
@@ -39,7 +39,7 @@ def test_versions_are_those_installed(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "options", "words"),
     [
-        ("osqpp", {}, ["osqpp", "did you mean osqp or slsqp?"]),
+        ("osqpp", {}, ["osqpp", "did you mean osqp"]),
         ("osqp", {"polish": True, "speed": 9}, ["options.polish", "options.speed", "polishing"]),
         ("osqp", {"polishing": 1}, ["solver osqp", "options.polishing = 1", "False, True"]),
         ("clarabel", {"direct_solve_method": "mumps"}, ["'mumps'", "'faer', 'qdldl', 'auto'"]),

@@ -7,34 +7,55 @@ when the objective no longer changes in its last digit, which it also calls a su
 
 from __future__ import annotations
 
+from typing import ClassVar
+
+import numpy as np
 from scipy.optimize import minimize
 
 from problems.errors import InputError
 from problems.forms.assembly import Vector
-from solvers.adapter import Converted
-from solvers.base import Answer, LoadCase, Status
-from solvers.minimize import Minimizer, Objective
+from solvers.adapter import Converted, dense
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, WarmStart
 
 LIMIT = 1_000_000  # iterations, and products with Q
 
 
-class LBfgsB(Minimizer):
-    """maxcor : pairs of vectors in the approximate Hessian."""
+class LBfgsB(Solver):
+    """It starts from λ = 0 or a warm start. maxcor : pairs of vectors in the approximate Hessian."""
+
+    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+    distribution = "scipy"
 
     def __init__(self, *, maxcor: int = 10) -> None:
         if type(maxcor) is not int or maxcor < 1:
             raise InputError.one("solver l-bfgs-b", "options.maxcor", maxcor, "must be a whole number from 1")
         self.maxcor = maxcor
 
+    def convert(self, problem: Problem) -> Converted:
+        return Converted(problem, dense(problem.blocks))
+
+    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> tuple[Converted, Vector]:
+        return state, np.zeros_like(load.p)
+
+    def update(
+        self, state: Converted, ready: object, load: LoadCase, tolerance: float, start: WarmStart
+    ) -> tuple[Converted, Vector]:
+        return state, np.maximum(start.lam, 0.0)
+
     def solve(self, ready: tuple[Converted, Vector], load: LoadCase, tolerance: float) -> Answer:
         state, start = ready
-        objective = Objective(state.P, load.p)
+
+        def objective(lam: Vector) -> tuple[float, Vector]:
+            """½λᵀQλ − pᵀλ, N·mm, and its gradient y = Qλ − p, mm."""
+            y = state.P @ lam - load.p
+            return float(lam @ (y - load.p)) / 2, y
+
         found = minimize(
             objective,
             start,
             jac=True,
             method="L-BFGS-B",
-            bounds=objective.bounds,
+            bounds=[(0.0, None)] * len(load.p),
             options={
                 "ftol": 0.0,
                 "gtol": tolerance,
@@ -44,7 +65,7 @@ class LBfgsB(Minimizer):
             },
         )
         message = str(found.message)
-        details = {"products": objective.products, "message": message}
+        details = {"products": int(found.nfev), "message": message}
         status: Status = "iteration_limit" if found.status == 1 else "inaccurate"
         if found.success and "PROJECTED GRADIENT" in message:
             status = "solved"
