@@ -1,17 +1,23 @@
-"""Loads a user's own solver: a Python file with one subclass of solvers.base.Solver."""
+"""A user's own solver: a Python file with one subclass of solvers.base.Solver, and what it imports."""
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import inspect
 import sys
+import sysconfig
 import traceback
+from collections.abc import Iterable, Iterator
+from importlib.machinery import all_suffixes
 from pathlib import Path
 from types import ModuleType
 
 from problems.errors import InputError
 
 from .base import Solver
+
+PROJECT = ("harness", "problems", "report", "solvers")
 
 
 def load_plugin(path: Path) -> type[Solver]:
@@ -38,6 +44,69 @@ def load_plugin(path: Path) -> type[Solver]:
         message = f"importing the file failed with {type(error).__name__}: {error}"
         raise InputError.one(path, f"line {line}", type(error).__name__, message) from error
     return solver_class(module, path)
+
+
+def own_files(path: Path) -> list[Path]:
+    """The file and the user's own code that it imports, directly or not, at its head or when it solves.
+
+    The user's own lies in the file's folder or in one of sys.path, which the plug-in may have extended, and
+    is neither installed nor of this project. A string that names a module or a file of code there is taken
+    for an import of it. Names that are computed, and files of data, are not seen.
+    """
+    path = path.resolve()
+    folders = {path.parent, *_own_folders()}
+    found: set[Path] = set()
+    unread = [path]
+    while unread:
+        file = unread.pop()
+        if file not in found:
+            found.add(file)
+            unread += [each.resolve() for each in _imported(file, folders)]
+    return sorted(found)
+
+
+def _own_folders() -> Iterator[Path]:
+    """The folders of sys.path that hold neither the standard library nor installed packages."""
+    standard = Path(sysconfig.get_path("stdlib"))
+    for folder in map(Path, sys.path):
+        installed = {"site-packages", "dist-packages"} & set(folder.parts)
+        if not (installed or standard in (folder, *folder.parents)):
+            yield folder.resolve()
+
+
+def _imported(file: Path, folders: Iterable[Path]) -> Iterator[Path]:
+    """The files of code in the folders that a file imports, packages' `__init__` included."""
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError):  # compiled, or no Python
+        return
+    for node in ast.walk(tree):
+        within = folders
+        if isinstance(node, ast.ImportFrom):
+            within = list(file.parents)[node.level - 1 : node.level] if node.level else folders
+            module = f"{node.module}." if node.module else ""
+            names = [module + alias.name for alias in node.names]
+        elif isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            names = [node.value]
+            if node.value.endswith(tuple(all_suffixes())):
+                yield from (each for folder in folders if (each := folder / node.value).is_file())
+        else:
+            continue
+        for parts in (name.split(".") for name in names):
+            own = within is not folders or parts[0] not in PROJECT
+            if own and all(part.isidentifier() or part == "*" for part in parts):
+                yield from _modules(within, parts)
+
+
+def _modules(folders: Iterable[Path], parts: list[str]) -> Iterator[Path]:
+    """The files of a dotted name and of the packages that it is in."""
+    for folder in folders:
+        for k in range(1, len(parts) + 1):
+            place = folder.joinpath(*parts[:k])
+            files = (f"{name}{suffix}" for suffix in all_suffixes() for name in (place, place / "__init__"))
+            yield from (Path(each) for each in files if Path(each).is_file())
 
 
 def solver_class(module: ModuleType, path: Path) -> type[Solver]:

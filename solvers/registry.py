@@ -21,7 +21,7 @@ from problems.errors import Fault, InputError
 from problems.input.validation import unknown
 
 from .base import Solver
-from .plugin import load_plugin, solver_class
+from .plugin import load_plugin, own_files, solver_class
 from .scaling import Scaled
 
 METHODS, LIBRARIES = "solvers.methods", "solvers.libraries"
@@ -71,9 +71,10 @@ def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) 
 
 
 def solver_version(name: str, plugin: Path | None = None) -> str:
-    """The version of the library; for a plug-in a hash of its file; "unknown" if there is none."""
+    """The version of the library; for a plug-in a hash of its own files; "unknown" if there is none."""
     if plugin is not None and name == plugin.stem:
-        return "sha256:" + hashlib.sha256(plugin.read_bytes()).hexdigest()[:12]
+        contents = sorted(hashlib.sha256(file.read_bytes()).digest() for file in own_files(plugin))
+        return "sha256:" + hashlib.sha256(b"".join(contents)).hexdigest()[:12]
     if in_house(name):
         return __version__
     try:

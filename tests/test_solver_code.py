@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
 from harness.measurement.solver_code import code_of
 from problems.storage.fingerprint import ROOT, fingerprint
-from solvers.registry import in_house, make_solver, modules
+from solvers.plugin import own_files
+from solvers.registry import in_house, make_solver, modules, solver_version
 
 
 @pytest.fixture
@@ -116,3 +118,66 @@ def test_a_plugin_depends_on_what_it_imports(package: Path, tmp_path: Path, line
     (package / "kkt.py").write_text("EPS = 0.0\n")
     after = [hash_of(file, package) for file in (mine, alone)]
     assert [a == b for a, b in zip(after, before, strict=True)] == [False, True]
+
+
+HELPED = """
+import sys
+from pathlib import Path
+sys.path.insert(0, str(Path(__file__).parent / "lib"))
+from solvers.base import Answer, Solver
+
+class Helped(Solver):
+    forms = ("dual",)
+    def solve(self, ready, load, tolerance):
+        {line}
+        return Answer("solved", load.p * 0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "helper"),
+    [
+        ("import helper", "helper.py"),
+        ("import importlib; h = importlib.import_module('helper')", "helper.py"),
+        ("exec(Path(__file__).with_name('my-helper.py').read_text())", "my-helper.py"),
+        ("import far", "lib/far.py"),
+        ("import package.module", "package/__init__.py"),
+        ("from package.module import f", "package/deep.py"),  # package.module imports it
+        ("from package import module", "package/module.py"),
+        ("import compiled", "compiled.so"),
+        ("import broken", "broken.py"),
+    ],
+)
+def test_a_plugin_is_another_when_its_helper_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, helper: str
+) -> None:
+    """In the fingerprint and in the version, however lazily it is imported; other files do not count."""
+    monkeypatch.setattr("sys.path", [str(tmp_path), *sys.path])
+    files = ["helper.py", "my-helper.py", "lib/far.py", "compiled.so", "other.py", "data.json"]
+    files += [f"package/{name}.py" for name in ("__init__", "module", "deep", "other")]
+    for name in files:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("def f(): return 1\n")
+    (tmp_path / "package" / "module.py").write_text("def f():\n    from .deep import f\n    return f()\n")
+    (tmp_path / "broken.py").write_text("def f( return 1\n")
+    mine = tmp_path / "mine.py"
+    mine.write_text(HELPED.format(line=line))
+
+    def identity() -> tuple[str, str]:
+        return code_of(make_solver("mine", {}, mine)), solver_version("mine", mine)
+
+    before = identity()
+    for name in ("other.py", "data.json", "package/other.py"):
+        (tmp_path / name).write_text("def f(): return 2\n")
+    assert identity() == before
+    text = (tmp_path / helper).read_text()
+    (tmp_path / helper).write_text(text + "\nx = 2\n")
+    assert [now == then for now, then in zip(identity(), before, strict=True)] == [False, False]
+
+
+def test_what_is_installed_and_the_project_is_not_a_plugins_own(tmp_path: Path) -> None:
+    mine = ROOT / "examples" / "my_solver.py"
+    assert own_files(mine) == [mine]
+    alone = tmp_path / "alone.py"
+    alone.write_text("import numpy.linalg\nfrom solvers import kkt\nfrom ........ import x\n")
+    assert own_files(alone) == [alone.resolve()]

@@ -1,7 +1,8 @@
 """The fingerprint in each row of the code that can change a solver's answer or its time.
 
 The code is the solver's own file and what it imports from the package `solvers`, directly or indirectly,
-never another solver's. The version of the library is a field of its own.
+never another solver's; and of a plug-in, what it imports of the user's own. The version of the library is a
+field of its own.
 """
 
 from __future__ import annotations
@@ -9,12 +10,16 @@ from __future__ import annotations
 import inspect
 from pathlib import Path
 
-from problems.storage.fingerprint import fingerprint
+from problems.storage.fingerprint import ROOT, fingerprint
 from solvers.base import Solver
+from solvers.plugin import own_files
 from solvers.scaling import Scaled
 
 
 def code_of(solver: Solver) -> str:
     """The fingerprint of a solver of the package, or of a plug-in."""
     made = [solver, solver.solver] if isinstance(solver, Scaled) else [solver]
-    return fingerprint([Path(inspect.getfile(type(each))) for each in made], within=["solvers"])
+    files = [Path(inspect.getfile(type(each))) for each in made]
+    if ROOT / "solvers" not in files[0].parents:
+        files = own_files(files[0])
+    return fingerprint(files, within=["solvers"])

@@ -36,7 +36,11 @@ def fingerprint(files: Iterable[Path], within: Iterable[str] = (), root: Path = 
 @cache
 def _read(path: Path, root: Path, changed: int) -> tuple[str, tuple[Path, ...]]:
     """The hash of one file's code and the files below root that it imports; `changed` renews the cache."""
-    tree = ast.parse(path.read_bytes())
+    content = path.read_bytes()
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError):  # compiled, or no Python
+        return hashlib.sha256(content).hexdigest(), ()
     imported = tuple(_imported(path, tree, root))
     code = ast.dump(_WithoutText().visit(tree))
     return hashlib.sha256(code.encode()).hexdigest(), imported
