@@ -308,8 +308,9 @@ def test_a_grid_for_paraview_covers_the_junction_of_each_part(tmp_path: Path) ->
         areas = (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]) / 2  # all turn the same way
         np.testing.assert_allclose(areas, 20.0 * 20.0)
         assert len(cells) == 40
-    assert data["contact_force_N"][:55].sum() == pytest.approx(found["lam"][:55].sum())
-    assert data["contact_force_N"][55:].sum() == pytest.approx(found["lam"].sum())
+    between, on_tool = np.split(found["lam"], 2)
+    assert data["contact_force_N"][:55].sum() == pytest.approx(between.sum())
+    assert data["contact_force_N"][55:].sum() == pytest.approx((on_tool - between).sum())
     np.testing.assert_array_equal(data["gap_after_mm"][:55], found["gap_after"][:55])
     np.testing.assert_array_equal(
         data["gap_after_mm"][55:], np.minimum(found["gap_after"][:55], found["gap_after"][55:])
@@ -332,10 +333,19 @@ def test_a_vtu_file_reads_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(part, np.repeat([0.0, 1.0], 55))
     # Part a meets b alone, part b meets a and the tool: the contacts of the two stand at the same nodes.
     between, on_tool = np.split(found["lam"], 2)
-    np.testing.assert_array_equal(force, np.concatenate([between, between + on_tool]))
+    np.testing.assert_array_equal(force, np.concatenate([between, on_tool - between]))
     for field, name in ((before, "gap_before"), (after, "gap_after")):
         gap, to_tool = np.split(found[name], 2)
         np.testing.assert_array_equal(field, np.concatenate([gap, np.minimum(gap, to_tool)]))
+
+
+def test_the_forces_on_the_nodes_are_A_lambda() -> None:
+    """A = (2, −3, 0): entries other than ±1 count."""
+    record = {"n": 3, "m": 1, "parts": [{"start": 0, "stop": 3}]}
+    data = {"A_data": [2.0, -3.0], "A_indices": [0, 1], "A_indptr": [0, 2], "lam": [1.25]}
+    data |= {"nodes": np.zeros((3, 2)), "x": np.zeros(3), "gap_before": [1.0], "gap_after": [0.0]}
+    given = {name: np.array(values) for name, values in data.items()}
+    assert grid_with_fields(record, given)[2]["contact_force_N"].tolist() == [2.5, -3.75, 0.0]
 
 
 def test_without_meshio_the_page_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,8 +14,8 @@ def write_vtu(path: Path, record: dict[str, Any], arrays: dict[str, Any]) -> str
     """Write the parts' junction nodes with their fields. Returns the file's name, or why it was not written,
     since meshio is optional.
 
-    Point data: displacement (0, 0, x) in mm, to warp by; part; contact force on the node, N; the smallest
-    gap before and after at its contacts, mm, NaN if it has none.
+    Point data: displacement (0, 0, x) in mm, to warp by; part; Aλ, the force with which the node pushes on
+    what it touches, N; the smallest gap before and after at its contacts, mm, NaN if it has none.
     """
     try:
         import meshio
@@ -32,7 +32,7 @@ def grid_with_fields(
     nodes, n = arrays["nodes"], record["n"]
     force, before, after = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)
     columns = np.repeat(np.arange(record["m"]), np.diff(arrays["A_indptr"]))
-    np.add.at(force, arrays["A_indices"], np.nan_to_num(arrays["lam"])[columns])
+    np.add.at(force, arrays["A_indices"], arrays["A_data"] * np.nan_to_num(arrays["lam"])[columns])
     np.fmin.at(before, arrays["A_indices"], arrays["gap_before"][columns])
     np.fmin.at(after, arrays["A_indices"], arrays["gap_after"][columns])
     part = np.concatenate([np.full(p["stop"] - p["start"], k) for k, p in enumerate(record["parts"])])
