@@ -230,6 +230,8 @@ BAD: dict[str, tuple[Any, int, str]] = {
     "x.bin": (np.zeros(20), 2, "suffix"),
     "words.txt": ("zero one two", 2, "numbers"),
     "heading.csv": ("a,b\n1,2\n", 2, "displacement_mm"),
+    "coordinate.csv": ("x,y,displacement_mm\n" + "0,0,0\n" * 20, 2, "one of them alone"),
+    "forces.csv": ("force_N,lam\n" + "0,0\n" * 10, 2, "one of them alone"),
     "empty.csv": ("", 2, "file"),
 }
 

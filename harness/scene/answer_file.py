@@ -23,7 +23,8 @@ def read_answer(path: Path) -> dict[str, Vector]:
     """What the file holds: "x" (displacements), "lam" (contact forces), or "" for a vector without a name.
 
     An .npz has arrays x or lam, or one alone; a .csv has a header with a column x or displacement_mm, lam or
-    force_N (as in nodes.csv and contacts.csv of `solve`), or one column of numbers. Raises InputError.
+    force_N (as in nodes.csv and contacts.csv of `solve`), never both of a pair, or one column of numbers.
+    Raises InputError.
     """
     regular_file(path, "file", MIB)
     try:
@@ -70,6 +71,9 @@ def _columns(path: Path) -> dict[str, Vector]:
     named = {}
     for name, headings in HEADINGS.items():
         known = [heading.index(each) for each in headings if each in heading]
+        if len(known) > 1:
+            both = ", ".join(heading[k] for k in known)
+            raise InputError.one(path, "columns", both, "one of them alone: the other is not what is judged")
         if known:
             named[name] = np.array([float(row[known[0]]) for row in rest])
     return named or {"": np.array([float(row[heading.index(_only(path, heading))]) for row in rest])}
