@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import csv
 import json
+from collections import Counter
+from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
+from long import draws
 from small import solve_by_nnls
 from strip import write_strip
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
+from harness.results import records, schema
 from harness.scene.allowed_gap import checked
+from harness.series import store
+from harness.verification.gap_error import GapError
 from problems.build import load_case, prepared
+from problems.forms.assembly import Assembly
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 
@@ -50,6 +59,75 @@ def test_a_gap_is_larger_only_beyond_its_uncertainty(
     assert found["contacts"] == contacts
     assert found["share"] == len(contacts) / 4
     assert found["pairs"] == {1: ["b – tool"], 2: ["a – b", "b – tool"]}.get(len(contacts), [])
+
+
+@dataclass
+class Drawn:
+    """A problem whose exact gaps are those of exact displacements at most `error_mm` from the given x."""
+
+    assembly: Assembly
+    g: np.ndarray
+    x: np.ndarray
+    error_mm: float
+    exact: list[Fraction]
+
+
+def drawn(rng: np.random.Generator) -> Drawn:
+    """Up to five entries a contact, of any size; x* at a corner of its box, at worst for one of the gaps."""
+    n, m = int(rng.integers(1, 6)), int(rng.integers(1, 4))
+    A = rng.standard_normal((n, m)) * np.exp2(rng.integers(-3, 4, (n, m)))
+    x = rng.standard_normal(n) * np.exp2(rng.integers(-20, 50))
+    g = A.T @ x + rng.uniform(0, 1, m) if rng.random() < 0.8 else rng.uniform(0, 1, m)
+    error_mm = float(rng.choice([0.0, 1e-9, 0.01]))
+    away = Fraction(error_mm) * int(rng.choice([-1, 1]))
+    worst = np.sign(A[:, rng.integers(m)]).astype(int)
+    moved = [Fraction(v) + away * int(s) for v, s in zip(x, worst, strict=True)]
+    exact = [
+        Fraction(g[j]) - sum((Fraction(A[i, j]) * moved[i] for i in range(n)), Fraction()) for j in range(m)
+    ]
+    return Drawn(Assembly((np.eye(n),), sp.csc_array(A)), g, x, error_mm, exact)
+
+
+def test_pass_and_fail_are_those_of_the_exact_gaps() -> None:
+    """In rational numbers, beside the limit, where the rounding of g − Aᵀx is larger than the gap or not."""
+    rng, said = np.random.default_rng(0), Counter[object]()
+    for _ in range(draws(3000, 100_000)):
+        made = drawn(rng)
+        gap = made.g - made.assembly.A.T @ made.x
+        e = GapError.of(made.assembly)(made.g, made.x, made.error_mm)
+        for exact, computed, error in zip(made.exact, gap, e, strict=True):
+            assert abs(Fraction(computed) - exact) <= Fraction(error)
+        largest = max(made.exact)
+        beside = float(largest) + rng.choice([0.0, 1e-3, 0.9, 1.1, 2.5]) * rng.choice([-1, 1]) * e.max()
+        allowed = max(float(np.nextafter(beside, rng.choice([-np.inf, np.inf]))), 0.0)
+        found = checked(allowed, gap, e, [])["exceeded"]
+        assert found is None or found == (largest > Fraction(allowed))
+        assert found is not None or e.max() > allowed or abs(largest - Fraction(allowed)) <= 2.1 * e.max()
+        said[found] += 1
+    assert min(said[outcome] for outcome in (True, False, None)) > 100
+
+
+def test_the_error_of_a_gap_is_no_wider_than_its_terms() -> None:
+    """‖a‖₁ e, or three roundings of |g| + |a|ᵀ|x| for one entry."""
+    of = GapError.of(Assembly((np.eye(1),), sp.csc_array([[3.0]])))
+    assert of(np.array([1.0]), np.array([0.0]), 1e-3) == pytest.approx(3e-3, rel=0.011)
+    assert of(np.array([6.0]), np.array([2.0]), 0.0) == pytest.approx(3 * 2.0**-53 * 12, rel=0.011)
+    assert of(np.array([6.0]), np.array([2.0]), np.inf) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("f", "g", "allowed", "passes"),
+    [(7e14, 4.9e14 + 0.0625, 0.07, False), (770000000000049.4, 539000000000034.6, 0.1, True)],
+)
+def test_a_gap_lost_in_rounding_cannot_be_told(
+    f: float, g: float, allowed: float, passes: bool, tmp_path: Path
+) -> None:
+    """The gaps are 0.094 and 0.097 mm; computed they are 0.0625 and 0.125."""
+    assert (Fraction(g) - Fraction(0.7) * Fraction(f) <= Fraction(allowed)) is passes
+    assert (g - 0.7 * f <= allowed) is not passes
+    np.savez(tmp_path / "own.npz", K=[[1.0]], A=[[0.7]], f=[f], g=[g])
+    done = harness("solve", tmp_path / "own.npz", "--allow-gap", allowed, "--out", tmp_path / "out")
+    assert done.exit_code == 3, done.output
 
 
 def harness(*words: object) -> Result:
@@ -120,3 +198,16 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     assert (again.exit_code, "PASS: in none of 12 cases" in again.stdout) == (0, True)
     unknown = harness(*asked, "--allow-gap", 1e-16, "--out", tmp_path)
     assert (unknown.exit_code, "In 12 of 12 cases it cannot be told" in unknown.stdout) == (3, True)
+
+
+def test_a_series_whose_rows_do_not_say_how_well_gaps_are_known_cannot_be_told(
+    gap: tuple[Path, np.ndarray], tmp_path: Path
+) -> None:
+    asked = ("series", gap[0], "--cases", 3, "--check", 0, "--threads", 1, "--out", tmp_path)
+    assert harness(*asked).exit_code == 0
+    rows = list(store.rows(tmp_path))
+    assert all(row["gap_error_mm"] >= row["bound_mm"] for row in rows)
+    records.rewrite(
+        tmp_path / schema.CASES, [{k: row[k] for k in row if k != "gap_error_mm"} for row in rows]
+    )
+    assert harness(*asked, "--allow-gap", 9.0).exit_code == 3

@@ -154,5 +154,5 @@ def series(
 
             console.print(f"Report: {write(out)}")
         if code == DONE and allow_gap is not None:
-            code = check_allowed_gap(job, out, allow_gap, console)
+            code = check_allowed_gap(out, allow_gap, console)
         raise typer.Exit(code)

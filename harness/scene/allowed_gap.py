@@ -1,8 +1,8 @@
 """Whether the remaining gap is larger than allowed, and where.
 
-The displacements of an answer are known up to e mm, so the gap of contact j, y_j = g_j − a_jᵀx, is known up
-to e_j = ‖a_j‖₁ e. It is larger than allowed where y_j − e_j is, and not where y_j + e_j is not; between the
-two nothing can be said, nor of an allowed gap below e_j.
+The gap y_j of contact j is known up to e_j (harness/verification/gap_error.py). It is larger than allowed
+where y_j − e_j is, and not where y_j + e_j is not; between the two nothing can be said, nor of an allowed gap
+below the largest e_j.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rich.table import Table
 
 from harness.terminal.exit_codes import DONE, GAP_EXCEEDED, NOTHING_JUDGED
 from problems.errors import InputError
-from problems.forms.assembly import Assembly, Vector
+from problems.forms.assembly import Vector
 
 SHOWN = 5  # contacts on the terminal
 
@@ -25,12 +25,6 @@ def refuse_unusable(allowed_mm: float | None) -> None:
     """Raise InputError unless it is a length, or None."""
     if allowed_mm is not None and not 0 <= allowed_mm < inf:
         raise InputError.one("--allow-gap", "gap, mm", allowed_mm, "must be 0 or larger, and finite")
-
-
-def uncertainty_mm(assembly: Assembly, error_mm: float) -> Vector:
-    """e_j (m,), mm, from the bound on the error of the displacements."""
-    norms = np.asarray(abs(assembly.asked_contacts).sum(axis=0)).ravel()
-    return norms * error_mm if np.isfinite(error_mm) else np.full(len(norms), inf)
 
 
 def checked(

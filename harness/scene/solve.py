@@ -23,6 +23,7 @@ from harness.planning.road import Choice, chosen_form
 from harness.results.machine import machine, resident_mib
 from harness.results.provenance import provenance
 from harness.terminal.exit_codes import DONE, FAILED
+from harness.verification.gap_error import GapError
 from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
@@ -171,7 +172,7 @@ def solve(
     gap = load.g - data.assembly.A.T @ x
     if allow_gap_mm is not None:
         error_mm = known.bound_mm + (record["judged_error_mm"] or 0.0)
-        uncertainty = allowed_gap.uncertainty_mm(data.assembly, error_mm)
+        uncertainty = GapError.of(data.assembly)(load.g, x, error_mm)
         record["allowed_gap"] = allowed_gap.checked(allow_gap_mm, gap, uncertainty, record["pairs"])
     save(out, record, data.assembly, load, x, lam)
     with steps.step("pictures and files"):

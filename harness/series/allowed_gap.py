@@ -9,22 +9,18 @@ from rich.console import Console
 from rich.table import Table
 
 from harness.terminal.exit_codes import DONE, GAP_EXCEEDED, NOTHING_JUDGED
-from problems.build import prepared
-
-from .session import Job
 
 SHOWN = 5  # contacts on the terminal
 
 
-def check(job: Job, directory: Path, allowed_mm: float, console: Console) -> int:
+def check(directory: Path, allowed_mm: float, console: Console) -> int:
     """Print the outcome, write DIRECTORY/allowed-gap.csv and .png; returns the exit code."""
     from report.analysis.allowed_gap import exceeding  # slow to import: not before the first row
     from report.results.series import read
     from report.writers.allowed_gap import write
 
-    A = prepared(job.scene, form=job.form).assembly.asked_contacts
     series = read(directory)
-    found = exceeding(series, allowed_mm, float(abs(A).sum(axis=0).max()))
+    found = exceeding(series, allowed_mm)
     written = write(directory, series, found)
     if len(found.cases):
         worst, share = found.cases.iloc[0], len(found.cases) / found.answered

@@ -21,6 +21,7 @@ from harness.results.records import Row
 from harness.verification.batched.assess import Assessment, assess
 from harness.verification.batched.bound import Bound
 from harness.verification.batched.sparse import SparseAssessor
+from harness.verification.gap_error import GapError
 from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
 from problems.build import prepared
@@ -102,6 +103,7 @@ class SeriesSession:
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)
         self.assess = assessor(self.data, job.limit_mm)
+        self.gap_error = GapError.of(self.data.assembly)
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.options, job.plugin)
         self.row: Row = {}  # of the case being solved
@@ -216,9 +218,11 @@ class SeriesSession:
         }
         if assessment is None:
             return Result(row, None)
+        gap_error = self.gap_error(attempt.load.g, assessment.x, assessment.bound_mm)
         row |= {
             "active": assessment.active,
             "bound_mm": assessment.bound_mm,
+            "gap_error_mm": float(gap_error.max()),
             **{
                 name: getattr(assessment, name)
                 for name in ("primal_residual", "dual_residual", "duality_gap")

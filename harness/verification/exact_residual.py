@@ -14,6 +14,7 @@ additions are exact there. Both are counted. What overflows ends as infinity or 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -88,7 +89,7 @@ class ErrorFreeSum:
         return Enclosure(value, 1.01 * error)
 
 
-def gamma(k: int) -> float:
+def gamma(k: Any) -> Any:
     """γ_k = ku/(1 − ku)."""
     return k * U / (1 - k * U)
 

@@ -1,8 +1,8 @@
 """In how many cases of a series the remaining gap is larger than allowed, and at which contacts.
 
-A displacement of a case is known up to its bound e, a gap up to norm · e, norm = maxⱼ ‖a_j‖₁. A case exceeds
-the allowed gap if its largest gap does by more than that, and is undecided if it does by less. The gaps of
-the contacts are stored as float32, whose rounding, 6e-8 of the gap, is added.
+The gaps of a case are known up to its gap_error_mm. It exceeds the allowed gap if its largest gap does by
+more than that, and is undecided if it does by less, or if its row does not say how well its gaps are known.
+The gaps of the contacts are stored as float32, whose rounding, 6e-8 of the gap, is added.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class Exceeding:
     largest: Array
 
 
-def exceeding(series: Series, allowed_mm: float, norm: float) -> Exceeding:
+def exceeding(series: Series, allowed_mm: float) -> Exceeding:
     """The check of a series."""
-    bounds = series.cases["bound_mm"].fillna(np.inf).to_numpy()
+    known = series.cases["gap_error_mm"].fillna(np.inf).to_numpy()
     gaps = series.cases["max_gap_mm"].to_numpy()
-    e = norm * bounds + ROUNDING * abs(gaps)
+    e = known + ROUNDING * abs(gaps)
     told = allowed_mm >= e
     larger = told & (gaps - e > allowed_mm)
     undecided = ~told | (~larger & (gaps + e > allowed_mm))
