@@ -1,4 +1,6 @@
-"""A Chromium without a window or a network, for the tests of the page; where none is installed, they skip."""
+"""A Chromium without a window or a network, for the tests of the page; where none is installed, they skip,
+and the summary says so.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +12,7 @@ from typing import Any
 
 import pytest
 
+NO_BROWSER = "no browser: "  # how the reason of these skips begins
 FLAGS = (
     *("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync"),
     *("disable-background-networking", "disable-component-update", "window-size=1400,1000"),
@@ -22,8 +25,8 @@ def browser(profile: Path) -> Iterator[Any]:
     driver = shutil.which("chromedriver")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if not (driver and chromium):
-        pytest.skip("no Chromium with its driver is installed")
-    webdriver = pytest.importorskip("selenium.webdriver")
+        pytest.skip(f"{NO_BROWSER}no Chromium with its driver is installed")
+    webdriver = pytest.importorskip("selenium.webdriver", reason=f"{NO_BROWSER}selenium is not installed")
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

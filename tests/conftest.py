@@ -1,4 +1,6 @@
-"""What all tests share: a cache of their own, so that none reads or fills the user's; quick tests first."""
+"""What all tests share: a cache of their own, so that none reads or fills the user's; quick tests first; a
+warning where the page was tried in no browser.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from browser import NO_BROWSER
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 
@@ -25,3 +28,12 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Quick tests first."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """What no test saw is said in one line: judge.js runs in a browser only."""
+    reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
+    missing = [reason.partition(NO_BROWSER)[2] for reason in reasons if NO_BROWSER in reason]
+    if missing:
+        text = f"WARNING: the page was not tried: {len(missing)} browser tests skipped, {missing[0]}"
+        terminalreporter.write_line(text, yellow=True, bold=True)

@@ -12,6 +12,8 @@ EXACT = "harness/verification/exact_residual.py"
 LENGTH = "harness/verification/length.py"
 DEFINITE = "harness/verification/definite.py"
 JUDGE = "harness/verification/judge.py"
+BASELINE = "harness/verification/baseline.py"
+GAP_ERROR = "harness/verification/gap_error.py"
 SPARSE_DEFINITE = "harness/verification/sparse_definite.py"
 SPARSE_BOUND = "harness/verification/sparse_bound.py"
 SLICED = "harness/verification/sliced_forces.py"
@@ -254,6 +256,20 @@ MUTANTS = [
     Mutant(JUDGE, "REFERENCE_SHARE * limit_mm", "limit_mm"),
     Mutant(JUDGE, "REFERENCE_SHARE * limit_mm", "2 * REFERENCE_SHARE * limit_mm"),
     Mutant(JUDGE, "if not reference.bound_mm <= ", "if reference.bound_mm > "),
+    Mutant(JUDGE, "max(np.max(np.abs(force)), np.max(-lam, initial=0.0))", "np.max(np.abs(force))"),
+    Mutant(JUDGE, "reference_gap > 2 * limit_mm", "reference_gap > limit_mm"),
+    Mutant(BASELINE, "max(errors.get(key, (0.0, 0.0))[0], error)", "error"),
+    Mutant(BASELINE, "max(bound_mm, then_bound_mm)", "bound_mm"),
+    Mutant(BASELINE, "max(bound_mm, then_bound_mm)", "then_bound_mm"),
+    # |ŷ − y| ≤ ‖a‖₁ e + γ_{k+1} (|g| + |a|ᵀ|x|)
+    Mutant(GAP_ERROR, "self.norms * error_mm", "error_mm"),
+    Mutant(GAP_ERROR, "self.norms * error_mm + rounding", "self.norms * error_mm"),
+    Mutant(GAP_ERROR, "self.norms * error_mm + rounding", "rounding"),
+    Mutant(GAP_ERROR, "abs(g) + self.size @ abs(x)", "self.size @ abs(x)"),
+    Mutant(GAP_ERROR, "abs(g) + self.size @ abs(x)", "abs(g)"),
+    Mutant(GAP_ERROR, "abs(assembly.A).T", "assembly.A.T"),
+    Mutant(GAP_ERROR, "gamma(k + 2)", "gamma(k)"),
+    Mutant(GAP_ERROR, "gamma(k + 2)", "gamma(2)"),
     Mutant(KKT, "max(float((-y).max(initial=0.0)), float(", "max(float("),
     Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "0.0"),
     Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "float(y[lam > 0].min(initial=0.0))"),
@@ -344,6 +360,8 @@ TESTS = {
     RESIDUAL: ("terms_batched", "altered", "series_bound"),
     ASSESS: ("terms_batched",),
     JUDGE: ("terms_verdict", "harness_judge"),
+    BASELINE: ("gate_baseline",),
+    GAP_ERROR: ("allowed_gap",),
     KKT: ("terms_verdict",),
     ALTERATION: ("altered",),
     READ: ("altered",),

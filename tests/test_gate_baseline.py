@@ -15,6 +15,8 @@ from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
 from harness.results import records
+from harness.results.sides import measurement
+from harness.verification.baseline import Baseline, read_baseline
 
 pytestmark = pytest.mark.slow
 
@@ -60,6 +62,28 @@ def test_digits_lost_within_the_limit_are_news(
     assert done.exit_code == code, done.output
     if not code:
         assert "2 of them are in" in done.stdout
+
+
+@pytest.mark.parametrize("errors", [(1e-9, 3e-9, 2e-9), (3e-9, 2e-9, 1e-9), (1e-9, 2e-9, 3e-9)])
+def test_the_standard_is_the_largest_error_of_the_repeats(
+    finished: Path, copy: Path, errors: tuple[float, ...]
+) -> None:
+    first = records.read(copy / records.MEASUREMENTS)[0]
+    rows = [first | {"repeat": k, "displacement_error_mm": error} for k, error in enumerate(errors)]
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    found = read_baseline(copy, 10.0, "now", records.read(finished / records.MEASUREMENTS))
+    assert found.error_mm(first) == 3e-9
+
+
+@pytest.mark.parametrize(("bound", "then"), [(1e-9, 1e-13), (1e-13, 1e-9)])
+@pytest.mark.parametrize(("error", "exceeded"), [(0.9e-8, False), (1.1e-8, True)])
+def test_below_either_bound_no_digit_is_lost(
+    finished: Path, bound: float, then: float, error: float, exceeded: bool
+) -> None:
+    """The margin is 10, the error was 1e-12 mm."""
+    row = records.read(finished / records.MEASUREMENTS)[0]
+    baseline = Baseline("then", 10.0, {measurement(row): (1e-12, then)})
+    assert baseline.exceeded(row, error, bound, 1e-7) is exceeded
 
 
 def test_a_baseline_outside_its_limit_is_no_standard(finished: Path, copy: Path, tmp_path: Path) -> None:

@@ -56,6 +56,22 @@ def test_an_answer_that_stays_open_with_a_pulling_force() -> None:
     assert found.backward_error == pytest.approx(1.85 / 4.65)
 
 
+def test_a_pulling_force_in_balance_is_a_residual() -> None:
+    """λ = −0.25 N, x = K⁻¹(f − Aλ)."""
+    found = judged(np.array([1.625, -0.625]), np.array([-0.25]))
+    assert found.dual_residual == 0.25
+
+
+@pytest.mark.parametrize(("gap", "moved", "mismatch"), [(1.5e-7, 0.9e-7, 0), (2.5e-7, 1.6e-7, 1)])
+def test_a_gap_below_twice_the_limit_may_be_closed(gap: float, moved: float, mismatch: int) -> None:
+    """A spring of 1 N/mm before a tool, at rest in the reference; the answer moves it to below the limit."""
+    prepared = Prepared(Assembly((np.eye(1),), sp.csc_array([[1.0]])))
+    load = LoadCase(np.zeros(1), np.array([gap]))
+    reference = Reference(np.zeros(1), np.zeros(1), np.array([False]), 1e-15, "by hand")
+    found = judge(prepared, load, reference, np.array([moved]), np.zeros(1), 1e-7)
+    assert found.contact_mismatch == mismatch
+
+
 @pytest.mark.parametrize(("shift", "verdict"), [(0.9e-7, "within"), (2e-7, "outside")])
 def test_the_limit(shift: float, verdict: str) -> None:
     found = judged(X - np.array([0.0, shift]), LAM)

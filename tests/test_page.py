@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import base64
 import json
+import os
+import re
+import subprocess
+import sys
 import zlib
 from html.parser import HTMLParser
 from pathlib import Path
@@ -216,3 +220,13 @@ def test_the_banner_of_an_answer_and_of_a_comparison_names_the_code() -> None:
     both = comparison._banner(rows.assign(machine=["CPU", "other"]))
     assert "old: " + "a" * 40 in both["commits"]
     assert [warning.split()[-2] for warning in both["warnings"]] == ["uncommitted", "machine"], both
+
+
+@pytest.mark.slow
+def test_that_no_browser_tried_the_page_is_said_in_the_summary() -> None:
+    file = Path(__file__).with_name("test_page_browser.py")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file), "-k", "slider"]
+    environment = os.environ | {"PATH": "", "PYTEST_ADDOPTS": ""}
+    done = subprocess.run(command, env=environment, cwd=file.parents[1], capture_output=True, text=True)
+    (line,) = [line for line in done.stdout.splitlines() if "WARNING" in line]
+    assert re.search(r"\d+ browser tests skipped, no Chromium with its driver is installed", line)
