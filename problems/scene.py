@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from problems.drawn import EXAMPLES, drawn_table
 from problems.input.bounded import regular_file, resolved
 from problems.input.validation import UNITS, unknown, validation_faults
 from problems.manufactured.ladder import LADDERS, make_rung, prefix_of, rung_names
@@ -51,6 +52,8 @@ def read_scene(name_or_path: str) -> Scene:
     """
     if prefix := prefix_of(name_or_path):
         return _rung_scene(prefix, name_or_path)
+    if table := drawn_table(name_or_path):
+        return _scene(name_or_path, SCENES / name_or_path, table)
     path = Path(name_or_path)
     if path.suffix == ".npz":
         if not path.is_file():
@@ -59,7 +62,7 @@ def read_scene(name_or_path: str) -> Scene:
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
-            raise _unknown_scene(name_or_path, scene_names())
+            raise _unknown_scene(name_or_path, [*scene_names(), *EXAMPLES])
     table = read_toml(path)
     is_users = not resolved(path).is_relative_to(SCENES)
     name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()

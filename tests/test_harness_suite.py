@@ -138,7 +138,7 @@ def test_one_name_and_variant_stands_for_one_set_of_options(tmp_path: Path) -> N
 
 
 def test_unknown_suite_names_the_known_ones() -> None:
-    with pytest.raises(InputError, match=r"did you mean default\? allowed: accuracy, default, gate"):
+    with pytest.raises(InputError, match=r"did you mean default\? allowed: accuracy, default, drawn, gate"):
         read_suite("defualt")
 
 

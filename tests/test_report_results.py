@@ -39,7 +39,7 @@ def said(directory: Path, *rows: dict[str, Any]) -> list[str]:
 def test_the_sections_stand_in_their_order() -> None:
     names = [module.__name__.removeprefix("report.sections.") for module in sections()]  # type: ignore[attr-defined]
     assert names == [
-        *("ladders", "rungs"),
+        *("ladders", "rungs", "drawn_scenes"),
         *(
             "outside",
             "summary",
@@ -59,7 +59,8 @@ def test_the_sections_stand_in_their_order() -> None:
         "machine",
     ]
     assert len({module.PLACE.number for module in sections()}) == len(names)
-    assert [m.PLACE.about for m in sections()] == ["ladders"] * 2 + ["scenes"] * (len(names) - 3) + ["all"]
+    about = ["ladders"] * 2 + ["drawn"] + ["scenes"] * (len(names) - 4) + ["all"]
+    assert [m.PLACE.about for m in sections()] == about
 
 
 def test_a_section_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from harness.results import schema
 from harness.verification.judge import Judgement
+from problems.drawn import EXAMPLES
 from problems.manufactured.ladder import LADDERS
 from solvers.base import Status
 
@@ -36,6 +37,7 @@ def test_the_vocabulary_is_that_of_solvers_judge_and_ladders() -> None:
     assert set(get_args(Status)) == set(schema.STATUSES[:4])
     assert {field.name for field in fields(Judgement)} == set(schema.JUDGED)
     assert schema.LADDERS == LADDERS
+    assert all(name.startswith(schema.DRAWN) for name in EXAMPLES)
     assert schema.ANSWERED == ("within", "outside", "cannot_be_judged")
 
 

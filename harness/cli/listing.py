@@ -6,6 +6,7 @@ from rich.table import Table
 
 from harness.planning.suite import read_suite, suite_names
 from problems import formats
+from problems.drawn import SIZES
 from problems.errors import InputError
 from problems.manufactured.ladder import PREFIXES, rung_names
 from problems.scene import read_scene, scene_names
@@ -29,7 +30,9 @@ def _solvers() -> Table:
 
 
 def _scenes() -> Table:
-    table = Table("scene", "n", "m", "title")
+    sizes = " or ".join(map(str, SIZES))
+    caption = f"Not listed: scenes drawn at random, drawn/<n>/<k>, with n = {sizes} and k = 0, 1, 2, …"
+    table = Table("scene", "n", "m", "title", caption=caption)
     rungs = [name for prefix in PREFIXES for name in rung_names(prefix)]
     for name in [*scene_names(), *rungs]:
         scene = read_scene(name)

@@ -1,7 +1,7 @@
 """A suite: which scenes, solvers, forms, tolerances and repeats to measure. A TOML file, validated whole.
 
 title = "…"
-scenes = ["4386/0107", "6112/*", "my-scene.toml"]     # names, globs over names, or paths
+scenes = ["4386/0107", "6112/*", "drawn/4386/0..59", "my-scene.toml"]  # names, globs, ranges, or paths
 tolerances = [1e-9]
 [[solver]]
 name = "ipm"
@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, JsonValue, PositiveInt, Tag, ValidationError
 
 from harness.results.checksums import Damaged, refuse_changed
+from problems.drawn import EXAMPLES, drawn_names
 from problems.errors import Fault, InputError
 from problems.input.bounded import Finite, Positive, Seed, resolved
 from problems.input.validation import VALUE, WORD, is_word, unknown, validation_faults
@@ -167,9 +168,10 @@ def read_written(path: Path) -> Suite:
 
 
 def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, faults: list[Fault]) -> list[str]:
-    """The scenes that match names, globs and paths (relative to `base`), in order, without duplicates.
+    """The scenes of names, globs, ranges and paths (relative to `base`), in order, without duplicates.
 
-    Only patterns that begin with "hard/" or "hard-full/" match rungs of ladders.
+    Only patterns that begin with "hard/" or "hard-full/" match rungs of ladders, and only names and ranges
+    ("drawn/4386/0..59") scenes drawn at random.
     """
     found: dict[str, None] = {}
     for pattern in map(str, patterns):
@@ -181,9 +183,9 @@ def resolved_scenes(patterns: list[Any], where: str, key: str, base: Path, fault
             continue
         prefix = prefix_of(pattern)
         known = rung_names(prefix) if prefix else scene_names()
-        names = [name for name in known if fnmatchcase(name, pattern)]
+        names = drawn_names(pattern) or [name for name in known if fnmatchcase(name, pattern)]
         if not names:
-            faults.append(Fault(where, key, pattern, unknown("scene", pattern, known)))
+            faults.append(Fault(where, key, pattern, unknown("scene", pattern, [*known, *EXAMPLES])))
         found |= dict.fromkeys(names)
     return list(found) or list(map(str, patterns))
 

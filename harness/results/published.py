@@ -30,8 +30,8 @@ LAST = ("paper", "accuracy")
 #: For a user's own runs and for the CI.
 NOT_PUBLISHED = ("gate", "scenes")
 DIGITS = 12  # of a commit, in the name of a folder
-#: The answers of a suite are kept, for the gate to judge anew, if they take at most this together; of the
-#: scenes' arrays, for their pictures, each that takes at most as many kB.
+#: The answers of a suite are kept, for the gate to judge anew, if they take at most this together; so are the
+#: scenes' arrays, for their pictures, of which each may take at most as many kB.
 KEPT_MIB, KEPT_SCENE_KB = 5, 500
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
@@ -114,7 +114,9 @@ def _unwanted(directory: Path) -> Iterator[Path]:
     """What is not published: locks, gaps of a series, answers and scenes that are large."""
     yield from directory.glob("**/*.lock")
     yield from directory.glob(GAPS)
-    yield from (path for path in directory.glob("scenes/*.npz") if path.stat().st_size > KEPT_SCENE_KB * 1000)
-    answers = directory / "answers"
-    if sum(path.stat().st_size for path in answers.glob("*")) > KEPT_MIB * 2**20:
-        yield answers
+    large = [path for path in directory.glob("scenes/*.npz") if path.stat().st_size > KEPT_SCENE_KB * 1000]
+    yield from large
+    for folder in (directory / "answers", directory / "scenes"):
+        sizes = [path.stat().st_size for path in folder.glob("*") if path not in large]
+        if sum(sizes) > KEPT_MIB * 2**20:
+            yield folder

@@ -95,8 +95,8 @@ class Section:
 @dataclass(frozen=True)
 class Place:
     """The place of a section in the report, by increasing `number`, and the results it is given: those on
-    the rungs of ladders, on all other scenes, or all.
+    the rungs of ladders, on scenes drawn at random, on all other scenes, or all.
     """
 
     number: int
-    about: Literal["scenes", "ladders", "all"] = "scenes"
+    about: Literal["scenes", "ladders", "drawn", "all"] = "scenes"

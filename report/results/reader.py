@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from harness.results.schema import CRC, LADDERS
+from harness.results.schema import CRC, DRAWN, LADDERS
 from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
 
@@ -70,9 +70,12 @@ class Results:
             return {}
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 
-    def on_ladders(self, wanted: bool) -> Results:
-        """The results on the rungs of ladders alone, or on all other scenes."""
-        rows = self.rows[self.rows["scene"].str.startswith(LADDERS) == wanted].reset_index(drop=True)
+    def about(self, what: str) -> Results:
+        """The results on rungs of "ladders", on scenes "drawn" at random, on all other "scenes", or "all"."""
+        names = self.rows["scene"].str
+        own = {"ladders": names.startswith(LADDERS), "drawn": names.startswith(DRAWN)}
+        others = ~(own["ladders"] | own["drawn"])
+        rows = self.rows if what == "all" else self.rows[own.get(what, others)].reset_index(drop=True)
         return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 
     def of_threads(self, threads: float) -> Results:

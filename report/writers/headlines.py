@@ -153,7 +153,7 @@ def contact_sentence(speed: Results) -> str:
 
 def ladder_score(hard: Results) -> str:
     """How often the in-house solvers are correct, and how often a library says solved of a wrong answer."""
-    rungs = hard.on_ladders(True)
+    rungs = hard.about("ladders")
     cells = with_outcomes(rungs.cells)
     return f"{in_house(rungs, cells)} {libraries(cells)}"
 

@@ -48,8 +48,7 @@ def write(directory: Path) -> Path:
 
 def _made(results: Results) -> list[Section]:
     """The sections that have something to say of the results, in their order."""
-    about = {"all": results, "ladders": results.on_ladders(True), "scenes": results.on_ladders(False)}
-    made = [module.section(about[module.PLACE.about]) for module in sections()]
+    made = [module.section(results.about(module.PLACE.about)) for module in sections()]
     return [section for section in made if section]
 
 

@@ -1,0 +1,145 @@
+"""Scenes drawn at random: the same wherever they are drawn, others for each version, within the ranges."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import problems.drawn
+from harness import solve
+from harness.cli.listing import listing
+from harness.planning.overrides import Overrides, overridden
+from harness.planning.plan import expand
+from harness.planning.suite import read_suite, read_written, resolved_scenes, to_toml
+from harness.results.schema import DRAWN
+from problems.drawn import MEANS, ROWS, SIZES, drawn_names
+from problems.effects.fasteners import Fasteners
+from problems.effects.initial_gap import InitialGap, RandomField
+from problems.effects.pressure import Pressure
+from problems.errors import Fault, InputError
+from problems.model.positions import Pattern
+from problems.model.scene import JointScene
+from problems.scene import read_scene, scene_names
+
+DRAWS = [f"{DRAWN}{n}/{k}" for k in range(167) for n in SIZES]  # 501
+
+
+def drawn_scene(name: str) -> JointScene:
+    scene = read_scene(name)
+    assert isinstance(scene, JointScene)
+    return scene
+
+
+def parts_of(scene: JointScene) -> tuple[float, RandomField, float, Pattern, tuple[float, float]]:
+    """Mean gap and its field, preload and its pattern, the pressures on the two parts."""
+    gap, fasteners, *pressures = scene.effects[-4:]  # after those of the assembly
+    assert isinstance(gap, InitialGap)
+    assert isinstance(fasteners, Fasteners)
+    assert gap.random is not None
+    assert fasteners.pattern is not None
+    wing, fragment = (effect for effect in pressures if isinstance(effect, Pressure))
+    assert (wing.part, fragment.part) == ("wing", "fragment")
+    return gap.mean, gap.random, fasteners.preload, fasteners.pattern, (wing.value, fragment.value)
+
+
+def test_a_name_gives_the_same_scene_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The digits are those of `printf 0.2.0/4386/7 | sha256sum`."""
+    monkeypatch.setattr(problems.drawn, "__version__", "0.2.0")
+    digits = "95027862 19d95e89 ed46722a 5f628451 bad6274f 1b458304 48266b9b 301c15a3"
+    shares = [int(word, 16) / 2**32 for word in digits.split()]
+    scene = drawn_scene("drawn/4386/7")
+    mean, field, preload, pattern, pressures = parts_of(scene)
+    assert mean == MEANS[math.floor(3 * shares[0])] == 0.6
+    assert field.sd == (20 + math.floor(181 * shares[1])) / 1000 == 0.038
+    assert field.correlation_length == 80 + math.floor(521 * shares[2]) == 562
+    assert field.seed == int(digits.split()[3], 16)
+    assert pattern == Pattern(columns=4 + math.floor(29 * shares[4]), rows=ROWS[0], edge=25.0)
+    assert preload == 500 + math.floor(3501 * shares[6]) == 1486
+    assert pressures == (5.176e-6, -5.176e-6)  # 10^(−5.286), as ⌊3801 · 0.18792…⌋ = 714
+    assert scene.key == drawn_scene("drawn/4386/7").key
+    assert scene.assembly_key == read_scene("4386/0107").assembly_key
+
+
+def test_another_version_draws_other_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = {drawn_scene(name).key for name in DRAWS[:30]}
+    monkeypatch.setattr(problems.drawn, "__version__", "99.0.0")
+    assert len(before | {drawn_scene(name).key for name in DRAWS[:30]}) == 60
+
+
+def test_every_parameter_is_within_its_range_and_fills_it() -> None:
+    drawn = [(scene.key, *parts_of(scene)) for scene in map(drawn_scene, DRAWS)]
+    keys, means, fields, preloads, patterns, pressures = zip(*drawn, strict=True)
+    assert len(set(keys)) == len({field.seed for field in fields}) == len(DRAWS)
+    for values, counts in ((MEANS, Counter(means)), (ROWS, Counter(p.rows for p in patterns))):
+        assert set(counts) == set(values)
+        assert min(counts.values()) > len(DRAWS) / 5
+    assert {p.columns for p in patterns} == set(range(4, 33))
+    assert all(first == -second for first, second in pressures)
+    logarithms = [math.log10(first) for first, _ in pressures]
+    for values, low, high in (
+        ([field.sd for field in fields], 0.02, 0.2),
+        ([field.correlation_length for field in fields], 80, 600),
+        (preloads, 500, 4000),
+        (logarithms, -6.0, -2.2),
+    ):
+        slack = 1e-4  # of a pressure of four digits
+        assert low - slack <= min(values) < low + (high - low) / 50
+        assert high - (high - low) / 50 < max(values) <= high + slack
+        assert sum(values) / len(values) == pytest.approx((low + high) / 2, abs=(high - low) / 20)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "drawn/4387/0",
+        "drawn/4386/-1",
+        "drawn/4386/01",
+        "drawn/4386/100000",
+        "drawn/4386/0..3",
+        "drawn/4386/²",
+    ],
+)
+def test_any_other_name_is_an_unknown_scene(name: str) -> None:
+    with pytest.raises(InputError, match=r"no such scene; similar: .*drawn/4386/0"):
+        read_scene(name)
+
+
+def test_a_range_stands_for_its_names() -> None:
+    assert drawn_names("drawn/4386/8..11") == [f"drawn/4386/{k}" for k in (8, 9, 10, 11)]
+    faults: list[Fault] = []
+    for pattern in ("drawn/4386/3..2", "drawn/4386/0..", "drawn/1170/0..3", "drawn/4386/*"):
+        resolved_scenes([pattern], "here", "scenes", Path(), faults)
+    assert len(faults) == 4
+    assert all("no such scene" in fault.allowed for fault in faults)
+    assert not any(name.startswith(DRAWN) for name in resolved_scenes(["*"], "here", "scenes", Path(), []))
+
+
+def test_the_suite_says_every_name_it_stands_for(tmp_path: Path) -> None:
+    suite = read_suite("drawn")
+    assert suite.scenes == [f"drawn/{n}/{k}" for n in SIZES for k in range(60)]
+    (tmp_path / "suite.toml").write_text(to_toml(suite), "utf-8")
+    assert read_written(tmp_path / "suite.toml") == suite
+    plan = expand(overridden(suite, Overrides(sizes=(6112,))))
+    usual = Counter((m.solver, m.form) for m in plan if m.tolerance == 1e-10)
+    forms = ("dual", "sparse")
+    assert usual == {(solver, form): 60 for solver in ("newton", "mprgp") for form in forms}
+    others = Counter((m.solver, m.form, m.tolerance) for m in plan if m.tolerance != 1e-10)
+    assert others == {("newton", form, tol): 6 for form in forms for tol in (1e-2, 1e-4, 1e-8, 1e-12)}
+    assert {m.scene for m in plan if m.tolerance != 1e-10} == {f"drawn/6112/{k}" for k in range(6)}
+    assert {m.threads for m in plan} == {1}
+
+
+def test_the_list_of_scenes_says_in_a_line_that_they_exist() -> None:
+    table = listing("scenes")
+    assert not any(name.startswith(DRAWN) for name in scene_names())
+    assert str(table.caption).startswith("Not listed: scenes drawn at random, drawn/<n>/<k>")
+
+
+@pytest.mark.slow
+def test_a_drawn_scene_is_solved_in_the_sparse_form() -> None:
+    answer = solve("drawn/4386/7", "newton", form="sparse", tolerance=1e-10)
+    assert (answer.status, answer.judgement.verdict) == ("solved", "within")
+    assert 0 < (answer.lam > 0).sum() < 2193

@@ -1,0 +1,154 @@
+"""The section on scenes drawn at random: every time, the worst cases, the failures, the looser tolerances."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from synthetic_results import no_answer, row, write_rows
+
+from report.document.blocks import Section
+from report.results.reader import read
+from report.sections import drawn_scenes
+from report.writers.markdown import write
+
+SECONDS = {
+    ("newton", "dual"): 0.05,
+    ("mprgp", "dual"): 0.1,
+    ("newton", "sparse"): 0.3,
+    ("mprgp", "sparse"): 0.4,
+}
+SCENES = 5
+
+
+def drawn(k: int, solver: str, form: str, n: int = 4386, **figures: Any) -> dict[str, Any]:
+    """A row of scene k; it takes (1 + k/10) times as long as that of scene 0."""
+    usual = {
+        **{"active": 400 * k + 50, "in_house": True, "tolerance": 1e-10, "threads": 1, "threads_asked": 1},
+        **{"setup_s": 0.0, "solve_s": SECONDS[solver, form] * (1 + k / 10)},
+    }
+    return row(f"{n}/0001", solver, form, **usual | figures) | {"scene": f"drawn/{n}/{k}"}
+
+
+def every_row() -> list[dict[str, Any]]:
+    return [drawn(k, *line) for k in range(SCENES) for line in SECONDS]
+
+
+def section_of(directory: Path, rows: list[dict[str, Any]]) -> Section:
+    section = drawn_scenes.section(read(write_rows(directory, rows)).about("drawn"))
+    assert section is not None
+    return section
+
+
+def table(section: Section, name: str) -> pd.DataFrame:
+    (block,) = (
+        block for block in section.blocks if getattr(block, "name", "") == name and block.kind == "table"
+    )
+    return block.data.set_index("method") if "scenes" in block.data else block.data
+
+
+def markdown(section: Section, name: str) -> dict[str, list[str]]:
+    """The cells of the table's lines, by method."""
+    (text,) = (b.markdown for b in section.blocks if getattr(b, "name", "") == name and b.kind == "table")
+    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines()[2:]]
+    return {line[1]: [line[0], *line[2:]] for line in lines}
+
+
+def test_medians_worst_cases_and_the_rival(tmp_path: Path) -> None:
+    section = section_of(tmp_path, every_row())
+    assert [getattr(block, "name", "") for block in section.blocks] == ["drawn", "drawn"]
+    found = table(section, "drawn")
+    assert found["median_s"].to_dict() == pytest.approx(
+        {f"{s} ({f})": 1.2 * t for (s, f), t in SECONDS.items()}
+    )
+    assert found["worst_to_median"].to_list() == pytest.approx([1.4 / 1.2] * 4)
+    assert set(found["worst_scene"]) == {"drawn/4386/4"}
+    cells = markdown(section, "drawn")
+    assert cells["newton (dual)"] == ["4386", "5", "5", "0.0600", "0.0700", "1.17", "5 of 5"]
+    assert cells["mprgp (dual)"][-1] == "–"
+
+
+def test_a_cliff_is_the_worst_case_and_is_slower_than_the_rival(tmp_path: Path) -> None:
+    """Just 1.5 times as slow is not slower."""
+    rows = [*every_row(), drawn(5, "newton", "dual", solve_s=7.9), drawn(5, "mprgp", "dual")]
+    rows += [drawn(6, "newton", "dual", solve_s=1.5), drawn(6, "mprgp", "dual", solve_s=1.0)]
+    line = table(section_of(tmp_path, rows), "drawn").loc["newton (dual)"]
+    assert (line["scenes"], line["within"], line["compared"], line["not_slower"]) == (7, 7, 7, 6)
+    assert (line["worst_s"], line["worst_scene"]) == (7.9, "drawn/4386/5")
+    assert line["worst_to_median"] == pytest.approx(7.9 / 0.065)
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [
+        no_answer("time_limit"),
+        no_answer("crashed"),
+        no_answer("not_run"),
+        {"status": "inaccurate"},
+        {"verdict": "outside", "displacement_error_mm": 3e-6},
+        {"verdict": "cannot_be_judged"},
+    ],
+    ids=lambda failure: failure.get("status", failure.get("verdict")),
+)
+def test_a_failure_is_counted_shown_and_never_fast(tmp_path: Path, failure: dict[str, Any]) -> None:
+    fast = {"solve_s": 1e-9} | failure
+    rows = [row for row in every_row() if row["scene"] != "drawn/4386/2"]
+    rows += [drawn(2, *line) | (fast if line[1] == "dual" else {}) for line in SECONDS]
+    section = section_of(tmp_path, rows)
+    found = table(section, "drawn")
+    assert found["scenes"].to_list() == [5] * 4
+    assert found["within"].to_dict() == {f"{s} ({f})": 4 if f == "dual" else 5 for s, f in SECONDS}
+    assert found.loc["newton (dual)", ["compared", "not_slower"]].to_list() == [5, 4]
+    failed = table(section, "drawn-failures")
+    assert failed[["scene", "method"]].to_numpy().tolist() == [
+        ["drawn/4386/2", f"{solver} (dual)"] for solver in ("mprgp", "newton")
+    ]
+
+
+def test_a_rival_without_an_answer_is_slower(tmp_path: Path) -> None:
+    rows = [row | (no_answer("time_limit") if row["solver"] == "mprgp" else {}) for row in every_row()]
+    line = table(section_of(tmp_path, rows), "drawn").loc["newton (sparse)"]
+    assert (line["compared"], line["not_slower"]) == (5, 5)
+
+
+def test_other_tolerances_are_compared_on_the_same_scenes_and_enter_no_other_figure(tmp_path: Path) -> None:
+    rows = every_row()
+    for k, factor in ((0, 0.5), (1, 0.7), (2, 3.0)):
+        seconds = factor * SECONDS["newton", "dual"] * (1 + k / 10)
+        rows.append(drawn(k, "newton", "dual", tolerance=1e-2, solve_s=seconds, verdict="outside"))
+    rows.append(drawn(0, "newton", "dual", tolerance=1e-12) | no_answer("failed"))
+    section = section_of(tmp_path, rows)
+    assert table(section, "drawn")["scenes"].to_list() == [5] * 4
+    assert not any(getattr(block, "name", "") == "drawn-failures" for block in section.blocks)
+    assert markdown(section, "drawn-tolerances") == {
+        "newton (dual)": ["4386", "3", "0.700 (0.50 to 3.0)", "–"],
+    }
+
+
+def test_the_report_keeps_drawn_scenes_apart(tmp_path: Path) -> None:
+    rows = [*every_row(), row("4386/0107", "newton"), row("4386/0107", "piqp")]
+    rows += [drawn(k, "newton", "sparse", n=6112) for k in range(2)]
+    page = write(write_rows(tmp_path, rows)).read_text("utf-8")
+    assert "## Scenes drawn at random" in page
+    assert "**Scene 4386/0107**" in page
+    assert "**Scene drawn/" not in page
+    assert (tmp_path / "report" / "drawn.png").stat().st_size > 10_000
+    saved = pd.read_csv(tmp_path / "report" / "drawn.csv")
+    assert {"n", "method", "scenes", "within", "median_s", "worst_s", "worst_scene"} <= set(saved)
+    assert saved["n"].to_list() == [4386] * 4 + [6112]
+
+
+def test_nothing_but_failures_is_a_section_too(tmp_path: Path) -> None:
+    rows = [row | no_answer("not_run") for row in every_row()] + [
+        every_row()[0] | {"n": None, "scene": "drawn/"}
+    ]
+    write(write_rows(tmp_path, rows))
+    saved = pd.read_csv(tmp_path / "report" / "drawn.csv")
+    assert saved["within"].to_list() == [0] * 4
+    assert len(pd.read_csv(tmp_path / "report" / "drawn-failures.csv")) == 4 * SCENES
+
+
+def test_without_a_drawn_scene_there_is_no_section(tmp_path: Path) -> None:
+    assert drawn_scenes.section(read(write_rows(tmp_path, [row()])).about("drawn")) is None
