@@ -159,7 +159,6 @@ MUTANTS = [
     Mutant(BLOCK, "np.where(closed | (s < s_error), s_error, 0.0)", "np.where(s < 0, s_error, 0.0)"),
     Mutant(BLOCK, "if not (self.kappa > 0 and self.sigma2 > 0):", "if not self.sigma2 > 0:"),
     Mutant(BLOCK, "if not (self.kappa > 0 and self.sigma2 > 0):", "if not self.kappa > 0:"),
-    Mutant(BLOCK, " + distance) / certain", " + distance)"),
     Mutant(BLOCK, "np.where(np.isfinite(bounds), bounds, np.inf)", "bounds"),
     Mutant(BLOCK, "scale * np.sqrt(energy) + missed", "missed"),
     Mutant(BLOCK, "scale * np.sqrt(energy) + missed", "scale * np.sqrt(energy) / 2 + missed"),

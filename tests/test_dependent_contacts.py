@@ -10,7 +10,7 @@ import pytest
 import scipy.sparse as sp
 from typer.testing import CliRunner
 
-from harness import own_matrices
+from harness import LoadCase, own_matrices, solve_series
 from harness.cli.app import app
 from problems.errors import InputError
 from problems.input.dependent_contacts import refuse_dependent
@@ -121,3 +121,15 @@ def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
 def test_arrays_are_refused_at_once() -> None:
     with pytest.raises(InputError, match=re.escape("A[:, 2]")):
         own_matrices(np.eye(N), np.eye(N, 3)[:, [0, 1, 0]], np.ones(N), np.zeros(3))
+
+
+def test_contacts_that_the_rounding_of_Q_makes_dependent_are_said() -> None:
+    """Apart by 2⁻¹⁹ in A, but by less than the rounding of K⁻¹ in Q: cond(K) = 10¹²."""
+    basis = np.linalg.qr(np.random.default_rng(0).standard_normal((N, N)))[0]
+    K = (basis * np.geomspace(1, 1e12, N)) @ basis.T
+    A = np.eye(N)[:, [*range(50), *range(50)]]
+    A[range(50, N), range(50, N)] += 2.0**-19
+    load = LoadCase(np.ones(N), np.zeros(N))
+    scene = own_matrices((K + K.T) / 2, A, load.f, load.g)
+    with pytest.raises(InputError, match=r"Q = AᵀK⁻¹A .* must be positive definite"):
+        list(solve_series(scene, [load], form="dual"))
