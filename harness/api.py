@@ -78,6 +78,7 @@ class Solution:
     gap : (m,) the remaining gaps, g − Aᵀx, mm.
     status, iterations : what the solver said; the reference has no iterations.
     judgement : what the judge found. error_bound_mm : proven, max|x − x*| for the exact answer x*.
+    notes : what was rounded or symmetrised of your own matrices; x* is the answer to what that gave.
     """
 
     x: Vector
@@ -87,6 +88,7 @@ class Solution:
     iterations: int | None
     judgement: Judgement
     error_bound_mm: float
+    notes: tuple[str, ...] = ()
 
 
 def load_scene(source: Source) -> Scene:
@@ -150,7 +152,7 @@ def solve(
     bound = np.inf if error is None else error + known.bound_mm
     gap = load.g - data.assembly.A.T @ x
     x = data.assembly.at_junction(x)
-    return Solution(x, lam, gap, answer.status, answer.iterations, judgement, bound)
+    return Solution(x, lam, gap, answer.status, answer.iterations, judgement, bound, data.assembly.notes)
 
 
 def judge(

@@ -10,15 +10,19 @@ from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
-from problems.model.scene import Scene
+from problems.model.scene import MadeScene, Scene
 
 
 def prepared(scene: Scene, progress: Progress = lambda text, fraction: None, form: Form = "dual") -> Prepared:
     """K and A of a scene, condensed from the cache or now, or as they are for the sparse form.
 
-    Factors and Q are made when first needed. Raises InputError if a part can move freely, or if a user's
-    matrices are invalid.
+    Factors and Q are made when first needed. Raises InputError if a part can move freely, if a user's
+    matrices are invalid, or if contacts of a rung depend on one another.
     """
+    if isinstance(scene, MadeScene):
+        from problems.input.dependent_contacts import refuse_dependent
+
+        refuse_dependent(scene.made.assembly.A, scene.source_of("A"))
     if form == "sparse":
         from problems.uncondensed import build as uncondensed
 

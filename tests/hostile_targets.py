@@ -240,8 +240,6 @@ def all_targets(root: Path) -> list[Target]:
         "abaqus": ".mtx",
         "op4": ".op4",
         "dmig": ".pch",
-        "qps": ".qps",
-        "mat": ".mat",
     }
     of_formats = [own(root, form, suffix) for form, suffix in forms.items()]
     return [scene(root), cached(root), results(root), series(root), suite(root), *of_formats]

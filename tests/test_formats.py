@@ -27,7 +27,6 @@ from harness.scene.solve import solve
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.formats import mat_arrays
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.input.digits import apparent_digits, expected_error
@@ -39,7 +38,6 @@ QUIET = Console(file=StringIO())
 SCENE = "gallery/installed-fasteners"  # springs join both parts into one block of K
 FOLDERS = ("mtx", "abaqus")
 PATHS = {"npz": "p.npz", "op4": "p.op4", "dmig": "p.pch", "qpsolvers": "q.npz", "mtx": "m", "abaqus": "a"}
-PATHS |= {"mat": "p.mat", "qps": "p.qps"}
 
 
 def files_of(form: str, path: Path) -> list[str]:
@@ -444,14 +442,3 @@ def test_an_op4_that_ends_early_has_whole_matrices_or_is_refused(tmp_path: Path)
             for name, values in found.items():
                 np.testing.assert_array_equal(values, wanted[name])
     assert refused > 0.99 * len(whole)
-
-
-def test_a_file_on_which_scipys_reader_crashes_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    formats.write("mat", tmp_path / "p.mat", matrices(*small()))
-    crashing = tmp_path / "crashing.py"
-    crashing.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)\n")
-    monkeypatch.setattr(mat_arrays, "__file__", str(crashing))
-    with pytest.raises(InputError, match="SciPy's reader crashed"):
-        formats.read(tmp_path / "p.mat")

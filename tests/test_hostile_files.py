@@ -297,11 +297,11 @@ FAR = np.linspace(-1, 1, 24).reshape(12, 2) * 1e308
         ({"K": np.zeros((2, 2, 2))}, "must be matrices"),
         ({"nodes": np.full((12, 2), np.nan)}, "nodes"),
         ({"nodes": FAR}, "nodes"),
-        ({"A": own_matrices()["A"] * 1e200}, "choose other units"),
-        ({"A": own_matrices()["A"] * 1e-200}, "choose other units"),
-        ({"A": own_matrices()["A"] * 1e-320}, "choose other units"),
-        *(({"K": own_matrices()["K"] * 10.0**k}, "choose other units") for k in (-311, -309, -290, 300)),
-        ({"K": own_matrices()["K"] * 1e-250, "A": own_matrices()["A"] * 1e-250}, "choose other units"),
+        ({"A": own_matrices()["A"] * 1e200}, "choose another unit of"),
+        ({"A": own_matrices()["A"] * 1e-200}, "choose another unit of"),
+        ({"A": own_matrices()["A"] * 1e-320}, "choose another unit of"),
+        *(({"K": own_matrices()["K"] * 10.0**k}, "choose another unit of") for k in (-311, -309, -290, 300)),
+        ({"K": own_matrices()["K"] * 1e-250, "A": own_matrices()["A"] * 1e-250}, "choose another unit of"),
     ],
 )
 def test_matrices_beyond_double_precision_are_refused(changes: Any, said: str, tmp_path: Path) -> None:

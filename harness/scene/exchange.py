@@ -11,12 +11,10 @@ import scipy.sparse as sp
 from rich.console import Console
 
 from harness.planning.road import cheaper
-from harness.verification.independence import independence
 from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import Fault, InputError
-from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
@@ -131,24 +129,15 @@ def _named(found: formats.Data, name: str, path: Path) -> object:
 
 
 def _refuse_unusable(path: Path, origin: dict[str, Path]) -> tuple[Form, Prepared, LoadCase]:
-    """The problem in its cheaper form. Raises InputError, naming the matrix's own file, if K is indefinite or
-    A's columns are dependent.
-    """
+    """The problem in its cheaper form. Raises InputError, naming K's own file, if K is indefinite."""
     try:
         scene = read_scene(str(path))
         form = cheaper(scene, FORMS).form
         data = prepared(scene, form=form)
-        if not isinstance(data, SparsePrepared):
-            _ = data.Q
-        elif data.sparse_factors and data.assembly.m and not independence(data.assembly) > 0:
-            allowed = "no column may depend on the others"
-            raise InputError.one(scene.source_of("A"), "A", "dependent columns", allowed)
+        _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.factors
         return form, data, load_case(scene, form)
     except InputError as error:
-        own = [
-            replace(fault, where=str(origin["A" if fault.key[0] == "A" else "K"])) for fault in error.faults
-        ]
-        raise InputError(own) from error
+        raise InputError([replace(fault, where=str(origin["K"])) for fault in error.faults]) from error
 
 
 def _print_facts(out: Path, used: tuple[Form, Prepared, LoadCase], console: Console) -> None:
@@ -161,8 +150,8 @@ def _print_facts(out: Path, used: tuple[Form, Prepared, LoadCase], console: Cons
     else:
         condition = f"{data.facts['cond_K']:.2e}"
     console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
-    if data.assembly.altered:
-        console.print(f"{ALTERED}.", style="yellow")
+    for note in data.assembly.notes:
+        console.print(f"{note}.", style="yellow")
     if digits_of(data.assembly) == DOUBLE:
         x, lam = np.zeros(data.assembly.n), np.zeros(data.assembly.m)  # which the sentence does not need
     elif isinstance(data, SparsePrepared):

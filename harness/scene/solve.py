@@ -28,7 +28,6 @@ from harness.verification.judge import LIMIT_MM, judge
 from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
@@ -110,8 +109,8 @@ def solve(
     with steps.step("matrices"):
         data = prepared(scene, steps.building, road.form)
         _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.factors
-    if data.assembly.altered:
-        console.print(f"{ALTERED}.", style="yellow")
+    for note in data.assembly.notes:
+        console.print(f"{note}.", style="yellow")
     with steps.step("the effects, each alone"):
         built = steps.condensed or road.form == "sparse"
         entries = ledger(scene, built, data.assembly.junction)

@@ -86,12 +86,14 @@ def _matrices(scene: Scene, console: Console) -> None:
     """Print the sizes and digits of given matrices. Raises InputError if K is not positive definite."""
     road = cheaper(scene, FORMS)
     data = prepared(scene, form=road.form)
-    _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.Q
+    _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.factors
     assembly = data.assembly
     blocks = ", ".join(str(K.shape[0]) for K in assembly.blocks)
     if isinstance(data, SparsePrepared):
         console.print(f"Sparse form by default: {road.why}.")
     console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
+    for note in assembly.notes:
+        console.print(f"{note}.", style="yellow")
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
 

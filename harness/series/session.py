@@ -25,6 +25,7 @@ from harness.verification.gap_error import GapError
 from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
 from problems.build import prepared
+from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
@@ -78,10 +79,17 @@ Assess = Callable[[Sequence[LoadCase], Sequence[Vector], Sequence[Vector | None]
 
 
 def assessor(data: Prepared, limit_mm: float) -> Assess:
-    """What judges a block of answers, with bounds far below the limit where that is no trouble."""
+    """What judges a block of answers, with bounds far below the limit where that is no trouble.
+
+    Raises InputError if rounding leaves Q indefinite.
+    """
     if isinstance(data, SparsePrepared):
         return SparseAssessor(data, limit_mm / 10)
-    return partial(assess, Bound.of(data))
+    try:
+        return partial(assess, Bound.of(data))
+    except np.linalg.LinAlgError as error:
+        allowed = "must be positive definite: are contacts nearly dependent, and K nearly singular?"
+        raise InputError.one("series", "Q = AᵀK⁻¹A", str(error), allowed) from error
 
 
 @dataclass(frozen=True)

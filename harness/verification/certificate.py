@@ -13,10 +13,6 @@ Where the unknowns have mixed units, the same is done in units D_i of each, powe
 
 Nothing is assumed about the active set: weakly active contacts (λ_i = s_i = 0) need no special treatment.
 With enclosures of r and s, and x, λ as sums of two float64, both terms are far below the rounding of x.
-
-Where reading has altered a user's numbers, the bound is for the given problem: r and s are enclosed for its
-K + ΔK, A + ΔA, f + Δf, g + Δg, and κ − ‖DΔKD‖₂ replaces κ. K + ΔK need not be symmetric: all this holds with
-‖e‖²_K = eᵀ(K + ΔK)e, and the λmin that counts is that of its symmetric part.
 """
 
 from __future__ import annotations
@@ -70,8 +66,6 @@ def certify(
     lam = DoubleDouble(np.where(negative, 0.0, lam.hi), np.where(negative, 0.0, lam.lo))
     x, s, feasible = _repaired(assembly, load.g, x, active)
     r = forces(assembly, load.f, x, lam)
-    if assembly.altered:
-        kappa = kappa * (1 - 2 * U) - 1.01 * float(units.max()) ** 2 * assembly.altered.norm_K
     undecided = np.zeros(assembly.m, dtype=bool)
     if not (feasible and kappa > 0):
         return Certificate(x, lam, np.inf, undecided, undecided)
@@ -84,8 +78,7 @@ def certify(
     bound = float(of_each.max(initial=0)) * inflation
     if not np.isfinite(bound):
         return Certificate(x, lam, np.inf, undecided, undecided)
-    decided = (undecided, undecided) if assembly.altered else _proven(assembly, lam, s, r, error, units)
-    return Certificate(x, lam, bound, *decided)
+    return Certificate(x, lam, bound, *_proven(assembly, lam, s, r, error, units))
 
 
 def _repaired(

@@ -95,7 +95,7 @@ def gamma(k: Any) -> Any:
 
 
 def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
-    """r = f − Kx − Aλ with its error bound, N: that of the given problem, where reading has altered it."""
+    """r = f − Kx − Aλ with its error bound, N."""
     total = ErrorFreeSum(assembly.n)
     total.add(f)
     subtract_sparse(total, slice(None), sp.csr_array(assembly.A), lam)
@@ -105,26 +105,18 @@ def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) ->
             subtract_sparse(total, rows, sp.csr_array(K.T), part)  # symmetric, and stored by columns
         else:
             _subtract_dense(total, rows, K, part)
-    if assembly.altered:
-        total.error += assembly.altered.of_forces(_size(x), _size(lam))
     return total.enclosed()
 
 
 def gaps(assembly: Assembly, g: Matrix, x: DoubleDouble) -> Enclosure:
-    """s = g − Aᵀx with its error bound, mm: that of the given problem, where reading has altered it.
+    """s = g − Aᵀx with its error bound, mm.
 
     g (m,) and x (n,), or a column for each load case.
     """
     total = ErrorFreeSum(g.shape)
     total.add(g)
     subtract_sparse(total, slice(None), sp.csr_array(assembly.A.T), x)
-    if assembly.altered:
-        total.error += assembly.altered.of_gaps(_size(x))
     return total.enclosed()
-
-
-def _size(v: DoubleDouble) -> Vector:
-    return abs(v.hi) + abs(v.lo)
 
 
 def subtract_sparse(total: ErrorFreeSum, rows: slice, A: sp.csr_array, v: DoubleDouble) -> None:

@@ -30,6 +30,4 @@ def independence(assembly: Assembly) -> float:
         SAFE * gamma(assembly.n + 1) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
     )
     sigma2 = least - uncertainty
-    if assembly.altered and sigma2 > 0:  # (σ − ‖ΔA‖₂)² ≥ σ² − 2σ‖ΔA‖₂
-        sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A
     return float(sigma2) if sigma2 >= SMALLEST else 0.0

@@ -203,8 +203,6 @@ def certified_active_set(
     undecided = int((~(proof.closed | proof.open)).sum())
     if not np.isfinite(proof.bound_mm):
         route = UNPROVEN
-    elif prepared.assembly.altered:
-        route = "proven; what reading has rounded or symmetrised is counted"
     else:
         route = "proven" + (f", {undecided} contacts weakly active" if undecided else "")
     if stopped:

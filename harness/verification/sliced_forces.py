@@ -40,7 +40,7 @@ class SlicedForces:
     D: Matrix
 
     def __call__(self, f: Matrix, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
-        """f (n, k) or (n, 1), x (n, k), λ (m, k). What reading has altered is not counted."""
+        """f (n, k) or (n, 1), x (n, k), λ (m, k)."""
         value, error = np.empty_like(x.hi), np.empty_like(x.hi)
         at_a_time = max(BYTES_AT_A_TIME // (8 * len(x.hi)), 1)
         for start in range(0, x.hi.shape[1], at_a_time):

@@ -69,9 +69,9 @@ class SparseBound:
 
     @classmethod
     def of(cls, prepared: SparsePrepared, kappa: float) -> SparseBound | None:
-        """kappa : κ. None where nothing can be proven so: no M, κ or σ², or numbers altered on reading."""
+        """kappa : κ. None where nothing can be proven so: no M, κ or σ²."""
         assembly, approximate = prepared.assembly, prepared.approximate_inverse
-        if approximate is None or assembly.altered or not kappa > 0:
+        if approximate is None or not kappa > 0:
             return None
         D = balanced_units(assembly)[:, None]
         rows = zip(assembly.sparse_blocks, assembly.slices, strict=True)

@@ -35,13 +35,13 @@ def prepared(scene: Scene, progress: Progress) -> Stored:
             return _condensed(scene, progress)
         case MatricesScene():
             assembly, _, seconds, key = _own(scene)
-            return Stored(assembly, key, {"condensation": seconds}, scene.source_of, True, progress)
+            return Stored(assembly, key, {"condensation": seconds}, scene.source_of, progress)
         case MadeScene():
             no_time = {"condensation": 0.0}
             made = scene.made.assembly
             if scene.sparse:
                 made = replace(made, blocks=tuple(K.toarray(order="F") for K in made.sparse_blocks))
-            return Stored(made, scene.assembly_key, no_time, scene.source_of, True, progress)
+            return Stored(made, scene.assembly_key, no_time, scene.source_of, progress)
     raise TypeError(type(scene).__name__)
 
 
@@ -79,7 +79,7 @@ def _condensed(scene: JointScene, progress: Progress) -> Stored:
     key, steps = cache.digest(keys), {"condensation": sum(seconds.values())}
     if any(scene.effects_of(TieEffect)):
         assembly, key, steps["ties"] = _tied(scene, assembly, key, progress)
-    return Stored(assembly, key, steps, scene.source_of, False, progress)
+    return Stored(assembly, key, steps, scene.source_of, progress)
 
 
 def _tied(

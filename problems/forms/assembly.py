@@ -10,8 +10,6 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .alteration import Alteration
-
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
@@ -28,7 +26,7 @@ class Assembly:
         a single 1 for a part against a rigid tool.
     nodes : (n, 2) coordinates of the unknowns in mm, or None if they are unknown.
     parts : a name for each block.
-    altered : how far these, and a user's f and g, may be from what was given; None if nothing was altered.
+    notes : sentences on what reading has rounded or symmetrised of a user's numbers.
     junction : the unknowns that are asked for, displacements in mm; None if all are. The others, of a model
         without condensation, are inner displacements, slopes and twists.
     """
@@ -37,7 +35,7 @@ class Assembly:
     A: sp.csc_array
     nodes: Matrix | None = None
     parts: tuple[str, ...] = ()
-    altered: Alteration | None = None
+    notes: tuple[str, ...] = ()
     junction: NDArray[np.intp] | None = None
 
     @property

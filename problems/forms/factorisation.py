@@ -48,16 +48,3 @@ def schur(assembly: Assembly, factors: tuple[Matrix, ...]) -> Matrix:
         A = assembly.A[rows]
         Q += A.T @ (A.T @ inverse).T
     return np.asfortranarray((Q + Q.T) / 2)
-
-
-def dependent_column(Q: Matrix) -> int | None:
-    """The first column of A that depends on those before it; None if A has full rank.
-
-    The pivot of Q relative to its diagonal entry measures the independence of a column.
-    """
-    U, info = lapack.dpotrf(Q)
-    if info:
-        return int(info - 1)
-    independence = np.diag(U) ** 2 / np.diag(Q)
-    worst = int(independence.argmin())
-    return worst if independence[worst] < len(Q) * np.finfo(float).eps else None

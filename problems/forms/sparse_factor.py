@@ -49,16 +49,19 @@ class Factor(Protocol):
         """K⁻¹ b, b (N,) or (N, k)."""
 
 
-def factored(K: sp.csc_array, nodes: Matrix | None = None) -> Factor:
-    """The factor of K (N, N). nodes : (N, 2) of the unknowns, if known. Raises NotPositiveDefinite."""
+def factored(K: sp.csc_array, nodes: Matrix | None = None, lost: float = LOST) -> Factor:
+    """The factor of K (N, N). nodes : (N, 2) of the unknowns, if known.
+
+    Raises NotPositiveDefinite, also where a pivot is at most `lost` times the entry of K's diagonal.
+    """
     widest = _widest(K)
     if half_bandwidth(K) < widest:
-        return BandFactor(lower_band(K))
+        return BandFactor(lower_band(K), lost)
     for order in _orders(K, nodes):
         renumbered = sp.csc_array(K[order][:, order])
         if half_bandwidth(renumbered) < widest:
-            return Renumbered(order, lower_band(renumbered))
-    return GeneralFactor(K)
+            return Renumbered(order, lower_band(renumbered), lost)
+    return GeneralFactor(K, lost)
 
 
 def expected_numbers(K: sp.csc_array, nodes: Matrix | None = None) -> int:
@@ -120,14 +123,14 @@ def lower_band(K: sp.csc_array) -> Matrix:
 class BandFactor:
     """L, lower triangular with K = LLᵀ, stored as (b + 1, N): L[j + d, j] in row d. Overwrites `band`."""
 
-    def __init__(self, band: Matrix) -> None:
-        smallest = LOST * band[0]
+    def __init__(self, band: Matrix, lost: float = LOST) -> None:
+        smallest = lost * band[0]
         self.L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
         if info:
             raise NotPositiveDefinite(int(info) - 1)
-        lost = np.flatnonzero(self.L[0] ** 2 <= smallest)
-        if lost.size:
-            raise NotPositiveDefinite(int(lost[0]))
+        wrong = np.flatnonzero(self.L[0] ** 2 <= smallest)
+        if wrong.size:
+            raise NotPositiveDefinite(int(wrong[0]))
 
     @property
     def numbers(self) -> int:
@@ -140,10 +143,10 @@ class BandFactor:
 class Renumbered:
     """The band factor of K[order][:, order]."""
 
-    def __init__(self, order: Order, band: Matrix) -> None:
+    def __init__(self, order: Order, band: Matrix, lost: float = LOST) -> None:
         self.order = order
         try:
-            self.band = BandFactor(band)
+            self.band = BandFactor(band, lost)
         except NotPositiveDefinite as error:
             raise NotPositiveDefinite(int(order[error.unknown])) from error
 
@@ -160,7 +163,7 @@ class Renumbered:
 class GeneralFactor:
     """K = LDLᵀ after a symmetric permutation."""
 
-    def __init__(self, K: sp.csc_array) -> None:
+    def __init__(self, K: sp.csc_array, lost: float = LOST) -> None:
         options = {"SymmetricMode": True}
         try:
             self.lu = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
@@ -169,7 +172,7 @@ class GeneralFactor:
         order = np.argsort(self.lu.perm_c)
         # Where a pivot on the diagonal is zero, SuperLU takes another row, whose entry may be positive.
         exchanged = np.argsort(self.lu.perm_r) != order
-        wrong = np.flatnonzero(~(self.lu.U.diagonal() > LOST * abs(K.diagonal()[order])) | exchanged)
+        wrong = np.flatnonzero(~(self.lu.U.diagonal() > lost * abs(K.diagonal()[order])) | exchanged)
         if wrong.size:
             raise NotPositiveDefinite(int(order[wrong[0]]))
 

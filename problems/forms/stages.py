@@ -19,7 +19,6 @@ from .prepared import Prepared
 from .problem import Progress
 
 LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
-SMALLEST_EIGENVALUE = 1e-300  # N/mm: below it K⁻¹ overflows
 
 
 class Stored(Prepared):
@@ -29,11 +28,9 @@ class Stored(Prepared):
     ----------
     assembly : K and A. key : of K in the cache.
     seconds : of the stages before.
-    source_of : the origin of "K" or "A", for error messages.
-    check_A : whether to raise an error if the columns of A are dependent.
+    source_of : the origin of "K", for error messages.
 
-    `factors` raises InputError if K is not positive definite or its condition number exceeds 1e14, `Q` if the
-    columns of A are dependent.
+    `factors` raises InputError if K is not positive definite or its condition number exceeds 1e14.
     """
 
     def __init__(
@@ -42,7 +39,6 @@ class Stored(Prepared):
         key: str,
         seconds: dict[str, float],
         source_of: Callable[[str], object],
-        check_A: bool,
         progress: Progress,
     ) -> None:
         super().__init__(assembly)
@@ -51,7 +47,7 @@ class Stored(Prepared):
         parts = (A.data, A.indices, A.indptr)
         self.Q_key = cache.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
         self.seconds = seconds
-        self.source_of, self.check_A, self.progress = source_of, check_A, progress
+        self.source_of, self.progress = source_of, progress
 
     @cached_property
     def key(self) -> str:
@@ -104,9 +100,6 @@ class Stored(Prepared):
         least, largest = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
         if largest > LARGEST_CONDITION * least:
             raise indefinite(self.source_of("K"), "cond(K)", largest / least if least > 0 else np.inf)
-        if least < SMALLEST_EIGENVALUE:
-            allowed = f"at least {SMALLEST_EIGENVALUE:g} N/mm: use another unit of force"
-            raise InputError.one(self.source_of("K"), "smallest eigenvalue of K", least, allowed)
         facts = {
             "cond_K": largest / least,
             "lambda_min": least,
@@ -121,11 +114,6 @@ class Stored(Prepared):
         self.progress("Q = AᵀK⁻¹A", 0.0)
         start = time.perf_counter()
         Q = factorisation.schur(self.assembly, factors)
-        if self.check_A and self.assembly.m:
-            column = factorisation.dependent_column(Q)
-            if column is not None:
-                allowed = "must not depend on the columns before it"
-                raise InputError.one(self.source_of("A"), f"A[:, {column}]", "dependent", allowed)
         return {"Q": Q}, {"seconds": time.perf_counter() - start}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +10,12 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
 from . import user_matrices
 
-ALTERED = tuple(field.name for field in fields(Alteration))
 PARTS = ("data", "indices", "indptr")
 SMALL = 2000  # unknowns up to which a K is solved in the dense forms
 
@@ -31,7 +28,7 @@ def stored_matrices(
 
     files_key : a hash of the files' content. Raises InputError.
     """
-    code = fingerprint([Path(__file__), Path(user_matrices.__file__)])
+    code = fingerprint([Path(__file__)], within=("problems/input",))
     key = cache.digest("own", files_key, sparse, code)
 
     def made() -> cache.Entry:
@@ -43,9 +40,8 @@ def stored_matrices(
     arrays, facts = cache.load_or_make(key, made)
     count = range(len(facts["parts"]))
     blocks = tuple(_matrix(arrays, f"K{k}") if sparse else arrays[f"K{k}"] for k in count)
-    altered = Alteration(*(arrays[f"altered_{name}"] for name in ALTERED)) if facts["altered"] else None
-    A = _matrix(arrays, "A", facts["shape"])
-    assembly = Assembly(blocks, A, arrays.get("nodes"), tuple(facts["parts"]), altered)
+    parts, notes = tuple(facts["parts"]), tuple(facts["notes"])
+    assembly = Assembly(blocks, _matrix(arrays, "A", facts["shape"]), arrays.get("nodes"), parts, notes)
     return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
 
 
@@ -69,9 +65,7 @@ def _packed(assembly: Assembly, load: LoadCase, sparse: bool) -> cache.Entry:
     for k, K in enumerate(assembly.blocks):
         of_K: Any = K
         arrays |= {f"K{k}_{part}": getattr(of_K, part) for part in PARTS} if sparse else {f"K{k}": K}
-    if assembly.altered:
-        arrays |= {f"altered_{name}": getattr(assembly.altered, name) for name in ALTERED}
-    return arrays, {"parts": assembly.parts, "shape": assembly.A.shape, "altered": bool(assembly.altered)}
+    return arrays, {"parts": assembly.parts, "shape": assembly.A.shape, "notes": assembly.notes}
 
 
 def _matrix(arrays: Any, name: str, shape: Any = None) -> sp.csc_array:

@@ -14,13 +14,12 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from problems.errors import Fault, InputError
-from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase
 
 from . import sparse_npz
 from .bounded import LARGEST
+from .dependent_contacts import refuse_dependent
 
-U = 2.0**-53  # relative rounding error of float64
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
 LONGEST_LINE = 60  # characters quoted in a message
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
@@ -31,9 +30,9 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
         nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
-    K is split into its diagonal blocks, dense unless they are to be `sparse`. What does not fit into float64
-    is rounded, and K that is not quite symmetric is replaced by (K + Kᵀ)/2; `Assembly.altered` bounds the
-    differences. Raises InputError with all faults.
+    K is split into its diagonal blocks, dense unless they are to be `sparse`. The problem is the one in the
+    nearest float64, with (K + Kᵀ)/2 for a K that is symmetric but for rounding; `Assembly.notes` say so.
+    Raises InputError with all faults.
     """
     where = {key: str(path) for key, path in files.items()}
     if "problem" in files:
@@ -85,58 +84,44 @@ def checked(
     untouched = np.flatnonzero(abs(A).sum(axis=0) == 0)
     if untouched.size:
         raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must involve an unknown")
-    for key, sizes in {"K": [abs(K).max()], "A": abs(A).max(axis=0).toarray() if m else []}.items():
-        if wrong := [float(size) for size in sizes if not 1 / SCALE <= size <= SCALE]:
-            allowed = f"must be between {1 / SCALE:g} and {SCALE:g}: choose other units"
-            faults.append(Fault(where[key], f"max|{key}|", wrong[0], allowed))
+    allowed = f"must be between {1 / SCALE:g} and {SCALE:g}: choose another unit of"
+    if not 1 / SCALE <= (size := float(abs(K).max())) <= SCALE:
+        faults.append(Fault(where["K"], "max|K|", size, f"{allowed} force"))
+    sizes = abs(A).max(axis=0).toarray().ravel() if m else np.zeros(0)
+    if (wrong := np.flatnonzero(~((sizes >= 1 / SCALE) & (sizes <= SCALE)))).size:
+        j = wrong[0]
+        faults.append(Fault(where["A"], f"max|A[:, {j}]|", float(sizes[j]), f"{allowed} this contact's gap"))
     if faults:
         raise InputError(faults)
     skew = abs(K - K.T).max()
     asymmetry = skew / max(abs(K).max(), np.finfo(float).tiny)
     if asymmetry > SYMMETRY:
         raise InputError.one(where["K"], "max|K − Kᵀ| / max|K|", float(asymmetry), f"must be ≤ {SYMMETRY:g}")
-    off_K, off_A, off_f, off_g = (
-        _rounding(data[key], v) for key, v in {"K": K, "A": A, "f": f, "g": g}.items()
-    )
+    notes = []
+    if rounded := [key for key in "KAfg" if not _fits(data[key])]:
+        notes.append(f"Numbers of {', '.join(rounded)} that float64 cannot hold were rounded to the nearest")
     K.eliminate_zeros()
     if skew:
-        given, K = K, sp.csr_array(K / 2 + K.T / 2)
-        off_K = off_K + abs(K - given)
-        off_K = off_K.maximum(off_K.T)
-    sums = (off_K.sum(1), off_A.sum(1), off_A.sum(0), off_f.sum(1), off_g.sum(1))
-    above = 1 + 2 * max(n, m, 4) * U  # for rounding in these sums themselves
-    altered = Alteration(*(above * np.asarray(each, dtype=float).ravel() for each in sums))
+        K = sp.csr_array(K / 2 + K.T / 2)
+        notes.append(f"K, asymmetric by {skew:.1e} N/mm, was replaced by (K + Kᵀ)/2")
+    A = sp.csc_array(A)
+    refuse_dependent(A, where["A"])
     blocks = tuple(K[a:b, a:b] for a, b in _ends_of_blocks(K))
     names = tuple(f"part {k + 1}" for k in range(len(blocks)))
     made = tuple(sp.csc_array(block) if sparse else block.toarray(order="F") for block in blocks)
-    return Assembly(made, sp.csc_array(A), nodes, names, altered if altered else None), LoadCase(f, g)
+    return Assembly(made, A, nodes, names, tuple(notes)), LoadCase(f, g)
 
 
-def _rounding(given: Any, read: Any) -> sp.csr_array:
-    """|given − read| from above, where `read` is what was given in float64; f and g as columns."""
-    shape = (read.shape[0], read.shape[1] if read.ndim == 2 else 1)
-    if not sp.issparse(given):
-        if given.dtype.kind == "b" or given.dtype in (np.float16, np.float32, np.float64):
-            return sp.csr_array(shape)
-        given = np.asarray(given).reshape(shape)
-    values = sp.coo_array(given)
-    exact, rounded = values.data, values.data.astype(float)
-    lost = np.zeros(len(exact))
-    if exact.dtype.kind == "f":  # extended precision, if the machine has it
-        difference = abs(exact - rounded.astype(exact.dtype))
-        lost[difference > 0] = np.nextafter(difference[difference > 0].astype(float), np.inf)
-    elif exact.dtype.kind in "iu":
-        with np.errstate(invalid="ignore"):
-            same = (abs(rounded) < 2.0**63) & (rounded.astype(exact.dtype) == exact)
-        lost[~same] = U * abs(rounded[~same])
-    count, size, off = (
-        sp.csr_array(sp.coo_array((v, values.coords), shape=shape))
-        for v in (lost * 0 + 1, abs(rounded), lost)
-    )
-    count.data -= 1  # entries that are given several times are added
-    off = sp.csr_array(off + 2 * U * count.multiply(size))
-    off.eliminate_zeros()
-    return off
+def _fits(given: Any) -> bool:
+    """Whether float64 holds each of these finite numbers exactly."""
+    values = sp.coo_array(given).data if sp.issparse(given) else given
+    if values.dtype == float or values.dtype.itemsize < 8:
+        return True
+    nearest = values.astype(float)
+    if values.dtype.kind == "f":
+        return bool((nearest == values).all())  # compared in the wider of the two
+    inside = nearest < float(np.iinfo(values.dtype).max)  # 2⁶³ or 2⁶⁴, which would not convert back
+    return bool(inside.all() and (nearest.astype(values.dtype) == values).all())
 
 
 def _ends_of_blocks(K: sp.csr_array) -> Iterator[tuple[int, int]]:

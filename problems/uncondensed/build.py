@@ -115,4 +115,4 @@ def _sparse(assembly: Assembly, scene: Scene) -> Assembly:
         if K.shape[0] > SMALL and share > DENSEST:
             allowed = f"at most {DENSEST:.0%} of a block's entries; K is dense: use --form dual or primal"
             raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
-    return Assembly(blocks, assembly.A, assembly.nodes, assembly.parts, assembly.altered)
+    return Assembly(blocks, assembly.A, assembly.nodes, assembly.parts, assembly.notes)

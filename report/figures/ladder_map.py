@@ -50,7 +50,6 @@ COUNTED = {
     "conditioning": "cond(K)",
     "contact_scale": "2^±k in g",
     "degeneracy": "weak, %",
-    "denormal": "K, g or f times",
     "duplicates": "apart",
     "pivoting": "family, m",
     "refinement": "nodes along",

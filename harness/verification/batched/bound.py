@@ -13,11 +13,6 @@ with κ ≤ λmin(K), σ² ≤ λmin(AᵀA), λmax(K) ≤ ‖K‖_∞ and the la
 
 So the bound is proportional to the residual, where that of `certificate` is to its square root, and plain
 float64 suffices for λ and s. Weakly active contacts need no special treatment.
-
-Where reading has altered a user's numbers, the bound is for the given problem, K + ΔK, A + ΔA, f + Δf and
-g + Δg. Its answer x* is that for K, A + ΔA and g + Δg under the force f + Δf − ΔK x*, so that with e = x − x*
-and the residuals of the given problem (see `Alteration`) ΔK e adds to r. As ‖ΔK e‖₂/√κ ≤ (‖ΔK‖₂/κ) ‖e‖_K, the
-bound is divided by 1 − ‖ΔK‖₂/κ; σ − ‖ΔA‖₂ replaces σ.
 """
 
 from __future__ import annotations
@@ -61,16 +56,12 @@ class Bound:
         """(k,) mm for columns r (n, k), s (m, k), λ (m, k) ≥ 0; r and s known to within their errors."""
         if not (self.kappa > 0 and self.sigma2 > 0):
             return np.full(r.shape[1], np.inf)
-        altered = self.prepared.assembly.altered
-        certain = 1 - SAFE * altered.norm_K / self.kappa if altered else 1.0
-        if certain <= 0:
-            return np.full(r.shape[1], np.inf)
         force = length(abs(r) + error)
         closed = lam > 0
         delta = np.where(closed, -s, np.maximum(-s, 0.0))
         uncertainty = np.where(closed | (s < s_error), s_error, 0.0)
         distance = self._translation(delta, length(uncertainty))
-        bounds = SAFE * np.sqrt(self.compliance) * (force / np.sqrt(self.kappa) + distance) / certain
+        bounds = SAFE * np.sqrt(self.compliance) * (force / np.sqrt(self.kappa) + distance)
         return np.where(np.isfinite(bounds), bounds, np.inf)
 
     def _translation(self, delta: Matrix, uncertainty: Vector) -> Vector:
@@ -87,8 +78,6 @@ class Bound:
         left = delta - A.T @ z
         depth = int(np.diff(A.indptr).max(initial=0)) + 2
         rounding = gamma(depth) * (abs(delta) + abs(A).T @ abs(z)) + depth * ETA
-        if assembly.altered:
-            rounding = rounding + np.multiply.outer(assembly.altered.A_columns, abs(z).max(axis=0))
         missed = length(left) + length(rounding) + uncertainty
         return scale * np.sqrt(energy) + missed * np.sqrt(self.stiffest / self.sigma2)
 
@@ -100,6 +89,4 @@ def gaps(assembly: Assembly, g: Matrix, x: Split) -> tuple[Matrix, Matrix]:
     depth = 2 * int(np.diff(A.indptr).max(initial=0)) + 3
     x_size = abs(x.head) + abs(x.tail)
     error = gamma(depth) * (abs(g) + abs(A).T @ x_size) + depth * ETA
-    if assembly.altered:
-        error = error + assembly.altered.of_gaps(x_size)
     return s, SAFE * error

@@ -59,8 +59,6 @@ def residual(assembly: Assembly, f: Matrix, x: Split, lam: Matrix) -> tuple[Matr
             size[rows] += abs(product)
     depth = int(np.diff(A.indptr).max(initial=0)) + 5
     error += gamma(depth) * size + depth * ETA
-    if assembly.altered:
-        error += assembly.altered.of_forces(abs(x.head) + abs(x.tail), abs(lam))
     return r, SAFE * error
 
 
@@ -75,8 +73,6 @@ def refined(
     Kd = assembly.multiply_K(d)
     error_of_d = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(moved.tail).max(axis=0) + ETA
     error = error + stiffest * error_of_d + gamma(1) * (abs(r) + abs(Kd)) + (n + 1) * ETA
-    if assembly.altered:
-        error = error + np.multiply.outer(assembly.altered.K, abs(d).max(axis=0))
     return moved, r - Kd, SAFE * error
 
 

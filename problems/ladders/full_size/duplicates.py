@@ -1,6 +1,6 @@
 """Nearly dependent constraints at full size: 128 contacts duplicated, ever closer to the originals.
 
-At 2⁻¹⁶ the model refuses them as dependent: a pivot of Q is within the rounding of 3184 contacts.
+At 2⁻¹⁶ a pivot of Q would be within the rounding of 3184 contacts.
 """
 
 from __future__ import annotations

@@ -1,0 +1,223 @@
+"""What float64 cannot hold is rounded, an asymmetry within rounding taken out, both are said, and the problem
+that results is the one that is proven.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from harness import own_matrices, solve
+from harness.verification.reference import UNPROVEN, refined_active_set
+from problems.build import load_case, prepared
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
+from problems.input.user_matrices import read_matrices
+from problems.scene import read_scene
+from problems.storage import cache
+
+EXTENDED = np.finfo(np.longdouble).nmant > 53
+N = 4
+
+
+def rational(values: Any) -> list[Any]:
+    """Nested lists of the same numbers as fractions."""
+    if np.ndim(values):
+        return [rational(row) for row in values]
+    return Fraction(*values.as_integer_ratio()) if isinstance(values, np.floating) else Fraction(int(values))
+
+
+def solution(K: list[Any], A: list[Any], f: list[Any], g: list[Any]) -> list[Fraction]:
+    """x of Kx + Aλ = f, Aᵀx ≤ g, λ ≥ 0, λᵀ(g − Aᵀx) = 0, exactly, by trying the contact sets."""
+    n, m = len(f), len(g)
+    for closed in product([False, True], repeat=m):
+        C = [j for j in range(m) if closed[j]]
+        rows = [[*K[i], *(A[i][j] for j in C), f[i]] for i in range(n)]
+        rows += [[*(A[i][j] for i in range(n)), *(Fraction(0) for _ in C), g[j]] for j in C]
+        found = eliminated(rows)
+        x, lam = found[:n], found[n:]
+        s = [g[j] - sum(A[i][j] * x[i] for i in range(n)) for j in range(m)]
+        if min([*s, *lam]) >= 0:
+            return x
+    raise AssertionError("a positive definite problem has an answer")
+
+
+def eliminated(rows: list[list[Fraction]]) -> list[Fraction]:
+    size = len(rows)
+    for k in range(size):
+        pivot = next(i for i in range(k, size) if rows[i][k] != 0)
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        for i in range(size):
+            if i != k and rows[i][k] != 0:
+                factor = rows[i][k] / rows[k][k]
+                rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
+    return [row[-1] / row[k] for k, row in enumerate(rows)]
+
+
+def error_of(x: Any, assembly: Assembly, load: LoadCase) -> Fraction:
+    """max|x − x*|, exactly, x* the answer to the problem as it was taken."""
+    K = sp.block_diag(assembly.blocks).toarray()
+    exact = solution(*map(rational, (K, assembly.A.toarray(), load.f, load.g)))
+    return max(abs(Fraction(float(a)) - b) for a, b in zip(x, exact, strict=True))
+
+
+def conditioned(seed: int, condition: float) -> dict[str, Any]:
+    """K with λmin 1 and λmax `condition`, contacts against rigid tools, half of them closed."""
+    rng = np.random.default_rng(seed)
+    basis = np.linalg.qr(rng.standard_normal((N, N)))[0]
+    K = (basis * np.geomspace(1, condition, N)) @ basis.T
+    x = rng.standard_normal(N)
+    f = K @ x + np.array([3.0, 2.0, 0.0, 0.0])
+    return {"K": (K + K.T) / 2, "A": np.eye(N), "f": f, "g": x + np.array([0.0, 0.0, 1.0, 2.0])}
+
+
+def by_an_ulp(seed: int, condition: float) -> dict[str, Any]:
+    data = conditioned(seed, condition)
+    rng = np.random.default_rng(seed)
+    K = data["K"]
+    for i, j in zip(*np.triu_indices(N, 1), strict=True):
+        K[i, j] = np.nextafter(K[i, j], rng.choice([-np.inf, np.inf]))
+    return data
+
+
+def extended(seed: int, condition: float) -> dict[str, Any]:
+    data, rng = conditioned(seed, condition), np.random.default_rng(seed)
+    for key in "KAfg":
+        value = np.asarray(data[key], dtype=np.longdouble)
+        data[key] = value * (1 + np.longdouble(2.0**-55) * rng.integers(-3, 4, value.shape))
+    data["K"] = np.triu(data["K"]) + np.triu(data["K"], 1).T
+    return data
+
+
+def whole(seed: int, condition: float) -> dict[str, Any]:
+    """Integers around 2⁶⁰, the unit of force so small that λmin is 2⁶⁰/condition or so."""
+    data, rng = conditioned(seed, condition), np.random.default_rng(seed)
+    scale = 2.0**60 / abs(data["K"]).max()
+    K = (data["K"] * scale).astype(np.int64) + rng.integers(-60, 60, (N, N))
+    K = np.triu(K) + np.triu(K, 1).T
+    return data | {"K": K, "f": (data["f"] * scale).astype(np.int64), "A": np.eye(N, dtype=np.int8)}
+
+
+Make = Callable[[int, float], dict[str, Any]]
+long_double = pytest.mark.skipif(not EXTENDED, reason="no long double here")
+ROUNDED, SYMMETRISED = "that float64 cannot hold were rounded", "was replaced by (K + Kᵀ)/2"
+
+
+@pytest.mark.parametrize(
+    ("make", "note"),
+    [
+        (by_an_ulp, SYMMETRISED),
+        (whole, f"K {ROUNDED}"),
+        pytest.param(extended, f"K, A, f, g {ROUNDED}", marks=long_double),
+    ],
+)
+@pytest.mark.parametrize("condition", [4e6, 4e9, 4e12])
+def test_the_bound_holds_for_the_problem_as_it_was_taken(
+    tmp_path: Path, make: Make, note: str, condition: float
+) -> None:
+    for seed in range(3):
+        np.savez(path := tmp_path / f"{seed}.npz", **make(seed, condition))
+        made, load = prepared(scene := read_scene(str(path))), load_case(scene)
+        assert note in made.assembly.notes[0]
+        (K,) = made.assembly.blocks
+        assert (K == K.T).all()
+        known = refined_active_set(made, load)
+        assert known.route.startswith("proven")
+        assert error_of(known.x, made.assembly, load) <= Fraction(known.bound_mm)
+
+
+def nearly_singular(above: float = 0.0, f: Any = 1.0, dtype: Any = float) -> tuple[Any, ...]:
+    """cond(K) = 2³²; K_01 is off by `above`."""
+    K = np.array([[1.0, 1.0 + above], [1.0, 1.0 + 2.0**-30]])
+    return K.astype(dtype), np.eye(2), np.array([f, 0], dtype=type(f)), np.array([1e30, 1e30])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "note"),
+    [
+        (nearly_singular(), nearly_singular(2.0**-52), SYMMETRISED),
+        (nearly_singular(), nearly_singular(2.0**-40), SYMMETRISED),
+        (nearly_singular(f=2.0**60), nearly_singular(f=np.int64(2**60 + 1)), ROUNDED),
+        pytest.param(
+            nearly_singular(),
+            nearly_singular(np.longdouble(2) ** -60, dtype=np.longdouble),
+            ROUNDED,
+            marks=long_double,
+        ),
+    ],
+)
+def test_an_earlier_problem_with_nearly_the_same_numbers_answers_no_other(
+    before: tuple[Any, ...], after: tuple[Any, ...], note: str
+) -> None:
+    """0.256 mm off was "within, 1.8e-16 mm" of an asymmetric K: the cache held another problem's bound."""
+    assert solve(own_matrices(*before)).notes == ()
+    found = solve(scene := own_matrices(*after))
+    data = prepared(scene)
+    assert note in found.notes[0]
+    assert error_of(found.x, data.assembly, load_case(scene)) <= Fraction(found.error_bound_mm)
+    assert found.error_bound_mm <= 1e-12 * abs(found.x).max()
+
+
+def test_what_float64_holds_is_taken_as_it_is(tmp_path: Path) -> None:
+    data, path = conditioned(0, 1e3), tmp_path / "same.npz"
+    for dtype in (np.float64, np.float32, np.longdouble):
+        np.savez(path, **{key: value.astype(np.float32).astype(dtype) for key, value in data.items()})
+        assert read_matrices({"problem": path})[0].notes == ()
+    K = np.eye(N, dtype=np.int64) * 2**60
+    np.savez(path, K=K, A=np.eye(N, dtype=bool), f=np.arange(N), g=np.full(N, 2**63, dtype=np.uint64))
+    assembly, load = read_matrices({"problem": path})
+    assert assembly.notes == ()
+    assert (load.g == 2.0**63).all()
+
+
+def test_integers_become_the_nearest_float64_and_K_the_mean_of_its_halves(tmp_path: Path) -> None:
+    K = np.eye(2) * 4.0
+    K[0, 1], K[1, 0] = 1.0, 1.0 + 2.0**-40
+    f, g = np.array([2**60 + 129, 2**63 - 1]), np.array([2**64 - 1, 5], dtype=np.uint64)
+    np.savez(tmp_path / "mine.npz", K=K, A=np.eye(2, dtype=int), f=f, g=g)
+    assembly, load = read_matrices({"problem": tmp_path / "mine.npz"})
+    assert (assembly.blocks[0][[0, 1], [1, 0]] == 1.0 + 2.0**-41).all()
+    np.testing.assert_array_equal(load.f, [2.0**60 + 256, 2.0**63])
+    np.testing.assert_array_equal(load.g, [2.0**64, 5.0])
+    rounded, symmetrised = assembly.notes
+    assert f"f, g {ROUNDED}" in rounded
+    assert "asymmetric by 9.1e-13 N/mm" in symmetrised
+
+
+@long_double
+@pytest.mark.parametrize("key", "KAfg")
+@pytest.mark.parametrize("lost", ["1e-18", "1e-4900"])
+def test_digits_of_extended_precision_are_said_to_be_lost(key: str, lost: str) -> None:
+    data: dict[str, Any] = {"K": np.eye(2) * 4.0, "A": np.eye(2), "f": np.zeros(2), "g": np.zeros(2)}
+    data[key] = data[key].astype(np.longdouble)
+    data[key].flat[0 if lost == "1e-18" else 1] += np.longdouble(lost)
+    if key == "K":
+        data[key].flat[2] = data[key].flat[1]
+    if lost == "1e-18" and key in "fg":
+        data[key].flat[0] += 1
+    (note,) = prepared(own_matrices(**data)).assembly.notes
+    assert f"Numbers of {key} {ROUNDED}" in note
+
+
+def test_the_cache_keeps_the_notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+    np.savez(tmp_path / "mine.npz", **by_an_ulp(0, 1e6))
+    first = prepared(read_scene(str(tmp_path / "mine.npz"))).assembly.notes
+    monkeypatch.setattr(cache, "store", lambda *_: pytest.fail("read a second time"))
+    assert prepared(read_scene(str(tmp_path / "mine.npz"))).assembly.notes == first != ()
+
+
+@pytest.mark.parametrize("f", [1.7e308, 1e308])
+def test_a_load_that_overflows_is_not_called_proven(f: float) -> None:
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    made = Prepared(Assembly((np.asfortranarray(K),), sp.csc_array(np.eye(2))))
+    found = refined_active_set(made, LoadCase(np.full(2, f), np.zeros(2)))
+    assert found.bound_mm == np.inf
+    assert found.route == UNPROVEN
