@@ -136,7 +136,7 @@ def test_a_step_counts_what_cancels_in_K_dx_and_in_A_dlam() -> None:
 def state_at_rest(data: Prepared) -> _State:
     """x, λ and r are zero; the units are 1, and of the bound only what rounding needs is right."""
     n, m = data.assembly.A.shape
-    (K,) = data.assembly.sparse_blocks
+    K = data.assembly.K.matrix
     sizes, one = abs(K) @ np.ones((n, 1)), np.ones((n, 1))
     bound = SparseBound(data, bound_of(DATA).M, sp.csc_array(abs(data.assembly.A)), sizes, one, 1.0, 1.0, 1.0)
     return _State(bound, stacked([LoadCase(np.zeros(n), np.ones(m))]), np.zeros((m, 1)))
