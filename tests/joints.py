@@ -27,7 +27,7 @@ def make_scene(joint: Joint, *effects: Effect) -> JointScene:
 def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:
     """From here on every matrix has to come from the cache."""
     for stage in (
-        "condensation.condense.condense",
+        "full_model.condense.condense",
         "stiffness.dense.cholesky",
         "stiffness.dense.DenseBlock.compliance",
     ):

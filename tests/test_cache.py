@@ -178,7 +178,7 @@ OWN = "input.user_matrices"  # makes a user's matrices, no joint's
 @pytest.mark.parametrize(
     "module",
     [
-        *("fem.hermite", "fem.plate", "condensation.condense", "condensation.condensed_part"),
+        *("fem.hermite", "fem.plate", "full_model.condense", "full_model.condensed"),
         *("model.joint", "model.part", "stiffness.dense", "forms.stages", "effects.supports", OWN),
     ],
 )

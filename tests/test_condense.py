@@ -13,7 +13,6 @@ from scipy.sparse.linalg import spsolve
 
 from harness.verification.principal_pivoting import contact_set
 from problems.build import load_case, prepared
-from problems.condensation.condense import NotPositiveDefinite, condense
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
@@ -23,6 +22,7 @@ from problems.effects.supports import Supports
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
+from problems.full_model.condense import NotPositiveDefinite, condense
 from problems.model.effect import StiffnessEffect
 from problems.model.scene import Scene
 

@@ -17,10 +17,10 @@ from problems.build import load_case, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
 from problems.forms.assembly import Assembly, Matrix
+from problems.full_model.joint_model import JointModel
 from problems.model.scene import JointScene
 from problems.scene import read_scene, scene_names
 from problems.stiffness.banded import half_bandwidth
-from problems.uncondensed.whole_model import WholeModel
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
 END = {"length": 90.0, "elements": 2}
@@ -97,7 +97,7 @@ def test_springs_past_a_part_in_between_and_loads_beyond_the_junction() -> None:
     check_same(scene)
     assert prepared(scene, form="sparse").assembly.parts == ("a + c", "b")
     f = load_case(scene, "sparse").f
-    beyond = np.delete(f, WholeModel.of(scene).junction)
+    beyond = np.delete(f, JointModel.of(scene).junction)
     assert np.count_nonzero(beyond) > len(beyond) / 4
 
 
@@ -106,17 +106,17 @@ def test_the_numbering_is_one_and_narrow(name: str) -> None:
     """Every free unknown has one number; the band is that of a line of nodes, and two nodes, across."""
     scene = read_scene(name)
     assert isinstance(scene, JointScene)
-    model = WholeModel.of(scene)
+    model = JointModel.of(scene)
     numbers = np.concatenate(model.numbering.places)
     assert sorted(numbers[numbers >= 0]) == list(range(model.numbering.size))
-    for place, part in zip(model.numbering.places, model.models, strict=True):
+    for place, part in zip(model.numbering.places, model.parts, strict=True):
         clamped = [part.plate.line_dofs(line) for line in part.clamped]
         assert (
             np.flatnonzero(place < 0) == np.sort(np.concatenate([*clamped, np.zeros(0, dtype=int)]))
         ).all()
     for parts, K in zip(model.numbering.blocks, model.assembly().K.matrices, strict=True):
-        along = sum(len(model.models[part].plate.x) for part in parts)
-        across = sum(len(model.models[part].free_lines) for part in parts)
+        along = sum(len(model.parts[part].plate.x) for part in parts)
+        across = sum(len(model.parts[part].free_lines) for part in parts)
         assert half_bandwidth(K) <= 4 * (min(along, across) + 2) - 1
 
 

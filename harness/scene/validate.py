@@ -19,8 +19,7 @@ from harness.planning.estimate import (
 )
 from harness.planning.road import cheaper
 from harness.results.machine import physical_memory_mib
-from problems.build import prepared
-from problems.condensation.build import built
+from problems.build import model_of, prepared
 from problems.forms.names import FORMS
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
@@ -46,7 +45,7 @@ def validate(source: str, console: Console) -> None:
     console.print(_contents(scene))
     console.print(f"n = {dense.n} unknowns, m = {dense.m} contacts; this machine has {physical} MiB.")
     if dense_fits:
-        console.print(_dense(dense, built(scene)))
+        console.print(_dense(dense, model_of(scene).built))
     else:
         console.print(
             f"No dense form can hold it: the process would take up to {dense.peak_mib:.0f} MiB. The sparse "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -98,11 +98,11 @@ class JointScene(Scene):
     def expected_size(self) -> tuple[int, int]:
         return self.joint.size
 
-    def junction_load(self) -> tuple[Vector, Vector]:
-        """f (n,) N of the forces on the junction, and the initial gaps g (m,) mm."""
+    def junction_load(self, effects: Iterable[Effect]) -> tuple[Vector, Vector]:
+        """f (n,) N of the forces on the junction, and the initial gaps g (m,) mm, of some effects."""
         n, m = self.joint.size
         f, g = np.zeros(n), np.zeros(m)
-        for effect in self.effects:
+        for effect in effects:
             if isinstance(effect, ForceEffect):
                 f += effect.force(self.joint)
             elif isinstance(effect, GapEffect):
