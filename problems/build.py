@@ -1,16 +1,41 @@
-"""From a scene to its problem in one of the forms: the matrices that load cases share, and a load case.
+"""From a scene to its model, and to the matrices and a load case of one form of its quadratic program.
 
-The dense forms condense the model onto the junction; the sparse form takes it as it is. Only the code of the
-road that is taken is imported.
+The dense forms condense the model onto the junction; the sparse form takes it as it is. Only the code that a
+form needs is imported.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
-from problems.model.scene import MadeScene, Scene
+from problems.full_model.model import Model
+from problems.model.effect import Effect
+from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
+
+_last: tuple[Scene, Model] | None = None  # of several, only the last one stays in memory
+
+
+def model_of(scene: Scene) -> Model:
+    """The model of a scene, made once for the same scene object."""
+    global _last
+    if _last is None or _last[0] is not scene:
+        _last = scene, _model(scene)
+    return _last[1]
+
+
+def _model(scene: Scene) -> Model:
+    if isinstance(scene, JointScene):
+        from problems.full_model.joint_model import JointModel
+
+        return JointModel.of(scene)
+    from problems.full_model.given_model import GivenModel
+
+    assert isinstance(scene, MatricesScene | MadeScene)
+    return GivenModel.of(scene)
 
 
 def prepared(scene: Scene, progress: Progress = lambda text, fraction: None, form: Form = "dual") -> Prepared:
@@ -19,25 +44,13 @@ def prepared(scene: Scene, progress: Progress = lambda text, fraction: None, for
     Factors and Q are made when first needed. Raises InputError if a part can move freely, if a user's
     matrices are invalid, or if contacts of a rung depend on one another.
     """
-    if isinstance(scene, MadeScene):
-        from problems.input.dependent_contacts import refuse_dependent
-
-        refuse_dependent(scene.made.assembly.A, scene.source_of("A"))
-    if form == "sparse":
-        from problems.uncondensed import build as uncondensed
-
-        return uncondensed.prepared(scene)
-    from problems.condensation import build as condensed
-
-    return condensed.prepared(scene, progress)
+    model = model_of(scene)
+    return model.sparse() if form == "sparse" else model.dense(progress)
 
 
-def load_case(scene: Scene, form: Form = "dual") -> LoadCase:
-    """f, an entry per unknown of K, and g: the sum of the scene's effects' terms, or the user's own."""
-    if form == "sparse":
-        from problems.uncondensed import build as uncondensed
+def load_case(scene: Scene, form: Form = "dual", effects: Iterable[Effect] | None = None) -> LoadCase:
+    """f, an entry per unknown of K, and g: the sum of the scene's effects' terms, or the user's own.
 
-        return uncondensed.load_case(scene)
-    from problems.condensation import build as condensed
-
-    return condensed.load_case(scene)
+    effects : of a joint, those that count; by default all.
+    """
+    return model_of(scene).load_case(form == "sparse", effects)

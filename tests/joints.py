@@ -27,9 +27,9 @@ def make_scene(joint: Joint, *effects: Effect) -> JointScene:
 def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:
     """From here on every matrix has to come from the cache."""
     for stage in (
-        "condensation.condense.condense",
-        "forms.factorisation.factor",
-        "forms.factorisation.schur",
+        "full_model.condense.condense",
+        "stiffness.dense.cholesky",
+        "stiffness.dense.DenseBlock.compliance",
     ):
         monkeypatch.setattr(f"problems.{stage}", lambda *_: pytest.fail("built a second time"))
 

@@ -29,11 +29,11 @@ from harness import (
 )
 from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
-from problems.condensation import build as condensation
 from problems.effects.fasteners import Fasteners
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.full_model.joint_model import JointModel
 from problems.model.joint import Joint
 from solvers.base import failed
 from solvers.registry import modules
@@ -42,7 +42,7 @@ from solvers.registry import modules
 def matrices(seed: int = 3) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
     data = make_prepared(seed, 6, tools=2)
     load = make_load(seed, data)[1]
-    return data, load, (sp.block_diag(data.assembly.blocks), data.assembly.A, load.f, load.g)
+    return data, load, (sp.block_diag(data.assembly.K.matrices), data.assembly.A, load.f, load.g)
 
 
 def dual(seed: int = 3) -> tuple[Matrix, Vector, Vector]:
@@ -233,7 +233,7 @@ def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytes
     gaps = [found.gap for found in solve_series(scene, random_gaps(scene, 2, seed=5))]
     load = load_case(scene, "sparse")
     x = reference_of(scene, prepared(scene, form="sparse"), load).x
-    monkeypatch.setattr(condensation, "prepared", lambda *given: pytest.fail("condensed"))
+    monkeypatch.setattr(JointModel, "dense", lambda *given: pytest.fail("condensed"))
     cases = random_gaps(scene, 2, seed=5, form="sparse")
     found = list(solve_series(scene, cases, form="sparse"))
     assert [result.row["verdict"] for result in found] == ["within"] * 2

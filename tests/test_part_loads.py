@@ -19,6 +19,7 @@ from problems.effects.support_shift import SupportShift
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
 from problems.forms.prepared import Prepared
+from problems.full_model.joint_model import JointModel
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.joint import Joint
 from problems.model.part import PartModel
@@ -42,7 +43,7 @@ FREE_JOINT = make_joint(OVERHANG, contacts=[["a", "tool"]])
 def solved(joint: Joint, *effects: Effect) -> tuple[NDArray[np.float64], Prepared]:
     scene = make_scene(joint, *effects)
     made = prepared(scene)
-    return made.solve_K(load_case(scene).f), made
+    return made.assembly.K.solve(load_case(scene).f), made
 
 
 def strip(*effects: Effect) -> NDArray[np.float64]:
@@ -195,12 +196,10 @@ def test_junction_moves_as_in_the_whole_plate(load: PartLoadEffect, part: dict[s
 
 
 def test_a_condensed_load_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    from problems.condensation import condensed_load
-
     scene = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1234.0))
     prepared(scene)
     first = load_case(scene)
-    monkeypatch.setattr(condensed_load, "_condensed", lambda *_: pytest.fail("condensed a second time"))
+    monkeypatch.setattr(JointModel, "interior", lambda *_: pytest.fail("condensed a second time"))
     np.testing.assert_array_equal(load_case(scene).f, first.f)
     heavier = make_scene(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a", density=1235.0))
     with pytest.raises(pytest.fail.Exception, match="second time"):

@@ -10,12 +10,12 @@ import scipy.linalg as sla
 from joints import make_joint, make_scene
 
 from problems.build import load_case, prepared
+from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.full_model.joint_model import JointModel
 from problems.model.effect import Effect, effect_class
 from problems.model.scene import JointScene
 from problems.scene import read_scene, scene_names
-from problems.uncondensed.whole_model import WholeModel
 from solvers.registry import make_solver
 
 LONG = {
@@ -47,11 +47,11 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_the_compliance_is_nearly_the_same_and_no_larger(name: str) -> None:
     """K' = PᵀKP, so Q' ≤ Q; half of the unknowns are gone."""
-    model = WholeModel.of(SCENES[name])
+    model = JointModel.of(SCENES[name])
     coarse = model.graded()
     assert coarse.numbering.size < 0.7 * model.numbering.size
     assert coarse.numbering.blocks == model.numbering.blocks
-    Q, near = SparsePrepared(model.assembly()).Q, SparsePrepared(coarse.assembly()).Q
+    Q, near = Prepared(model.assembly()).Q, Prepared(coarse.assembly()).Q
     ratio = sla.eigh(near, Q, eigvals_only=True)
     assert 1 - 2e-3 <= ratio[0] < 1 - 1e-6
     assert ratio[-1] <= 1 + 1e-9
@@ -59,10 +59,10 @@ def test_the_compliance_is_nearly_the_same_and_no_larger(name: str) -> None:
 
 @pytest.mark.parametrize("scene", [*SCENES.values(), *map(read_scene, scene_names()[-9:])])
 def test_the_junction_and_the_clamped_edges_are_kept(scene: Any) -> None:
-    model = WholeModel.of(scene)
+    model = JointModel.of(scene)
     coarse = model.graded()
     assert coarse.junction.shape == model.junction.shape
-    for given, made in zip(model.models, coarse.models, strict=True):
+    for given, made in zip(model.parts, coarse.parts, strict=True):
         np.testing.assert_array_equal(given.plate.y[list(given.junction)], made.plate.y[list(made.junction)])
         assert set(made.plate.y) <= set(given.plate.y)
         assert {made.plate.y[line] for line in made.clamped} == {
@@ -73,9 +73,9 @@ def test_the_junction_and_the_clamped_edges_are_kept(scene: Any) -> None:
 
 def test_the_lines_of_stiff_beams_and_supports_are_kept() -> None:
     def lines(name: str) -> set[float]:
-        return set(WholeModel.of(SCENES[name]).graded().models[0].plate.y.tolist())
+        return set(JointModel.of(SCENES[name]).graded().parts[0].plate.y.tolist())
 
-    full = WholeModel.of(SCENES["ribs"]).models[0].plate.y
+    full = JointModel.of(SCENES["ribs"]).parts[0].plate.y
     beams = {float(full[np.argmin(abs(full - y))]) for y in (320.0, 520.0)}
     assert beams <= lines("ribs")
     assert not beams <= lines("plain")
@@ -88,8 +88,8 @@ def test_without_a_coarser_model_the_answer_is_the_same() -> None:
     press = effect("fasteners", preload=200.0, points=[[200.0, 48.0], [100.0, 96.0]])
     scene = joint_with(gap, press)
     coarse, fine = prepared(scene, form="sparse"), prepared(scene, form="sparse")
-    assert isinstance(coarse, SparsePrepared)
-    assert isinstance(fine, SparsePrepared)
+    assert not coarse.assembly.K.dense
+    assert not fine.assembly.K.dense
     assert coarse.coarser is not None
     fine.coarser = None
     load, answers = load_case(scene, "sparse"), []

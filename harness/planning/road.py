@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from harness.results.machine import physical_memory_mib
-from problems.condensation.build import built
+from problems.build import model_of
 from problems.errors import InputError
 from problems.forms.names import DENSE_FORMS, Form, default_form
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
@@ -63,7 +63,7 @@ def cheaper(scene: Scene, taken: Sequence[Form], cases: int = 1, in_house: bool 
         refuse_what_cannot_fit(scene, scene.name)
     if not in_house or "sparse" not in taken or usual == "sparse" or sparse.peak_mib > physical:
         return Choice(usual)
-    build_s = 0.0 if built(scene) else condensed.build_s
+    build_s = 0.0 if model_of(scene).built else condensed.build_s
     per_case = (2 * SWEEPS * condensed.m**2 + 2 * PRODUCTS * condensed.n**2) / FLOPS_PER_S
     dense_s = build_s + (condensed.answer_s if cases == 1 else cases * per_case)
     # Load cases share their solutions, but for the first, whose answer the others start from.

@@ -6,7 +6,7 @@ import time
 import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,9 +88,8 @@ def _entries(
         with measured() as cost:
             T, k = effect.springs(joint)
         yield Entry(name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", cost.seconds, cost.mib)
-    alone = replace(scene, effects=(*scene.stiffness_effects, effect))
     with measured() as cost:
-        load = load_case(alone, "dual" if junction is None else "sparse")
+        load = load_case(scene, "dual" if junction is None else "sparse", [effect])
     if isinstance(effect, GapEffect):
         yield Entry(name, "gap", _gap(load.g), cost.seconds, cost.mib)
     elif junction is not None and isinstance(effect, PartLoadEffect):

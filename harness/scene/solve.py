@@ -31,7 +31,6 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene, Scene
@@ -108,7 +107,7 @@ def solve(
         threadpoolctl.threadpool_limits(1)  # a second thread gains nothing on narrow bands, and spins
     with steps.step("matrices"):
         data = prepared(scene, steps.building, road.form)
-        _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.factors
+        _ = data.assembly.K.factors
     for note in data.assembly.notes:
         console.print(f"{note}.", style="yellow")
     with steps.step("the effects, each alone"):

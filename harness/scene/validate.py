@@ -19,10 +19,8 @@ from harness.planning.estimate import (
 )
 from harness.planning.road import cheaper
 from harness.results.machine import physical_memory_mib
-from problems.build import prepared
-from problems.condensation.build import built
+from problems.build import model_of, prepared
 from problems.forms.names import FORMS
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, Scene
@@ -47,7 +45,7 @@ def validate(source: str, console: Console) -> None:
     console.print(_contents(scene))
     console.print(f"n = {dense.n} unknowns, m = {dense.m} contacts; this machine has {physical} MiB.")
     if dense_fits:
-        console.print(_dense(dense, built(scene)))
+        console.print(_dense(dense, model_of(scene).built))
     else:
         console.print(
             f"No dense form can hold it: the process would take up to {dense.peak_mib:.0f} MiB. The sparse "
@@ -86,10 +84,10 @@ def _matrices(scene: Scene, console: Console) -> None:
     """Print the sizes and digits of given matrices. Raises InputError if K is not positive definite."""
     road = cheaper(scene, FORMS)
     data = prepared(scene, form=road.form)
-    _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.factors
+    _ = data.assembly.K.factors
     assembly = data.assembly
-    blocks = ", ".join(str(K.shape[0]) for K in assembly.blocks)
-    if isinstance(data, SparsePrepared):
+    blocks = ", ".join(str(K.shape[0]) for K in assembly.K.matrices)
+    if road.form == "sparse":
         console.print(f"Sparse form by default: {road.why}.")
     console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
     for note in assembly.notes:

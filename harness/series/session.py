@@ -29,7 +29,6 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.load_cases.base import LoadCases
 from problems.model.scene import Scene
 from solvers.base import Answer, Form, Solver, failed
@@ -83,7 +82,7 @@ def assessor(data: Prepared, limit_mm: float) -> Assess:
 
     Raises InputError if rounding leaves Q indefinite.
     """
-    if isinstance(data, SparsePrepared):
+    if not data.assembly.K.dense:
         return SparseAssessor(data, limit_mm / 10)
     try:
         return partial(assess, Bound.of(data))
@@ -175,7 +174,7 @@ class SeriesSession:
         """The rows and gaps, with a proven error bound for each answer."""
         start = time.perf_counter()
         known = self._assessed(attempts)
-        if self.session.batch is not None and not isinstance(self.data, SparsePrepared):
+        if self.session.batch is not None and self.data.assembly.K.dense:
             self._retry(attempts, known)
         share = (time.perf_counter() - start) / len(attempts)
         return [self._result(each, known.get(each.case), share) for each in attempts]

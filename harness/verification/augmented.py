@@ -19,8 +19,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.sparse_factor import factored
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.stiffness.sparse import sparse_block
 
 from .interior_point import interior_contact_set
 from .principal_pivoting import Stop, pivoted
@@ -35,7 +35,7 @@ ROUNDING = 2.0**-50  # of the largest term: gaps and forces that are zero but fo
 class ContactSystem:
     """The conditions for one set of closed contacts, active (m,) bool."""
 
-    def __init__(self, prepared: SparsePrepared, active: NDArray[np.bool_]) -> None:
+    def __init__(self, prepared: Prepared, active: NDArray[np.bool_]) -> None:
         assembly = prepared.assembly
         self.assembly, self.prepared = assembly, prepared
         self.rows = np.flatnonzero(active)
@@ -45,15 +45,15 @@ class ContactSystem:
             return
         touched = np.unique(self.A_C.indices)
         largest = float((self.A_C.data**2).max())
-        self.rho = STIFFER * float(assembly.diagonal_K()[touched].max()) / largest
-        K = sp.block_diag(assembly.blocks, format="csc")
-        self.factor = factored(sp.csc_array(K + self.rho * (self.A_C @ self.A_C.T)), assembly.nodes)
+        self.rho = STIFFER * float(assembly.K.diagonal[touched].max()) / largest
+        K = assembly.K.matrix
+        self.factor = sparse_block(sp.csc_array(K + self.rho * (self.A_C @ self.A_C.T)), assembly.nodes)
 
     def solve(self, force: Vector, gap: Vector) -> tuple[Vector, Vector]:
         """x (n,) and λ (m,), zero at open contacts, to a few digits. force (n,) N, gap (m,) mm."""
         lam = np.zeros(self.assembly.m)
         if not self.rows.size:
-            return self.prepared.solve_K(force), lam
+            return self.prepared.assembly.K.solve(force), lam
         g, lam_C = gap[self.rows], np.zeros(self.rows.size)
         for _ in range(PASSES):
             x = self.factor.solve(force + self.A_C @ (self.rho * g - lam_C))
@@ -63,13 +63,13 @@ class ContactSystem:
 
 
 def solution(
-    prepared: SparsePrepared, load: LoadCase, active: NDArray[np.bool_]
+    prepared: Prepared, load: LoadCase, active: NDArray[np.bool_]
 ) -> tuple[Vector, Vector, float, float]:
     """λ (m,) N with λ = 0 at open contacts, the gaps y = g − Aᵀx (m,) mm there, and the rounding of both."""
     assembly = prepared.assembly
     system = ContactSystem(prepared, active)
     x, lam = system.solve(load.f, load.g)
-    dx, dlam = system.solve(load.f - assembly.multiply_K(x) - assembly.A @ lam, load.g - assembly.A.T @ x)
+    dx, dlam = system.solve(load.f - assembly.K.multiply(x) - assembly.A @ lam, load.g - assembly.A.T @ x)
     x, lam = x + dx, lam + dlam
     y = load.g - assembly.A.T @ x
     missed = float(abs(y[active]).max(initial=0.0))
@@ -79,7 +79,7 @@ def solution(
 
 
 def contact_set(
-    prepared: SparsePrepared, load: LoadCase, start: NDArray[np.bool_], stop: Stop
+    prepared: Prepared, load: LoadCase, start: NDArray[np.bool_], stop: Stop
 ) -> NDArray[np.bool_]:
     """The closed contacts by principal pivoting from a first set; a guess, if `stop` ends the search."""
     m = prepared.assembly.m
@@ -89,28 +89,26 @@ def contact_set(
     def rescue() -> NDArray[np.bool_] | None:
         if m > FEW:
             return None
-        return interior_contact_set(prepared.compliance, prepared.dual_load(load), stop)
+        return interior_contact_set(prepared.Q, prepared.dual_load(load), stop)
 
     return pivoted(lambda S: solution(prepared, load, S), start, rescue, stop)[0]
 
 
-def _with_springs(
-    prepared: SparsePrepared, load: LoadCase, S: NDArray[np.bool_], stop: Stop
-) -> NDArray[np.bool_]:
+def _with_springs(prepared: Prepared, load: LoadCase, S: NDArray[np.bool_], stop: Stop) -> NDArray[np.bool_]:
     """The contacts that overlap if springs hold them, the set found anew for springs ever stiffer, from as
     stiff as K against the overlap of S to as stiff as its stiffest unknown at a contact.
 
     From S itself pivoting would open the contacts at its edge alone, a row of them per factorisation.
     """
     assembly = prepared.assembly
-    A, K = assembly.A, sp.csc_array(sp.block_diag(assembly.blocks, format="csc"))
-    stiffest = float(assembly.diagonal_K()[A.indices].max()) / float((A.data**2).max())
+    A, K = assembly.A, assembly.K.matrix
+    stiffest = float(assembly.K.diagonal[A.indices].max()) / float((A.data**2).max())
     overlap = np.where(S, prepared.dual_load(load), 0.0)
-    given_way = float(overlap @ (A.T @ prepared.solve_K(A @ overlap)))
+    given_way = float(overlap @ (A.T @ prepared.assembly.K.solve(A @ overlap)))
     rho = float(overlap @ overlap) / given_way if given_way > 0 else stiffest
     while rho < stiffest and S.any() and not stop():
         springs = sp.diags_array(rho * S)
-        factor = factored(sp.csc_array(K + A @ springs @ A.T), assembly.nodes)
+        factor = sparse_block(sp.csc_array(K + A @ springs @ A.T), assembly.nodes)
         S = A.T @ factor.solve(load.f + A @ (springs @ load.g)) > load.g
         rho *= STIFFENING
     return S

@@ -14,14 +14,14 @@ additions are exact there. Both are counted. What overflows ends as infinity or 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, Matrix, Vector
+from problems.stiffness.rounding import U as U
+from problems.stiffness.rounding import gamma as gamma
 
-U = 2.0**-53
 ETA = 2.0**-1074  # the smallest positive number
 SMALLEST_SCALE = 2.0**-960  # bounds are multiplied by no factor below it, lest they underflow to nothing
 SPARSE_ROWS_AT_A_TIME = 4096
@@ -89,17 +89,12 @@ class ErrorFreeSum:
         return Enclosure(value, 1.01 * error)
 
 
-def gamma(k: Any) -> Any:
-    """γ_k = ku/(1 − ku)."""
-    return k * U / (1 - k * U)
-
-
 def forces(assembly: Assembly, f: Vector, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
     """r = f − Kx − Aλ with its error bound, N."""
     total = ErrorFreeSum(assembly.n)
     total.add(f)
     subtract_sparse(total, slice(None), sp.csr_array(assembly.A), lam)
-    for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
+    for K, rows in zip(assembly.K.matrices, assembly.K.slices, strict=True):
         part = DoubleDouble(x.hi[rows], x.lo[rows])
         if sp.issparse(K):
             subtract_sparse(total, rows, sp.csr_array(K.T), part)  # symmetric, and stored by columns

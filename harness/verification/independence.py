@@ -7,10 +7,13 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from problems.forms.assembly import Assembly
+from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.operator import Stiffness
 
 from .definite import SMALLEST, smallest_eigenvalue
 from .exact_residual import gamma
 
+SHARE, STEPS = 0.9, 20  # of an estimate of λmin that is no smaller, by so many steps of the power method
 SAFE = 1.01  # for the rounding of the bound itself
 
 
@@ -19,15 +22,22 @@ def independence(assembly: Assembly) -> float:
     G = sp.csr_array(assembly.A.T @ assembly.A)
     count, label = connected_components(G, directed=False)
     sizes = np.bincount(label, minlength=count)
-    groups = np.split(np.argsort(label, kind="stable"), np.cumsum(sizes)[:-1])
     least = float(G.diagonal()[sizes[label] == 1].min(initial=np.inf))
-    for group in groups:
-        if len(group) > 1:
-            block = np.asfortranarray(G[group][:, group].toarray())
-            least = min(least, smallest_eigenvalue(block, float(np.linalg.eigvalsh(block)[0])))
+    shared = np.flatnonzero(sizes[label] > 1)
+    if shared.size:
+        least = min(least, _least(Stiffness.of(sp.csc_array(G[shared][:, shared]))))
     # The entries of AᵀA are rounded themselves, and so is the difference.
     uncertainty = (
         SAFE * gamma(assembly.n + 1) * float(G.diagonal().max(initial=0.0)) * int(sizes.max(initial=1))
     )
     sigma2 = least - uncertainty
     return float(sigma2) if sigma2 >= SMALLEST else 0.0
+
+
+def _least(G: Stiffness) -> float:
+    one = np.ones(G.size)
+    try:
+        guesses = [SHARE * about for about in G.least_eigenvalues(one, STEPS)]
+    except NotPositiveDefinite:
+        return 0.0
+    return smallest_eigenvalue(G, one, guesses)

@@ -17,17 +17,16 @@ import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
 
-from problems.forms.assembly import Vector
-from problems.forms.compliance import AnyQ, Compliance
+from problems.forms.assembly import Matrix, Vector
 
 MAX_ITERATIONS = 100
 TO_BOUNDARY = 0.99  # share of the step to the boundary
 SMALLEST_MU = 1e-30  # of the first μ: the signs do not change any more
 
 
-def interior_contact_set(Q: AnyQ, p: Vector, stop: Callable[[], bool] = lambda: False) -> NDArray[np.bool_]:
+def interior_contact_set(Q: Matrix, p: Vector, stop: Callable[[], bool] = lambda: False) -> NDArray[np.bool_]:
     """(m,) bool, λᵢ√qᵢᵢ > yᵢ/√qᵢᵢ at the last iterate. stop : asked before each iteration."""
-    dense = Q.toarray() if isinstance(Q, Compliance) else np.asarray(Q)
+    dense = np.asarray(Q)
     root = np.sqrt(np.diag(dense))
     H, q = dense / root / root[:, None], p / root
     size = float(abs(q).max(initial=0.0)) or 1.0

@@ -16,8 +16,7 @@ import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
 
-from problems.forms.assembly import Vector
-from problems.forms.compliance import AnyQ, dense_submatrix, submatrix
+from problems.forms.assembly import Matrix, Vector
 
 from .interior_point import interior_contact_set
 
@@ -33,7 +32,7 @@ FULL_EXCHANGES = 3  # without a new smallest count of infeasibilities, before si
 
 
 def contact_set(
-    Q: AnyQ, p: Vector, start: NDArray[np.bool_] | None = None, stop: Stop = lambda: False
+    Q: Matrix, p: Vector, start: NDArray[np.bool_] | None = None, stop: Stop = lambda: False
 ) -> NDArray[np.bool_]:
     """The closed contacts: (m,) bool, with λ > 0 and y = 0 where True; a guess, if `stop` ends the search.
 
@@ -89,31 +88,31 @@ def pivoted(
         S = S ^ wrong
 
 
-def _first_set(Q: AnyQ, p: Vector, stop: Stop) -> NDArray[np.bool_]:
+def _first_set(Q: Matrix, p: Vector, stop: Stop) -> NDArray[np.bool_]:
     """The contacts closed if every other one is left out, and those that then overlap; p > 0 if m is small.
 
     The half is solved in the same way, from its own half: small factors replace most of the large ones.
     """
     if len(p) <= SMALL_PROBLEM or not (p > 0).any():
         return p > 0
-    half = submatrix(Q, np.arange(0, len(p), 2)), p[::2]
+    half = np.ascontiguousarray(Q[::2, ::2]), p[::2]
     lam = np.zeros(len(p))
     lam[::2] = _pivoted(*half, _first_set(*half, stop), stop)[1]
     return (lam > 0) | (Q @ lam < p)
 
 
-def _pivoted(Q: AnyQ, p: Vector, S: NDArray[np.bool_], stop: Stop) -> tuple[NDArray[np.bool_], Vector]:
+def _pivoted(Q: Matrix, p: Vector, S: NDArray[np.bool_], stop: Stop) -> tuple[NDArray[np.bool_], Vector]:
     """The closed contacts and λ, from a first set S."""
     return pivoted(lambda C: _solve_for(Q, p, C), S, lambda: interior_contact_set(Q, p, stop), stop)
 
 
-def _solve_for(Q: AnyQ, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vector, float, float]:
+def _solve_for(Q: Matrix, p: Vector, S: NDArray[np.bool_]) -> tuple[Vector, Vector, float, float]:
     """λ with Q_SS λ_S = p_S and λ = 0 outside S, y = Qλ − p outside S, and the rounding of both."""
     lam = np.zeros(len(p))
     rows = np.flatnonzero(S)
     if not rows.size:
         return lam, -p, 0.0, 0.0
-    block = dense_submatrix(Q, rows)
+    block = Q[np.ix_(rows, rows)].T
     factor = sla.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
     lam[rows] = sla.cho_solve(factor, p[rows], check_finite=False)
     y = Q @ lam - p

@@ -19,19 +19,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from problems.forms import balance
-from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.balance import balanced_units
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.scene import MadeScene, Scene
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
-from . import augmented, sparse_definite
+from . import augmented
 from .certificate import certify
 from .definite import smallest_eigenvalue
 from .exact_residual import gaps
@@ -42,6 +38,7 @@ from .sparse_bound import PROVEN_ENOUGH_MM, Proven, SparseBound
 MAX_SET_CORRECTIONS = 20
 STOPPED = "the search for the contact set was stopped"
 UNPROVEN = "could not be proven"
+KNOWN, ESTIMATED = 0.9, 0.5  # shares of λmin from Lanczos, and of an estimate that is no smaller
 
 
 @dataclass(frozen=True)
@@ -114,7 +111,7 @@ def of_refined(refined: Proven) -> Reference:
     return Reference(refined.x.hi, refined.lam.hi, refined.active, refined.bound_mm, "proven")
 
 
-def sparse_bound(prepared: SparsePrepared) -> SparseBound | None:
+def sparse_bound(prepared: Prepared) -> SparseBound | None:
     """What load cases of an assembly share of their proofs; None where nothing can be proven so."""
     return SparseBound.of(prepared, proven_lambda_min(prepared))
 
@@ -129,32 +126,21 @@ def proven_lambda_min(prepared: Prepared) -> float:
 
 
 def _proven_lambda_min(prepared: Prepared) -> float:
-    if isinstance(prepared, SparsePrepared):
-        return sparse_definite.smallest_eigenvalue(prepared, balanced_units(prepared.assembly))
-    estimates = _lambda_min_of_blocks(prepared)
-    blocks = map(_dense, prepared.assembly.blocks)
-    return min(smallest_eigenvalue(K, estimate) for K, estimate in zip(blocks, estimates, strict=True))
-
-
-def _lambda_min_of_blocks(prepared: Prepared) -> list[float]:
-    """An estimate for each block: λmin of all would be lost in the rounding of a much stiffer one.
-
-    Where the facts hold λmin of all blocks and each cond(K_i), that, or max_j k_jj / cond(K_i) ≤ λmin(K_i).
-    """
-    blocks, facts = prepared.assembly.blocks, prepared.facts
+    K, facts = prepared.assembly.K, prepared.facts
+    D = np.broadcast_to(units_of(prepared), K.size)
     least, conditions = facts.get("lambda_min"), facts.get("cond_blocks")
-    if not (isinstance(least, float) and isinstance(conditions, list)):
-        return [float(np.linalg.eigvalsh(_dense(K))[0]) for K in blocks]
-    return [max(least, float(K.diagonal().max()) / c) for K, c in zip(blocks, conditions, strict=True)]
-
-
-def _dense(K: Any) -> Matrix:
-    return K.toarray() if sp.issparse(K) else K
+    if isinstance(least, float) and isinstance(conditions, list):  # max_j k_jj / cond(K_i) ≤ λmin(K_i)
+        pairs = zip(K.blocks, conditions, strict=True)
+        guesses = [KNOWN * max(least, float(block.diagonal().max()) / c) for block, c in pairs]
+    else:
+        guesses = [ESTIMATED * about for about in K.least_eigenvalues(D)]
+    return smallest_eigenvalue(K, D, guesses)
 
 
 def _code() -> str:
     """The fingerprint of the code for references: those of other code are recomputed."""
-    return fingerprint([Path(__file__), Path(balance.__file__)], within=["harness/verification"])
+    within = ["harness/verification", "problems/stiffness"]
+    return fingerprint([Path(__file__)], within)
 
 
 def refined_active_set(
@@ -168,7 +154,7 @@ def refined_active_set(
     guess : λ (m,) N of an answer, from whose set the search starts; with a sparse K the answer itself is
         refined, if that proves enough. The proof does not depend on where it came from.
     """
-    if guess is not None and isinstance(prepared, SparsePrepared):
+    if guess is not None and not prepared.assembly.K.dense:
         bound = sparse_bound(prepared)
         refined = bound.proven([load], [guess])[0] if bound else None
         if refined is not None and refined.bound_mm <= PROVEN_ENOUGH_MM:
@@ -211,6 +197,6 @@ def certified_active_set(
 
 
 def _contact_set(prepared: Prepared, load: LoadCase, p: Vector, stop: Stop) -> NDArray[np.bool_]:
-    if isinstance(prepared, SparsePrepared):
+    if not prepared.assembly.K.dense:
         return augmented.contact_set(prepared, load, p > 0, stop)
-    return contact_set(prepared.compliance, p, stop=stop)
+    return contact_set(prepared.Q, p, stop=stop)

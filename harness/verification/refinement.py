@@ -13,10 +13,7 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.balance import balanced_units
-from problems.forms.compliance import dense_submatrix
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
 
 from . import augmented
 from .exact_residual import DoubleDouble, forces, gaps
@@ -30,7 +27,7 @@ ENOUGH = 1e-20  # relative to x: a smaller correction is the last
 
 def units_of(prepared: Prepared) -> Vector | float:
     """D (n,), the units in which the error is bounded: balanced for a sparse K, mm for a condensed one."""
-    return balanced_units(prepared.assembly) if isinstance(prepared, SparsePrepared) else 1.0
+    return prepared.assembly.K.units if not prepared.assembly.K.dense else 1.0
 
 
 def refined_solution(
@@ -40,7 +37,7 @@ def refined_solution(
     assembly, units = prepared.assembly, units_of(prepared)
     solve: ContactSolve = (
         augmented.ContactSystem(prepared, active).solve
-        if isinstance(prepared, SparsePrepared)
+        if not prepared.assembly.K.dense
         else _dense_system(prepared, np.flatnonzero(active))
     )
     x = DoubleDouble(np.zeros(assembly.n), np.zeros(assembly.n))
@@ -64,14 +61,14 @@ def _dense_system(prepared: Prepared, rows: NDArray[np.intp]) -> ContactSolve:
     assembly = prepared.assembly
     A_C, factor = assembly.A[:, rows], None
     if rows.size:
-        block = dense_submatrix(prepared.compliance, rows)
+        block = prepared.compliance.submatrix(rows).toarray()
         factor = sla.cho_factor(block, lower=True, overwrite_a=True)
 
     def solve(force: Vector, gap: Vector) -> tuple[Vector, Vector]:
-        x, lam = prepared.solve_K(force), np.zeros(assembly.m)
+        x, lam = prepared.assembly.K.solve(force), np.zeros(assembly.m)
         if factor is not None:
             lam[rows] = sla.cho_solve(factor, A_C.T @ x - gap[rows], check_finite=False)
-            x = x - prepared.solve_K(assembly.A @ lam)
+            x = x - prepared.assembly.K.solve(assembly.A @ lam)
         return x, lam
 
     return solve

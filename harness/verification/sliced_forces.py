@@ -54,7 +54,7 @@ class SlicedForces:
         total = ErrorFreeSum(x.hi.shape)
         total.add(np.broadcast_to(f, x.hi.shape))
         subtract_sparse(total, slice(None), sp.csr_array(self.assembly.A), lam)
-        for K, rows in zip(self.assembly.sparse_blocks, self.assembly.slices, strict=True):
+        for K, rows in zip(self.assembly.K.matrices, self.assembly.K.slices, strict=True):
             D = self.D[rows]
             _subtract(total, rows, K, D, DoubleDouble(x.hi[rows] / D, x.lo[rows] / D))
         return total.enclosed()

@@ -24,11 +24,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.balance import balanced_units
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector, stacked
 from problems.forms.banded_inverse import BandedInverse, BandFactor
-from problems.forms.problem import stacked
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 from .exact_residual import ETA, DoubleDouble, Enclosure, U, gamma, gaps
 from .independence import independence
@@ -58,7 +57,7 @@ class Proven:
 class SparseBound:
     """κ, ‖DKD‖_∞ and σ² of an assembly, its M, and for rounding |A| and |K|D (n, 1). D : (n, 1)."""
 
-    prepared: SparsePrepared
+    prepared: Prepared
     M: BandedInverse
     A_size: sp.csc_array
     stiffness: Matrix
@@ -68,16 +67,15 @@ class SparseBound:
     sigma2: float
 
     @classmethod
-    def of(cls, prepared: SparsePrepared, kappa: float) -> SparseBound | None:
+    def of(cls, prepared: Prepared, kappa: float) -> SparseBound | None:
         """kappa : κ. None where nothing can be proven so: no M, κ or σ²."""
         assembly, approximate = prepared.assembly, prepared.approximate_inverse
         if approximate is None or not kappa > 0:
             return None
-        D = balanced_units(assembly)[:, None]
-        rows = zip(assembly.sparse_blocks, assembly.slices, strict=True)
-        stiffness = np.concatenate([_size(K) @ D[s] for K, s in rows])
+        D = assembly.K.units[:, None]
+        stiffness = assembly.K.absolute_sums(D[:, 0])[:, None]
         stiffest = SAFE * float((stiffness * D).max())
-        sigma2 = independence(Assembly((), sp.csc_array(sp.diags_array(D[:, 0]) @ assembly.A)))
+        sigma2 = independence(Assembly(Stiffness.of(), sp.csc_array(sp.diags_array(D[:, 0]) @ assembly.A)))
         if not sigma2 > 0:
             return None
         return cls(prepared, approximate.M, _size(assembly.A), stiffness, D, kappa, stiffest, sigma2)
@@ -187,11 +185,11 @@ class _State:
         self.forces = SlicedForces(self.assembly, bound.D)
         # The most terms in a row of Kx + Aλ; K is symmetric.
         self.depth = 4 + int(np.bincount(bound.A_size.indices, minlength=1).max())
-        self.depth += max(int(np.diff(K.indptr).max(initial=0)) for K in self.assembly.sparse_blocks)
+        self.depth += max(int(np.diff(K.indptr).max(initial=0)) for K in self.assembly.K.matrices)
         self.lam = DoubleDouble(lam, np.zeros_like(lam))
         known = x is not None
         if x is None:
-            x = bound.prepared.solve_K(self.f - self.assembly.A @ lam)
+            x = bound.prepared.assembly.K.solve(self.f - self.assembly.A @ lam)
         self.x = DoubleDouble(x, np.zeros_like(x))
         self.r = self.forces(self.f, self.x, self.lam)
         if known:
@@ -218,12 +216,12 @@ class _State:
     def move(self, dlam: Matrix) -> None:
         """To λ + dλ, and x with it."""
         # What is stored is λ + dλ but for the rounding of its second part, which counts below.
-        self._move(self.bound.prepared.solve_K(self.r.value - self.assembly.A @ dlam), dlam)
+        self._move(self.bound.prepared.assembly.K.solve(self.r.value - self.assembly.A @ dlam), dlam)
 
     def _move(self, dx: Matrix, dlam: Matrix) -> None:
         """r − K dx − A dλ in float64: dx and dλ are small, and so is the rounding."""
         assembly, A, depth, D = self.assembly, self.assembly.A, self.depth, self.bound.D
-        product, self.lam = assembly.multiply_K(dx), self.lam.plus(dlam)
+        product, self.lam = assembly.K.multiply(dx), self.lam.plus(dlam)
         force, lam_size = A @ dlam, gamma(depth) * abs(dlam) + 2 * U * abs(self.lam.lo)
         of_force, most = self.bound.A_size @ lam_size, np.zeros(dx.shape[1])
         for rows in self._rows():

@@ -16,7 +16,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from problems.errors import InputError
-from problems.forms.sparse_factor import NotPositiveDefinite, factored
+from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.sparse import sparse_block
 
 LOST = 2.0**-44  # of ‖a_j‖₂², per contact and entry: 256 ulps, for ‖z‖²
 
@@ -36,8 +37,10 @@ def _dependent(A: sp.csc_array) -> bool:
     scaled = A @ sp.diags_array(np.exp2(-exponents.astype(float)))  # without rounding; no square overflows
     G = sp.csc_array(scaled.T @ scaled)
     terms = np.bincount(connected_components(G, directed=False)[1]).max() + np.diff(A.indptr).max()
+    block = sparse_block(G)
+    block.lost = float(terms * LOST)
     try:
-        factored(G, lost=float(terms * LOST))
+        block.factor()
     except NotPositiveDefinite:
         return True
     return False

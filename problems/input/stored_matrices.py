@@ -11,6 +11,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase
+from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
@@ -38,10 +39,11 @@ def stored_matrices(
         return arrays, facts | {"seconds": time.perf_counter() - start}
 
     arrays, facts = cache.load_or_make(key, made)
-    count = range(len(facts["parts"]))
-    blocks = tuple(_matrix(arrays, f"K{k}") if sparse else arrays[f"K{k}"] for k in count)
+    nodes = arrays.get("nodes")
     parts, notes = tuple(facts["parts"]), tuple(facts["notes"])
-    assembly = Assembly(blocks, _matrix(arrays, "A", facts["shape"]), arrays.get("nodes"), parts, notes)
+    blocks = [_matrix(arrays, "K")] if sparse else [arrays[f"K{k}"] for k in range(len(parts))]
+    A = _matrix(arrays, "A", facts["shape"])
+    assembly = Assembly(Stiffness.of(*blocks, nodes=nodes), A, nodes, parts, notes)
     return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
 
 
@@ -62,9 +64,10 @@ def _packed(assembly: Assembly, load: LoadCase, sparse: bool) -> cache.Entry:
     arrays |= {"f": load.f, "g": load.g}
     if assembly.nodes is not None:
         arrays["nodes"] = assembly.nodes
-    for k, K in enumerate(assembly.blocks):
-        of_K: Any = K
-        arrays |= {f"K{k}_{part}": getattr(of_K, part) for part in PARTS} if sparse else {f"K{k}": K}
+    if sparse:
+        arrays |= {f"K_{part}": getattr(assembly.K.matrix, part) for part in PARTS}
+    else:
+        arrays |= {f"K{k}": block.matrix for k, block in enumerate(assembly.K.blocks)}
     return arrays, {"parts": assembly.parts, "shape": assembly.A.shape, "notes": assembly.notes}
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Assembly, LoadCase
+from problems.stiffness.operator import Stiffness, dense_blocks
 
 from . import sparse_npz
 from .bounded import LARGEST
@@ -30,9 +29,9 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
         nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
-    K is split into its diagonal blocks, dense unless they are to be `sparse`. The problem is the one in the
-    nearest float64, with (K + Kᵀ)/2 for a K that is symmetric but for rounding; `Assembly.notes` say so.
-    Raises InputError with all faults.
+    K is one `sparse` block, or a few dense ones, of bodies. The problem is the one in the nearest float64,
+    with (K + Kᵀ)/2 for a K that is symmetric but for rounding; `Assembly.notes` say so. Raises InputError
+    with all faults.
     """
     where = {key: str(path) for key, path in files.items()}
     if "problem" in files:
@@ -106,9 +105,8 @@ def checked(
         notes.append(f"K, asymmetric by {skew:.1e} N/mm, was replaced by (K + Kᵀ)/2")
     A = sp.csc_array(A)
     refuse_dependent(A, where["A"])
-    blocks = tuple(K[a:b, a:b] for a, b in _ends_of_blocks(K))
-    names = tuple(f"part {k + 1}" for k in range(len(blocks)))
-    made = tuple(sp.csc_array(block) if sparse else block.toarray(order="F") for block in blocks)
+    made = Stiffness.of(*([sp.csc_array(K)] if sparse else dense_blocks(K)), nodes=nodes)
+    names = tuple(f"part {k + 1}" for k in range(len(made.blocks)))
     return Assembly(made, A, nodes, names, tuple(notes)), LoadCase(f, g)
 
 
@@ -122,15 +120,6 @@ def _fits(given: Any) -> bool:
         return bool((nearest == values).all())  # compared in the wider of the two
     inside = nearest < float(np.iinfo(values.dtype).max)  # 2⁶³ or 2⁶⁴, which would not convert back
     return bool(inside.all() and (nearest.astype(values.dtype) == values).all())
-
-
-def _ends_of_blocks(K: sp.csr_array) -> Iterator[tuple[int, int]]:
-    """The unknowns of each diagonal block of K, which must be contiguous in x."""
-    count, label = connected_components(K, directed=False)
-    starts = np.flatnonzero(np.diff(label, prepend=-1))
-    if len(starts) != count:  # interleaved blocks: a single dense block is always valid
-        starts = np.array([0])
-    yield from itertools.pairwise([*starts.tolist(), K.shape[0]])
 
 
 def _read_npz(path: Path) -> dict[str, Any]:

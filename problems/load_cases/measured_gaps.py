@@ -65,10 +65,8 @@ def measured_gaps(scene: Scene, path: Path, count: int | None = None, form: Form
     memory. Raises InputError naming the cases with faults.
     """
     gaps = _read(regular_file(path, "file", TABLE_MIB))
-    if isinstance(scene, JointScene):
-        forces_only = tuple(e for e in scene.effects if not isinstance(e, GapEffect))
-        scene = replace(scene, effects=forces_only)
-    forces = load_case(scene, form)
+    effects = scene.effects if isinstance(scene, JointScene) else ()
+    forces = load_case(scene, form, [each for each in effects if not isinstance(each, GapEffect)])
     m = len(forces.g)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
         raise InputError.one(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -96,5 +96,5 @@ def random_gaps(
         field = InitialGap.model_validate(table | {"random": random})
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
-    others = replace(scene, effects=tuple(effect for effect in scene.effects if effect not in found))
-    return RandomGaps(scene.joint, load_case(others, form), field, seed, cases)
+    others = [effect for effect in scene.effects if effect not in found]
+    return RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,12 +28,14 @@ class PartModel:
     """A part's plate and what stiffens and holds it.
 
     junction : the grid lines y = const of the junction. clamped : those that are built in.
+    geometry : what it was made from, but for its name and its effects, for keys; of a model from a joint.
     """
 
     plate: Plate
     effects: tuple[StiffnessEffect, ...]
     junction: range
     clamped: frozenset[int] = frozenset()
+    geometry: tuple[dict[str, Any], ...] = ()
 
     @classmethod
     def of(cls, joint: Joint, part: Part, effects: tuple[StiffnessEffect, ...]) -> PartModel:
@@ -45,6 +48,7 @@ class PartModel:
             tuple(effect for effect in effects if effect.part == part.name),
             range(first, first + len(joint.y)),
             frozenset(edges[edge] for edge in part.clamped),
+            (joint.junction.model_dump(mode="json"), part.model_dump(mode="json", exclude={"name"})),
         )
 
     def stiffness(self) -> sp.csr_array:

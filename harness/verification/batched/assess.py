@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.forms.assembly import LoadCase, Vector
-from problems.forms.problem import stacked
+from problems.forms.assembly import LoadCase, Vector, stacked
 
 from .bound import Bound, gaps
 from .residual import SAFE, refined, residual, split
@@ -55,9 +54,9 @@ def assess(
     compliance = np.diag(prepared.Q)[:, None]
     clean = np.where(compliance * lam > prepared.Q @ lam - p, np.maximum(lam, 0.0), 0.0)
 
-    x = split(assembly, prepared.solve_K(f - A @ clean))
+    x = split(assembly, prepared.assembly.K.solve(f - A @ clean))
     r, r_error = residual(assembly, f, x, clean)
-    x, r, r_error = refined(assembly, x, r, r_error, prepared.solve_K(r), bound.stiffest)
+    x, r, r_error = refined(assembly, x, r, r_error, prepared.assembly.K.solve(r), bound.stiffest)
     bounds = bound.bound(r, r_error, *gaps(assembly, g, x), clean)
 
     given = x.rounded
@@ -65,13 +64,13 @@ def assess(
     if xs[0] is not None:
         answer = np.column_stack([each for each in xs if each is not None])
     else:
-        answer = given - prepared.solve_K(removed) if removed.any() else given
+        answer = given - prepared.assembly.K.solve(removed) if removed.any() else given
     moved = answer - given
     rounding = np.finfo(float).eps * abs(given).max(axis=0)
     bounds = SAFE * (bounds + abs(moved).max(axis=0) + rounding)  # `moved` itself is rounded
     bounds = np.where(np.isfinite(bounds), bounds, np.inf)
     if moved.any():
-        r = r - assembly.multiply_K(moved) - removed
+        r = r - assembly.K.multiply(moved) - removed
     gap = g - A.T @ answer
     return [
         Assessment(

@@ -47,7 +47,7 @@ class Bound:
     @classmethod
     def of(cls, prepared: Prepared) -> Bound:
         """Computed once per assembly; κ comes from the cache if it is there."""
-        stiffest = SAFE * max(float(abs(K).sum(axis=0).max()) for K in prepared.assembly.blocks)
+        stiffest = SAFE * prepared.assembly.K.norm
         sigma2, kappa = independence(prepared.assembly), proven_lambda_min(prepared)
         D = largest_compliance(prepared, kappa)
         return cls(prepared, kappa, stiffest, sigma2, D, sla.cholesky(prepared.Q, check_finite=False))
@@ -68,11 +68,11 @@ class Bound:
         """(k,) ‖d‖_K of a d with Aᵀd = δ (m, k), δ uncertain by that much in its 2-norm."""
         assembly = self.prepared.assembly
         A, n = assembly.A, assembly.n
-        z = self.prepared.solve_K(A @ sla.cho_solve((self.factor, False), delta, check_finite=False))
+        z = self.prepared.assembly.K.solve(A @ sla.cho_solve((self.factor, False), delta, check_finite=False))
         scale = np.exp2(exponent(abs(z).max(axis=0, initial=0.0)))
         w = z / scale  # so that its squares do not underflow
         # |fl(wᵀKw) − wᵀKw| ≤ γ_2n |w|ᵀ|K||w| ≤ γ_2n ‖K‖_∞ ‖w‖², and η for each product that underflows
-        energy = np.maximum((w * assembly.multiply_K(w)).sum(axis=0), 0.0)
+        energy = np.maximum((w * assembly.K.multiply(w)).sum(axis=0), 0.0)
         size = length(w)
         energy = energy + gamma(2 * n) * self.stiffest * size**2 + 2 * n * n * ETA * (size > 0)
         left = delta - A.T @ z

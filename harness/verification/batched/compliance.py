@@ -24,7 +24,7 @@ from .residual import SAFE
 
 def largest_compliance(prepared: Prepared, kappa: float) -> float:
     """max (K⁻¹)_ii in mm/N; infinite if no bound can be proven."""
-    pairs = zip(prepared.assembly.blocks, prepared.factors, strict=True)
+    pairs = zip(prepared.assembly.K.matrices, prepared.assembly.K.factors, strict=True)
     return max(_of_block(K, U, kappa) for K, U in pairs)
 
 

@@ -42,7 +42,7 @@ def bits(n: int) -> int:
 def split(assembly: Assembly, x: Matrix) -> Split:
     """x (n, k) split, block by block of K."""
     head = np.empty_like(x)
-    for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
+    for K, rows in zip(assembly.K.matrices, assembly.K.slices, strict=True):
         head[rows] = cut(x[rows], exponent(abs(x[rows]).max(axis=0)), bits(len(K)))[0]
     return Split(head, x - head)
 
@@ -52,7 +52,7 @@ def residual(assembly: Assembly, f: Matrix, x: Split, lam: Matrix) -> tuple[Matr
     A = assembly.A.tocsr()
     r, size = f - A @ lam, abs(f) + abs(A) @ abs(lam)
     error = np.empty_like(r)
-    for K, rows in zip(assembly.blocks, assembly.slices, strict=True):
+    for K, rows in zip(assembly.K.matrices, assembly.K.slices, strict=True):
         products, error[rows] = _products(K, x.head[rows], x.tail[rows])
         for product in products:
             r[rows] -= product
@@ -70,7 +70,7 @@ def refined(
     d is small, so a plain product suffices: |fl(Kd) − Kd| ≤ γ_n ‖K‖_∞ max|d|.
     """
     moved, n = x.plus(d), assembly.n
-    Kd = assembly.multiply_K(d)
+    Kd = assembly.K.multiply(d)
     error_of_d = gamma(n) * abs(d).max(axis=0) + gamma(1) * abs(moved.tail).max(axis=0) + ETA
     error = error + stiffest * error_of_d + gamma(1) * (abs(r) + abs(Kd)) + (n + 1) * ETA
     return moved, r - Kd, SAFE * error

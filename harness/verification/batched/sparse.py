@@ -20,7 +20,7 @@ from harness.verification.reference import (
 )
 from harness.verification.sparse_bound import PROVEN_ENOUGH_MM, SparseBound
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
 
 from .assess import Assessment
 
@@ -31,7 +31,7 @@ class SparseAssessor:
     enough_mm : a wider bound is tried to be improved by a factorisation for the contact set.
     """
 
-    def __init__(self, prepared: SparsePrepared, enough_mm: float = PROVEN_ENOUGH_MM) -> None:
+    def __init__(self, prepared: Prepared, enough_mm: float = PROVEN_ENOUGH_MM) -> None:
         self.prepared, self.enough_mm = prepared, enough_mm
 
     def __call__(
@@ -63,11 +63,11 @@ class SparseAssessor:
         return sparse_bound(self.prepared)
 
 
-def _of(prepared: SparsePrepared, known: Reference, load: LoadCase, lam: Vector, x: Vector) -> Assessment:
+def _of(prepared: Prepared, known: Reference, load: LoadCase, lam: Vector, x: Vector) -> Assessment:
     assembly = prepared.assembly
     away = float(abs(assembly.at_junction(x - known.x)).max(initial=0.0))
     gap = load.g - assembly.A.T @ x
-    r = load.f - assembly.multiply_K(x) - assembly.A @ lam
+    r = load.f - assembly.K.multiply(x) - assembly.A @ lam
     return Assessment(
         x=x,
         gap=gap,

@@ -1,4 +1,4 @@
-"""Units in which the unknowns of a model weigh alike, and the condition number of K in them."""
+"""Units in which the unknowns of a model weigh alike, and the least eigenvalue of K in them."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .assembly import Assembly, Vector
+from .block import Vector
 
 POWER_STEPS = 5
 
 
-def balanced_units(assembly: Assembly) -> Vector:
+def balanced_units(diagonal: Vector) -> Vector:
     """D (n,), powers of two, D_i √K_ii between 1/√2 and √2; 1 where K_ii is not positive.
 
     The unknowns of a finite-element model have mixed units (mm, 1, 1/mm); DKD has the digits of K.
     """
-    diagonal = assembly.diagonal_K()
     positive = diagonal > 0
     return np.exp2(np.where(positive, -np.round(np.log2(np.where(positive, diagonal, 1.0)) / 2), 0.0))
 
 
-def least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector) -> float:
+def least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector, steps: int = POWER_STEPS) -> float:
     """About λmin(DKD), no smaller, by the power method on its inverse. solve : b → K⁻¹b."""
     v = np.random.default_rng(0).standard_normal(len(D))
     largest = 0.0
-    for _ in range(POWER_STEPS):
+    for _ in range(steps):
+        v = v / abs(v).max()  # whose square does not overflow
         v = v / np.linalg.norm(v)
         w = solve(v / D) / D
         largest, v = float(v @ w), w

@@ -1,0 +1,265 @@
+"""The finite-element model of a joint: its parts with all their unknowns, springs, contacts and loads.
+
+    min ½ûᵀK̂û − f̂ᵀû   subject to   Bᵀû ≤ g
+
+The sparse form takes it as it is. The dense forms condense it part by part onto the junction, which is exact:
+û at the junction is x, and the multipliers λ are those of min ½xᵀKx − fᵀx, Aᵀx ≤ g.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.prepared import Prepared
+from problems.forms.problem import Progress
+from problems.forms.stages import CachedStages, SparseStages, indefinite
+from problems.model.effect import Effect, TieEffect
+from problems.model.part import PartModel
+from problems.model.part_load import PartLoadEffect
+from problems.model.scene import JointScene
+from problems.stiffness.block import NotPositiveDefinite, SparseBlock
+from problems.stiffness.operator import Stiffness
+from problems.stiffness.sparse import sparse_block
+from problems.storage import cache
+from problems.storage.fingerprint import fingerprint
+
+from .graded import graded
+from .model import Model
+from .numbering import Numbering, Unknowns
+
+CODE = ("problems/fem", "problems/model", "problems/effects", "problems/full_model")
+WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
+
+
+@dataclass(frozen=True)
+class JointModel(Model):
+    """The parts of a scene as finite elements."""
+
+    scene: JointScene
+    parts: tuple[PartModel, ...]
+
+    @classmethod
+    def of(cls, scene: JointScene) -> JointModel:
+        joint = scene.joint
+        return cls(scene, tuple(PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part))
+
+    def sparse(self) -> Prepared:
+        start = time.perf_counter()
+        assembly, coarser = self.assembly(), self.graded()
+        seconds = time.perf_counter() - start
+        key = cache.digest("sparse", self.scene.assembly_key, fingerprint([Path(__file__)], CODE))
+        stages = SparseStages(key, seconds, self.scene.source_of, own=False)
+        worth = coarser.work < WORTH * self.work
+        return Prepared(assembly, stages, coarser=coarser.assembly if worth else None)
+
+    def dense(self, progress: Progress) -> Prepared:
+        stages = self._condensed(progress)
+        return Prepared(stages.assembly, stages)
+
+    @property
+    def built(self) -> bool:
+        from .condensed import part_key  # of the dense forms only
+
+        known = [*map(part_key, self.parts)]
+        if self.springs is not None:
+            known.append(self._spring_key(cache.digest(known)))
+        return None not in map(cache.load, known) and self._condensed(lambda text, fraction: None).built
+
+    def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
+        """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
+        joint, given = self.scene.joint, self.scene.effects if effects is None else tuple(effects)
+        f, g = self.scene.junction_load(given)
+        loads = [effect for effect in given if isinstance(effect, PartLoadEffect)]
+        names = [part.name for part in joint.part]
+        if sparse:
+            at_junction, f = f, np.zeros(self.numbering.size)
+            f[self.junction] = at_junction
+        for load in loads:
+            k = names.index(load.part)
+            if sparse:
+                place, force = self.numbering.places[k], load.load(self.parts[k])
+                f[place[place >= 0]] += force[place >= 0]
+            else:
+                from .condensed import condensed_load  # of the dense forms only
+
+                own = condensed_load(load, self.parts[k], partial(self.interior, k))
+                f[joint.unknowns(load.part)] += own
+        return LoadCase(f, g)
+
+    def graded(self) -> JointModel:
+        """A coarser model with the same junction, for a preconditioner."""
+        return JointModel(self.scene, tuple(map(graded, self.parts)))
+
+    @property
+    def work(self) -> float:
+        """What the inverse near the diagonal costs, as far as it depends on the grid lines: Σ (lines)³."""
+        return float(sum(len(part.free_lines) ** 3 for part in self.parts))
+
+    @cached_property
+    def springs(self) -> tuple[sp.csc_array, Vector] | None:
+        """Directions T (n, r), stiffnesses k (r,) N/mm of the springs between parts: K + T diag(k) Tᵀ."""
+        pairs = [effect.springs(self.scene.joint) for effect in self.scene.effects_of(TieEffect)]
+        if not pairs:
+            return None
+        return sp.csc_array(sp.hstack([T for T, _ in pairs])), np.concatenate([k for _, k in pairs])
+
+    @cached_property
+    def tied(self) -> list[list[int]]:
+        """The parts of each block of K̂: parts that springs join are one block."""
+        count = len(self.parts)
+        linked = sp.lil_array((count, count))
+        if self.springs is not None:
+            T = self.springs[0]
+            part = T.indices // self.scene.joint.node_count
+            linked[part[T.indptr[:-1]].repeat(np.diff(T.indptr)), part] = 1
+        _, label = connected_components(sp.csr_array(linked), directed=False)
+        return [np.flatnonzero(label == k).tolist() for k in dict.fromkeys(label.tolist())]
+
+    @cached_property
+    def numbering(self) -> Numbering:
+        return Numbering.of(self.parts, self.tied)
+
+    @cached_property
+    def junction(self) -> Unknowns:
+        """(n,) the numbers of the junction's deflections, in the order of x."""
+        places = zip(self.numbering.places, self.parts, strict=True)
+        return np.concatenate([place[part.deflections] for place, part in places])
+
+    def assembly(self) -> Assembly:
+        """K̂, a sparse block for each part or for parts that springs join, and B (N, m)."""
+        blocks = []
+        ends = np.cumsum([0, *self.numbering.sizes])
+        for parts, start, stop in zip(self.numbering.blocks, ends[:-1], ends[1:], strict=True):
+            K = self._block(parts, int(start), int(stop - start))
+            if self.springs is not None:
+                T, k = self.springs
+                T_here = self._at_junction(T)[start:stop]
+                added = T_here @ sp.diags_array(k) @ T_here.T
+                K = K + (added + added.T) / 2  # the order of products is another in K_ji: proofs see it
+            blocks.append(sp.csc_array(K))
+        B, nodes = self._at_junction(self.scene.joint.contact_matrix()), self._nodes()
+        names = self._names(self.numbering.blocks)
+        return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, names, junction=self.junction)
+
+    def _names(self, blocks: Iterable[Iterable[int]]) -> tuple[str, ...]:
+        return tuple(" + ".join(self.scene.joint.part[part].name for part in parts) for parts in blocks)
+
+    def _block(self, parts: tuple[int, ...], start: int, size: int) -> sp.csc_array:
+        """The stiffness of some parts, (size, size), on the unknowns from `start` on."""
+        own = [self.parts[part].stiffness() for part in parts]
+        K = own[0] if len(own) == 1 else sp.csr_array(sp.block_diag(own, format="csr"))
+        place = np.concatenate([self.numbering.places[part] for part in parts]).astype(np.int32) - start
+        free = np.flatnonzero(place >= 0)
+        order = np.empty(size, dtype=np.int32)
+        order[place[free]] = free
+        K = K[order]
+        column, ends = place[K.indices], K.indptr
+        if size < len(place):
+            kept = column >= 0
+            column, data, ends = column[kept], K.data[kept], np.append(0, np.cumsum(kept))[ends]
+        else:
+            data = K.data
+        found = sp.csc_array((data, column, ends), shape=(size, size))  # symmetric
+        found.sort_indices()
+        return found
+
+    def _at_junction(self, M: sp.csc_array) -> sp.csc_array:
+        """(N, k): the rows of M (n, k) at the junction's deflections, the others zero."""
+        M = sp.csc_array(M)
+        found = sp.csc_array(
+            (M.data, self.junction[M.indices], M.indptr), shape=(self.numbering.size, M.shape[1])
+        )
+        found.sort_indices()
+        return found
+
+    def _nodes(self) -> np.ndarray:
+        """(N, 2) the coordinates of each unknown's node, mm."""
+        nodes = np.empty((self.numbering.size, 2))
+        for place, part in zip(self.numbering.places, self.parts, strict=True):
+            plate = part.plate
+            iy, _, ix, _ = np.unravel_index(np.arange(plate.size), (len(plate.y), 2, len(plate.x), 2))
+            nodes[place[place >= 0]] = np.column_stack([plate.x[ix], plate.y[iy]])[place >= 0]
+        return nodes
+
+    def interior(self, k: int) -> tuple[Unknowns, SparseBlock]:
+        """The unknowns i of a part that condensation eliminates, in the order of a narrow band, and K_ii."""
+        if k not in self._interiors:
+            part = self.parts[k]
+            i = part.others[np.argsort(self.numbering.places[k][part.others])]
+            self._interiors[k] = i, sparse_block(sp.csc_array(part.stiffness()[i][:, i]))
+        return self._interiors[k]
+
+    @cached_property
+    def _interiors(self) -> dict[int, tuple[Unknowns, SparseBlock]]:
+        return {}
+
+    def _condensed(self, progress: Progress) -> CachedStages:
+        """K, a dense block for each part, or for parts from the first to the last that springs join."""
+        from .condensed import condensed_stiffness, part_key  # of the dense forms only
+
+        joint, source_of = self.scene.joint, self.scene.source_of
+        blocks, seconds, keys = [], {}, [*map(part_key, self.parts)]
+        for part, key, own in zip(joint.part, keys, self.parts, strict=True):
+            say = partial(progress, f"condensing {part.name}")
+            try:
+                K, seconds[key] = condensed_stiffness(key, own, say)
+            except NotPositiveDefinite as error:
+                raise indefinite(source_of("K"), f"part.{part.name}", str(error)) from error
+            blocks.append(K)
+        groups, key = [[k] for k in range(len(blocks))], cache.digest(keys)
+        before = {"condensation": sum(seconds.values())}
+        if self.springs is not None:
+            groups, key = self._ranges(), self._spring_key(key)
+            blocks, before["ties"] = self._with_springs(key, blocks, groups, progress)
+        nodes = np.tile(joint.nodes, (len(joint.part), 1))
+        assembly = Assembly(Stiffness.of(*blocks), joint.contact_matrix(), nodes, self._names(groups))
+        return CachedStages(assembly, key, before, source_of, progress)
+
+    def _ranges(self) -> list[list[int]]:
+        """The parts of each dense block, consecutive: from the first to the last that springs join."""
+        ranges: list[list[int]] = []
+        for parts in sorted(self.tied):
+            if ranges and parts[0] <= ranges[-1][-1]:
+                ranges[-1] = list(range(ranges[-1][0], max(ranges[-1][-1], parts[-1]) + 1))
+            else:
+                ranges.append(list(range(parts[0], parts[-1] + 1)))
+        return ranges
+
+    def _spring_key(self, key: str) -> str:
+        assert self.springs is not None
+        T, k = self.springs
+        code = fingerprint([Path(__file__)])
+        return cache.digest("springs", key, T.indices.tolist(), T.data.tolist(), k.tolist(), code)
+
+    def _with_springs(
+        self, key: str, parts: list[Matrix], groups: list[list[int]], progress: Progress
+    ) -> tuple[list[Matrix], float]:
+        """The blocks of K + T diag(k) Tᵀ, and the seconds in which they were made."""
+        assert self.springs is not None
+        T, k = self.springs
+
+        def made() -> cache.Entry:
+            progress("springs between the parts", 0.0)
+            start, count = time.perf_counter(), self.scene.joint.node_count
+            added = sp.csr_array(T @ sp.diags_array(k) @ T.T)
+            arrays = {}
+            for b, group in enumerate(groups):
+                rows = slice(group[0] * count, (group[-1] + 1) * count)
+                K = added[rows, rows].toarray(order="F")
+                for place, part in enumerate(group):
+                    own = slice(place * count, (place + 1) * count)
+                    K[own, own] += parts[part]
+                arrays[f"K{b}"] = K
+            return arrays, {"seconds": time.perf_counter() - start}
+
+        arrays, facts = cache.load_or_make(key, made)
+        return [arrays[f"K{b}"] for b in range(len(groups))], facts["seconds"]

@@ -1,0 +1,12 @@
+"""The unit roundoff of float64, and what k roundings amount to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+U = 2.0**-53
+
+
+def gamma(k: Any) -> Any:
+    """γ_k = ku/(1 − ku), of a number or an array."""
+    return k * U / (1 - k * U)
