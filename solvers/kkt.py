@@ -34,3 +34,11 @@ def kkt_status(Q: AnyQ, p: Vector, lam: Vector, y: Vector, tolerance: float) -> 
     size = abs(y + p) if isinstance(Q, Compliance) else abs(Q) @ lam
     rounding = 4 * EPS * float((abs(p) + size).max(initial=0.0))
     return "solved" if residual <= rounding else "inaccurate", residual
+
+
+def rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:
+    """Bound on the rounding error of y = Qλ − p, mm, but for its growth with m: 4ε max_i(|p_i| + √q_ii Σ_j √q_jj λ_j),
+    as |q_ij| ≤ √(q_ii q_jj).
+    """
+    root = np.sqrt(diagonal)
+    return 4 * EPS * float((abs(p) + root * (root @ abs(lam))).max(initial=0.0))
