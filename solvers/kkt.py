@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from problems.forms.assembly import Vector
-from problems.forms.compliance import AnyQ, Compliance
+from problems.forms.assembly import Matrix, Vector
 
 from .base import Status
 
@@ -22,15 +21,19 @@ def rounding_of(p: Vector, y: Vector) -> float:
     return 4 * EPS * float((abs(p) + abs(y + p)).max(initial=0.0))
 
 
-def kkt_status(Q: AnyQ, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
+def kkt_status(Q: Matrix, p: Vector, lam: Vector, y: Vector, tolerance: float) -> tuple[Status, float]:
     """Status and `kkt_residual` of λ ≥ 0 with y = Qλ − p.
 
-    "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate". |Qλ| replaces
-    |Q|λ if Q is given by its products.
+    "solved" if the residual is at most max(tolerance, 4ε max(|p| + |Q|λ)), else "inaccurate".
     """
     residual = kkt_residual(lam, y)
     if residual <= tolerance:
         return "solved", residual
-    size = abs(y + p) if isinstance(Q, Compliance) else abs(Q) @ lam
-    rounding = 4 * EPS * float((abs(p) + size).max(initial=0.0))
+    rounding = 4 * EPS * float((abs(p) + abs(Q) @ lam).max(initial=0.0))
     return "solved" if residual <= rounding else "inaccurate", residual
+
+
+def largest_rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:
+    """4ε max_i(|p_i| + √q_ii Σ_j √q_jj |λ_j|), mm: no less than 4ε max(|p| + |Q||λ|), without Q."""
+    root = np.sqrt(diagonal)
+    return 4 * EPS * float((abs(p) + root * (root @ abs(lam))).max(initial=0.0))

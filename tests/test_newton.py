@@ -7,18 +7,18 @@ import pytest
 import scipy.linalg as sla
 from scipy.optimize import nnls
 from small import make_load, make_prepared, solve_by_nnls
+from solvers.active_set.nested import cells_of, representatives
 
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.forms.product import product
 from problems.manufactured.ladder import make_rung
 from problems.stiffness.operator import Stiffness
 from solvers.active_set.block_pivoting import MAX_STALE_PASSES, block_pivoting
 from solvers.active_set.bordered_factor import BorderedFactor
 from solvers.active_set.contact_sets import ContactSets, trial_of
-from solvers.active_set.nested import cells_of, representatives
 from solvers.linear_algebra.inverse import BLOCK, inverse_with_factor
-from solvers.linear_algebra.product import product
 from solvers.methods.newton import ActiveSetNewton
 
 

@@ -10,46 +10,66 @@ import numpy as np
 from problems.stiffness.banded import BandedBlock
 
 from .assembly import Assembly, Vector
-from .banded_inverse import BandedInverse, Windows, of_windows
+from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, of_windows
 from .compliance import Compliance, DenseCompliance
 
 SAMPLE = 3  # contacts, for the size of Q
 FEW = 3000  # contacts for which Q is small beside K
 SETS = 15  # factorisations of K that settle the contacts without M
+WIDEST_WINDOW = 1 / 4  # of the contacts: M with wider ones costs as much as Q⁻¹
+STEPS, CONTRACTION = 3, 0.5  # of e ← e − MQe from a random e, and what the last one must achieve
 SINGLE_BITS = 18  # of cond(Q_WW): more are lost in float32
 
 
 @dataclass(frozen=True)
 class ApproximateInverse:
-    """M ≈ Q⁻¹. diagonal : about that of Q, (m,) mm/N."""
+    """M ≈ Q⁻¹, None where it would cost too much. diagonal : of Q, about, (m,) mm/N."""
 
-    M: BandedInverse
+    M: BandedInverse | None
     diagonal: Vector
 
 
-def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse | None:
-    """From Q itself; None if it is not positive definite. nodes : (m, 2) of the contacts, mm, or None."""
-    return _from_windows(Q, Windows.of(nodes, len(Q.Q)), single=False)
+def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse:
+    """From Q itself: with a narrow band if e ← e − MQe converges fast, else from a window of all contacts, Q⁻¹.
 
-
-def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> ApproximateInverse | None:
-    """From local blocks of `like`, a Q of the same contacts: in single precision, in double where some block
-    is not positive definite in that. Of few contacts without coordinates M = Q⁻¹.
-
-    None where K has no band, and of contacts all over an area, where M takes longer than some factorisations
-    of K.
+    nodes : (m, 2) of the contacts, mm, or None. Raises LinAlgError if Q is not positive definite.
     """
-    m = assembly.m
-    if assembly.contact_nodes is None and m <= FEW:
-        return _from_windows(DenseCompliance(Q.toarray()), Windows(np.arange(m), m), single=False)
-    windows = _along_bands(assembly)
-    if m > FEW and windows.work > SETS * assembly.K.work:
-        return None
-    for single in (True, False) if _single_might_do(assembly) else (False,):
-        found = _from_windows(like, windows, single)
-        if found is not None:
-            return found
-    return None
+    diagonal, m = Q.diagonal(), len(Q.Q)
+    windows = Windows.of(nodes, m)
+    if (WINDOW_LINES + 1) * windows.across <= WIDEST_WINDOW * m:
+        M = of_windows(windows, Q.local(windows.contacts(), False))
+        e, sizes = np.random.default_rng(0).standard_normal(m), []
+        for _ in range(STEPS):
+            e[M.order] -= M.product((Q @ e)[M.order])
+            sizes.append(float(np.linalg.norm(e)))
+        if sizes[-1] <= CONTRACTION * sizes[-2]:
+            return ApproximateInverse(M, diagonal)
+    return ApproximateInverse(
+        of_windows(Windows(np.arange(m), m), lambda _: np.array(Q.Q, order="F")), diagonal
+    )
+
+
+def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> ApproximateInverse:
+    """From local blocks of `like`, a Q of the same contacts: in single precision, in double where some block
+    is not positive definite in that. Of few contacts without coordinates, or on a K without a band, M = Q⁻¹.
+
+    No M of more contacts where K has no band, and of contacts all over an area, where M takes longer than
+    some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is not positive
+    definite.
+    """
+    m, windows = assembly.m, _along_bands(assembly)
+    few = m <= FEW
+    if few and assembly.contact_nodes is None:
+        return of_dense(DenseCompliance(Q.toarray()), None)
+    found = None
+    if few or windows.work <= SETS * assembly.K.work:
+        if _single_might_do(assembly):
+            with suppress(np.linalg.LinAlgError):
+                found = _from_windows(like, windows, single=True)
+        found = found or _from_windows(like, windows, single=False)
+    if found is None and few:
+        return of_dense(DenseCompliance(Q.toarray()), assembly.contact_nodes)
+    return found or ApproximateInverse(None, assembly.A.power(2).T @ (1 / assembly.K.diagonal))
 
 
 def _from_windows(Q: Compliance, windows: Windows, single: bool) -> ApproximateInverse | None:
@@ -60,9 +80,7 @@ def _from_windows(Q: Compliance, windows: Windows, single: bool) -> ApproximateI
     for _, start, stop in windows.ranges():
         line = windows.order[start:stop]
         diagonal[line] = np.diag(local(line))
-    with suppress(np.linalg.LinAlgError):
-        return ApproximateInverse(of_windows(windows, local), diagonal)
-    return None
+    return ApproximateInverse(of_windows(windows, local), diagonal)
 
 
 def _single_might_do(assembly: Assembly) -> bool:

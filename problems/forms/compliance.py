@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from problems.stiffness.operator import Stiffness
 
 from .assembly import Matrix, Vector
+from .product import product
 
 Rows = NDArray[np.intp]
 #: A window of contacts → its principal submatrix of Q, stored by columns, which may be overwritten.
@@ -52,7 +53,7 @@ class DenseCompliance(Compliance):
     Q: Matrix
 
     def __matmul__(self, lam: Matrix) -> Matrix:
-        return self.Q @ lam
+        return product(self.Q, lam)
 
     def diagonal(self) -> Vector:
         return np.diag(self.Q).copy()
@@ -90,7 +91,3 @@ class ComplianceProducts(Compliance):
 
     def local(self, windows: Sequence[Rows], single: bool) -> Local | None:
         return self.K.local_compliance(self.A, windows, single)
-
-
-#: A dense Q, or one with the same operations.
-AnyQ = Matrix | Compliance

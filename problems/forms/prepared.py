@@ -116,8 +116,8 @@ class Prepared:
         return DenseCompliance(self.Q) if K.dense else ComplianceProducts(K, A)
 
     @cached_property
-    def approximate_inverse(self) -> ApproximateInverse | None:
-        """M ≈ Q⁻¹ and about the diagonal of Q; None where there is none, or it is not worth having."""
+    def approximate_inverse(self) -> ApproximateInverse:
+        """M ≈ Q⁻¹, and about the diagonal of Q. Raises LinAlgError if Q is not positive definite."""
         Q = self.compliance
         if isinstance(Q, DenseCompliance):
             return of_dense(Q, self.assembly.contact_nodes)
@@ -139,7 +139,7 @@ class Prepared:
         Qλ − p with a matrix Q; else by one solution with K, as Qλ and p can be large, and cancel.
         """
         if self.assembly.K.dense:
-            return self.Q @ lam - np.column_stack([load.p for load in loads])
+            return self.compliance @ lam - np.column_stack([load.p for load in loads])
         A, cases = self.assembly.A, stacked(loads)
         y: Matrix = cases.g - A.T @ self.assembly.K.solve(cases.f - A @ lam)
         return y

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.linear_algebra.product import product
+from problems.forms.product import product
 
 from .bordered_factor import BorderedFactor, Set
 

@@ -15,8 +15,8 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from problems.forms.assembly import Matrix, Vector
+from problems.forms.product import product
 from solvers.base import Status
-from solvers.linear_algebra.product import product
 
 from .gi_border import Border
 from .growing_factor import GrowingFactor

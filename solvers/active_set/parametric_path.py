@@ -18,8 +18,8 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from problems.forms.assembly import Matrix, Vector
+from problems.forms.product import product
 from solvers.kkt import EPS, rounding_of
-from solvers.linear_algebra.product import product
 
 from .growing_factor import GrowingFactor
 

@@ -9,10 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
-from problems.forms.compliance import AnyQ
+from problems.forms.product import product
 from solvers.base import Answer
 from solvers.kkt import kkt_residual, kkt_status, rounding_of
-from solvers.linear_algebra.product import product
 
 from .block_pivoting import MAX_SINGLE_EXCHANGES, block_pivoting, wrong_signs
 from .bordered_factor import Set
@@ -33,7 +32,7 @@ class Sets(Protocol):
     compliance: Vector
 
     @property
-    def Q(self) -> AnyQ: ...
+    def Q(self) -> Matrix: ...
 
     @property
     def factorisations(self) -> int: ...

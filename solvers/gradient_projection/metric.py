@@ -21,12 +21,11 @@ import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
-from problems.forms.compliance import AnyQ
+from problems.forms.compliance import Compliance
 from solvers.active_set.banded_sets import BandedSets
 from solvers.active_set.block_pivoting import block_pivoting
 from solvers.active_set.bordered_factor import Set
 from solvers.active_set.contact_sets import TrialSolution
-from solvers.linear_algebra.product import product
 
 STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
 POWER_STEPS = 30  # products for λmax, once per assembly
@@ -106,12 +105,12 @@ class Band:
         return d
 
 
-def step_length(Q: AnyQ, diagonal: Vector) -> float:
+def step_length(Q: Compliance, diagonal: Vector) -> float:
     """ᾱ of `Diagonal`, with λmax by the power method, in `POWER_STEPS` products."""
     root = np.sqrt(diagonal)
     v, largest = np.random.default_rng(0).uniform(0.5, 1.5, len(root)), 1.0
     for _ in range(POWER_STEPS):
         v /= np.linalg.norm(v)
-        v = product(Q, v / root) / root
+        v = (Q @ (v / root)) / root
         largest = float(np.linalg.norm(v))
     return STEP_LENGTH / largest

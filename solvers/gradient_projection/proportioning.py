@@ -20,11 +20,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.compliance import AnyQ
+from problems.forms.compliance import Compliance
 from problems.forms.prepared import Prepared
 from solvers.active_set.bordered_factor import Set
 from solvers.kkt import kkt_residual, rounding_of
-from solvers.linear_algebra.product import product
 
 from .metric import Metric
 
@@ -40,7 +39,7 @@ class Proportioning:
     products : with Q. before : the last conjugate direction, Q times it, and its face.
     """
 
-    Q: AnyQ
+    Q: Compliance
     p: Vector
     diagonal: Vector
     metric: Metric
@@ -125,7 +124,7 @@ class Proportioning:
 
     def _times_Q(self, v: Vector) -> Vector:
         self.products += 1
-        return product(self.Q, v)
+        return self.Q @ v
 
 
 @dataclass(kw_only=True)

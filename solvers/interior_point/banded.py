@@ -14,8 +14,8 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
+from problems.forms.product import product
 from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
-from solvers.linear_algebra.product import product
 
 from .newton_system import CG_LIMIT, FactoredPerD, Solved
 

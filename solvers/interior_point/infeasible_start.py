@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.linear_algebra.product import product
+from problems.forms.product import product
 
 from .newton_system import Direct
 from .start import Start

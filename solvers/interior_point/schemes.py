@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.linear_algebra.product import product
+from problems.forms.product import product
 
 from .newton_system import NewtonSystem
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.linear_algebra.product import product
+from problems.forms.product import product
 
 from .newton_system import Direct, Solved
 

@@ -14,22 +14,21 @@ from typing import Any, ClassVar
 import numpy as np
 
 from problems.errors import Fault, InputError
-from solvers.active_set.dense_newton import DenseState
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, failed
 from solvers.interior_point.banded import Banded
-from solvers.interior_point.identify import identified_set
 from solvers.interior_point.infeasible_start import stp2
 from solvers.interior_point.newton_system import Direct, NewtonSystem
 from solvers.interior_point.schemes import NewtonSteps, Point, mehrotra
 from solvers.interior_point.single_precision import SinglePrecision
 from solvers.interior_point.start import NoStart, algorithm_5
 
+from .newton import DualState
+
 THETA = 0.995
 LEAST_GAP = 0.01  # mm, at the start
 RHO = 10.0  # with 0.1 the start is up to a hundred times as large, and far from the solution
 REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: per iteration, the error in y = Qλ − p shrinks by that or by 1 − α
 MAX_ITERATIONS = 100
-MAX_SETS = 1000
 STALLED = 10
 LIMIT = {"cause": f"{MAX_ITERATIONS} iterations"}
 IDENTIFICATION_RATIO = 1e-4  # of the initial μ: above, a contact may look closed before it has moved
@@ -40,7 +39,7 @@ UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 class _Ready:
     problem: Problem
     system: NewtonSystem
-    finish: DenseState
+    finish: DualState
 
 
 class FastIpm(Solver):
@@ -72,11 +71,10 @@ class FastIpm(Solver):
 
     def prepare(self, data: Problem) -> _Ready | Answer:
         """M, or else Q⁻¹ and Q in single precision; a failed answer if Q is not positive definite."""
-        try:
-            finish = DenseState.of(data, False, MAX_SETS, identified_set)
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
-        if self.band and finish.sweeps:
+        finish = DualState.of(data)
+        if isinstance(finish, Answer):
+            return finish
+        if self.band:
             return _Ready(data, Banded(data.Q, finish.sweeps.M), finish)
         return _Ready(data, SinglePrecision(data.Q) if self.single else Direct(data.Q), finish)
 

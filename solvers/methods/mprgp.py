@@ -21,17 +21,16 @@ import numpy as np
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
-from problems.forms.compliance import AnyQ
+from problems.forms.compliance import Compliance
 from problems.forms.prepared import Prepared
 from problems.stiffness.block import NotPositiveDefinite
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, WarmStart, failed
 from solvers.dense_dual import first_point
 from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
 from solvers.gradient_projection.proportioning import Proportioning, SparseProportioning
-from solvers.kkt import kkt_status
+from solvers.kkt import kkt_residual, largest_rounding
 from solvers.sparse_dual import with_p, with_x
 
-NO_BAND = "no banded M ≈ Q⁻¹: K has no band, or its contacts lie all over an area"
 PRECONDITIONERS = ("band", "face", "none")
 
 
@@ -39,7 +38,7 @@ PRECONDITIONERS = ("band", "face", "none")
 class _Ready:
     """diagonal : of Q, or about that. metric : makes a load case's own. prepared : of the sparse form."""
 
-    Q: AnyQ
+    Q: Compliance
     diagonal: Vector
     metric: Callable[[], Metric]
     prepared: Prepared | None = None
@@ -64,7 +63,7 @@ class Mprgp(Solver):
 
     Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with y = Qλ − p
     computed anew, or when such a computation has not halved what is below the tolerance, or five what is
-    above. "solved" if it then is at most max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations
+    above. "solved" if it then is at most max(tolerance, `kkt.largest_rounding`) mm, else "inaccurate". Iterations
     are steps, inner iterations contact sets tried with M; details count the products with Q per load case. In
     the sparse form the status is that of the refined x (solvers/sparse_dual.py).
 
@@ -92,22 +91,20 @@ class Mprgp(Solver):
     def prepare(self, data: Problem) -> _Ready | Answer:
         """M and ᾱ, by 30 products, as the option needs them.
 
-        A failed answer if M finds Q indefinite, and in the sparse form if K is, or has no M.
+        A failed answer if M finds Q indefinite, and in the sparse form if K is. Where there is no M, diag(Q)
+        takes its place.
         """
-        prepared = data.prepared if data.form == "sparse" else None
-        Q: AnyQ = data.prepared.compliance if prepared else data.Q
-        if not prepared and self.preconditioner == "none":
-            diagonal = np.diag(data.Q).copy()
-            return _Ready(Q, diagonal, self._metric(Q, diagonal, None))
         try:
             near = data.prepared.approximate_inverse
         except NotPositiveDefinite as error:
             return failed(f"K is not positive definite: {error}")
-        if near is None:
-            return failed(NO_BAND if prepared else "Q is not positive definite")
-        return _Ready(Q, near.diagonal, self._metric(Q, near.diagonal, near.M), prepared)
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+        Q, sparse = data.prepared.compliance, "x" in data.needs
+        metric = self._metric(Q, near.diagonal, near.M)
+        return _Ready(Q, near.diagonal, metric, data.prepared if sparse else None)
 
-    def _metric(self, Q: AnyQ, diagonal: Vector, M: BandedInverse | None) -> Callable[[], Metric]:
+    def _metric(self, Q: Compliance, diagonal: Vector, M: BandedInverse | None) -> Callable[[], Metric]:
         if M is None or self.preconditioner == "none":
             return partial(Diagonal, diagonal, step_length(Q, diagonal))
         if self.preconditioner == "band":
@@ -133,11 +130,12 @@ class Mprgp(Solver):
         given = load if ready.prepared is None else with_p(ready.prepared, [load])[0]
         case = ready.proportioning(given, metric)
         enough = case.solve(tolerance, self.max_products)
-        status, residual = kkt_status(ready.Q, given.p, case.lam, case.y, tolerance)
+        residual = kkt_residual(case.lam, case.y)
+        solved = residual <= max(tolerance, largest_rounding(ready.diagonal, given.p, case.lam))
+        status: Status = "solved" if solved else "inaccurate" if enough else "iteration_limit"
         details: dict[str, Any] = {"products": case.products, "kkt_residual_mm": residual}
         details |= {"steps": case.steps}
-        if status == "inaccurate":
-            status = "inaccurate" if enough else "iteration_limit"
+        if not solved:
             tried = "rounding" if enough else f"max_products = {self.max_products}"
             details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
         steps = sum(case.steps.values())

@@ -4,86 +4,97 @@
 
 For a guess C of the contact set, the linear equations λ_N = 0, y_C = 0 are solved and every index with a
 wrong sign changes sides: Newton's method on min(λ, y) = 0 (Hintermüller, Ito and Kunisch, SIAM J.
-Optim. 13:865–888, 2002), made finite by block principal pivoting.
-
-The equations are solved with a banded M ≈ Q⁻¹ and corrected by products with Q, if Q decays along the joint
-(solvers/active_set/batched.py). For few closed contacts, and otherwise, they are solved as they are: the
-first guess then comes from the solutions on a sixteenth and a quarter of the contacts, whose matrices are
-principal submatrices of Q; if most of the quarter are closed, it is all contacts that overlap.
+Optim. 13:865–888, 2002), made finite by block principal pivoting. The equations are solved with a banded
+M ≈ Q⁻¹ and corrected by products with Q, whatever the form and the share of closed contacts
+(solvers/active_set/sweeps.py); nothing of order m³ is made. Where Q does not decay along the joint, M is Q⁻¹.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
-from problems.errors import InputError
-from solvers.active_set.dense_newton import DenseState
+from problems.forms.assembly import Vector
+from problems.stiffness.block import NotPositiveDefinite
+from solvers.active_set.bordered_factor import Set
+from solvers.active_set.sweeps import Sweeps
 from solvers.base import Answer, Batch, Form, LoadCase, Problem, Solver, WarmStart, failed
-from solvers.interior_point.identify import identified_set
+from solvers.sparse_dual import with_p, with_x
 
-if TYPE_CHECKING:
-    from solvers.active_set.sparse_newton import SparseState
 
-State: TypeAlias = "DenseState | SparseState | Answer"
+@dataclass(frozen=True)
+class DualState:
+    """What load cases share. start : the solved case to start from."""
+
+    problem: Problem
+    sweeps: Sweeps
+    start: WarmStart | None = None
+
+    @classmethod
+    def of(cls, problem: Problem) -> DualState | Answer:
+        """M; a failed answer if Q, or K in the sparse form, is not positive definite, or there is no M."""
+        try:
+            near = problem.prepared.approximate_inverse
+        except NotPositiveDefinite as error:
+            return failed(f"K is not positive definite: {error}")
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+        if near.M is None:
+            return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area; try mprgp")
+        return cls(problem, Sweeps(near.M, near.diagonal, problem.prepared.gaps))
+
+    def solve(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
+        """One load case, or several together."""
+        prepared, sweeps, start = self.problem.prepared, self.sweeps, self.start
+        sparse = "x" in self.problem.needs
+        given = with_p(prepared, loads) if sparse else loads
+        if len(given) == 1:
+            if start is not None and sparse:
+                start = replace(start, load=with_p(prepared, [start.load])[0])
+            found = [sweeps.answer(sweeps.solved(given[0], tolerance, start), tolerance)]
+        else:
+            found = sweeps(given, tolerance)
+        return with_x(prepared, found, loads, tolerance) if sparse else found
+
+    def solve_from(self, C: Set, lam: Vector, load: LoadCase, tolerance: float) -> Answer:
+        """A load case with p from a contact set and the forces on it, (m,) N."""
+        lam = np.where(C, lam, 0.0)
+        start = WarmStart(load, lam, self.sweeps.gaps(lam[:, None], [load])[:, 0])
+        return self.sweeps.answer(self.sweeps.solved(load, tolerance, start, C), tolerance)
 
 
 class ActiveSetNewton(Solver):
-    """Active-set Newton.
+    """Active-set Newton, from λ = 0 or a warm start; the stopping rule is that of `Sweeps`.
 
-    Pivoting stops when, with λ_C refined against Q, no q_ii λ_i and no y_i is below −max(tolerance,
-    10 × rounding) mm. Negative λ are then set to 0: "solved" if max(max(−y), max_{λ>0} |y|) ≤ max(tolerance,
-    4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are the contact sets tried on all contacts, inner
-    iterations those on the subsets. Sweeps stop at right signs with |y_C| far below the tolerance or within
-    rounding; iterations then are products with Q, inner iterations contact sets tried with M.
-
-    Options
-    -------
-    nested : start from the subsets; if false, from C = {p > 0}. In a series, a warm start that changes at
-        most an eighth of the contacts takes precedence. Sweeps start from C = {p > 0} or the warm start.
-    max_sets : limit on the contact sets tried on all contacts.
+    Iterations are products with Q, inner iterations contact sets tried with M. "solved" as said in
+    `Sweeps.answer`; in the sparse form, of the refined x (solvers/sparse_dual.py).
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
 
-    def __init__(self, *, nested: bool = True, max_sets: int = 1000) -> None:
-        if max_sets < 1:
-            raise InputError.one("newton", "max_sets", max_sets, "must be at least 1")
-        self.nested = nested
-        self.max_sets = max_sets
-
-    def prepare(self, data: Problem) -> State:
-        """M, or else Q⁻¹; a failed answer if Q, or K in the sparse form, is not positive definite."""
-        if data.form == "sparse":
-            from solvers.active_set.sparse_newton import SparseState  # not in the other forms
-
-            return SparseState.of(data, self.max_sets)
-        try:
-            return DenseState.of(data, self.nested, self.max_sets, identified_set)
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
+    def prepare(self, data: Problem) -> DualState | Answer:
+        return DualState.of(data)
 
     def update(
         self,
-        state: State,
-        ready: State,
+        state: DualState | Answer,
+        ready: object,
         load: LoadCase,
         tolerance: float,
         start: WarmStart,
-    ) -> State:
-        """The first guess comes from the warm start."""
+    ) -> DualState | Answer:
         return state if isinstance(state, Answer) else replace(state, start=start)
 
-    def batched(self, state: State) -> Batch | None:
-        """Sweeps with a banded M ≈ Q⁻¹; unsettled cases are solved by pivoting."""
-        return None if isinstance(state, Answer) else state.batched()
+    def batched(self, state: DualState | Answer) -> Batch | None:
+        return None if isinstance(state, Answer) else state.solve
 
-    def solve(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
+    def solve(self, ready: DualState | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
             return ready
         try:
-            return ready.solve(load, tolerance)
+            return ready.solve([load], tolerance)[0]
         except np.linalg.LinAlgError as error:
             return failed(str(error))

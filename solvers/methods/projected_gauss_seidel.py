@@ -17,10 +17,10 @@ from scipy.linalg import blas
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
+from problems.forms.product import product
 from solvers.base import Answer, LoadCase
 from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
 from solvers.kkt import kkt_residual, kkt_status, rounding_of
-from solvers.linear_algebra.product import product
 
 CHECKED = 10  # sweeps after which y is computed anew
 SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slower is as good as never
