@@ -30,7 +30,7 @@ class ApproximateInverse:
 
 
 def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse:
-    """From Q itself: with a narrow band if e ← e − MQe converges fast, else from a window of all contacts, Q⁻¹.
+    """From Q itself: with a narrow band if e ← e − MQe converges fast, else from one window of all: Q⁻¹.
 
     nodes : (m, 2) of the contacts, mm, or None. Raises LinAlgError if Q is not positive definite.
     """

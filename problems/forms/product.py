@@ -12,7 +12,7 @@ SPARSE_LIMIT = 1 / 8
 
 
 def product(G: Matrix, v: Matrix) -> Matrix:
-    """G v for G symmetric, column-major, v (m,) or columns (m, k). A single one reads one triangle, or only the
+    """G v for G symmetric, column-major, v (m,) or columns (m, k). One reads a triangle, or only the
     columns where v is nonzero.
 
     Only SciPy's BLAS is called: NumPy's has its own thread pool, and each pool spins while the other works.

@@ -63,9 +63,9 @@ class Mprgp(Solver):
 
     Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with y = Qλ − p
     computed anew, or when such a computation has not halved what is below the tolerance, or five what is
-    above. "solved" if it then is at most max(tolerance, `kkt.largest_rounding`) mm, else "inaccurate". Iterations
-    are steps, inner iterations contact sets tried with M; details count the products with Q per load case. In
-    the sparse form the status is that of the refined x (solvers/sparse_dual.py).
+    above. "solved" if it then is at most max(tolerance, `kkt.largest_rounding`) mm, else "inaccurate".
+    Iterations are steps, inner iterations contact sets tried with M; details count the products with Q per
+    load case. In the sparse form the status is that of the refined x (solvers/sparse_dual.py).
 
     Options
     -------
