@@ -23,7 +23,7 @@ from harness.cli.app import app
 from harness.scene.ledger import ledger
 from harness.scene.solve import solve
 from harness.scene.validate import estimated
-from problems.build import load_case, prepared
+from problems.build import load_case, model_of, prepared
 from problems.errors import InputError
 from problems.model.scene import JointScene
 from problems.scene import read_scene
