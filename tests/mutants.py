@@ -326,7 +326,7 @@ TESTS = {
     EXACT: ("terms_residual", "altered", "exact_residual"),
     LENGTH: ("terms_residual",),
     DEFINITE: ("terms_definite", "sparse_terms", "sparse_certificate"),
-    DENSE: ("terms_definite", "certificate"),
+    DENSE: ("terms_definite", "sparse_terms", "certificate"),
     BANDED: ("terms_definite", "sparse_certificate"),
     STIFFNESS_BLOCK: ("sparse_terms", "sparse_certificate"),
     SPARSE_BOUND: ("terms_sparse",),
