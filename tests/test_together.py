@@ -264,7 +264,7 @@ def test_few_closed_contacts_are_solved_one_case_after_another(tmp_path: Path) -
 
 def test_newton_has_no_such_way_without_a_factor() -> None:
     data = make_prepared(1, 5)
-    broken = type(data)(data.assembly, data.assembly.K.factors, -data.Q)
+    broken = Prepared(data.assembly, Q=lambda: -data.Q)
     solver = ActiveSetNewton()
     assert solver.batched(solver.prepare(in_form(broken, "dual"))) is None
 
