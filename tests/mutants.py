@@ -12,13 +12,13 @@ EXACT = "harness/verification/exact_residual.py"
 LENGTH = "harness/verification/length.py"
 DEFINITE = "harness/verification/definite.py"
 JUDGE = "harness/verification/judge.py"
-BASELINE = "harness/verification/baseline.py"
-GAP_ERROR = "harness/verification/gap_error.py"
-SPARSE_DEFINITE = "harness/verification/sparse_definite.py"
+DENSE = "problems/stiffness/dense.py"
+BANDED = "problems/stiffness/banded.py"
+STIFFNESS_BLOCK = "problems/stiffness/block.py"
 SPARSE_BOUND = "harness/verification/sparse_bound.py"
 SLICED = "harness/verification/sliced_forces.py"
 AUGMENTED = "harness/verification/augmented.py"
-BALANCE = "problems/forms/balance.py"
+BALANCE = "problems/stiffness/balance.py"
 REFERENCE = "harness/verification/reference.py"
 BLOCK = "harness/verification/batched/bound.py"
 INDEPENDENCE = "harness/verification/independence.py"
@@ -26,6 +26,8 @@ COMPLIANCE = "harness/verification/batched/compliance.py"
 RESIDUAL = "harness/verification/batched/residual.py"
 ASSESS = "harness/verification/batched/assess.py"
 KKT = "solvers/kkt.py"
+ALTERATION = "problems/forms/alteration.py"
+READ = "problems/input/user_matrices.py"
 
 
 class Mutant(NamedTuple):
@@ -68,11 +70,14 @@ MUTANTS = [
     Mutant(CERTIFICATE, "if not (feasible and kappa > 0):", "if not feasible:"),
     Mutant(CERTIFICATE, "np.where(negative, 0.0, lam.hi)", "lam.hi"),
     Mutant(CERTIFICATE, "if not np.isfinite(bound):", "if False:"),
+    Mutant(CERTIFICATE, " - 1.01 * float(units.max()) ** 2 * assembly.altered.norm_K", ""),
     Mutant(CERTIFICATE, "1.01 * norms * error", "1.01 * error"),
     Mutant(CERTIFICATE, "(np.sqrt(diagonal) * np.sqrt(trace))[single] * error + ", ""),
     Mutant(CERTIFICATE, "error + abs(r.value[single]) +", "error +"),
     # The units of unknowns
     Mutant(CERTIFICATE, "at_junction(units * error + abs(x.lo))", "at_junction(units * (error + abs(x.lo)))"),
+    Mutant(CERTIFICATE, "float(units.max()) ** 2 *", "float(units.max()) *"),
+    Mutant(CERTIFICATE, "float(units.max()) ** 2 *", "float(units.min()) ** 2 *"),
     Mutant(CERTIFICATE, "sp.csc_array(sp.diags_array(units) @ A)", "A"),
     Mutant(CERTIFICATE, "scaled = diagonal * units**2", "scaled = diagonal"),
     Mutant(CERTIFICATE, "scaled[rows].sum()", "scaled[rows].max()"),
@@ -95,43 +100,41 @@ MUTANTS = [
     Mutant(EXACT, "    total.error[rows] += 1.01 * error\n", ""),
     Mutant(EXACT, "np.column_stack([rest, x.lo])", "np.column_stack([rest, 0 * x.lo])"),
     Mutant(EXACT, "np.maximum(np.exp2(exponents[:, 0]), SMALLEST_SCALE)", "np.exp2(exponents[:, 0])"),
+    Mutant(
+        EXACT, "        total.error += assembly.altered.of_forces(_size(x), _size(lam))\n", "        pass\n"
+    ),
+    Mutant(EXACT, "        total.error += assembly.altered.of_gaps(_size(x))\n", "        pass\n"),
     Mutant(LENGTH, "np.linalg.norm(v / scale, axis=0)\n", "np.linalg.norm(v, axis=0) / scale\n"),
     Mutant(LENGTH, " + ETA * (norm > 0)", ""),
     # λmin(K) ≥ s − γ ‖|R|ᵀ|R|‖₂ − u (max(B_ii) + s)
-    Mutant(DEFINITE, "gamma(2 * (len(K) + 1)) * _norm(R) + ", ""),
-    Mutant(DEFINITE, "gamma(2 * (len(K) + 1))", "gamma(len(K) + 1)"),
-    Mutant(DEFINITE, "_norm(R) + U * (largest + abs(s))", "_norm(R)"),
-    Mutant(DEFINITE, "U * (largest + abs(s))", "U * abs(s)"),
-    Mutant(DEFINITE, "U * (largest + abs(s))", "U * largest"),
-    Mutant(DEFINITE, "1.01 * (gamma(2", "1.00 * (gamma(2"),
-    Mutant(DEFINITE, "max())\n        R, info", "min())\n        R, info"),
-    Mutant(DEFINITE, "if info == 0:", "if True:"),
-    Mutant(DEFINITE, "(w / v).max()", "(w / v).min()"),
-    Mutant(DEFINITE, "np.abs(R, out=R)", "pass"),
-    Mutant(DEFINITE, "if bound >= SMALLEST:", "if bound > 0:"),
-    Mutant(
-        REFERENCE,
-        "min(smallest_eigenvalue(K, estimate) for K, estimate in",
-        "min(estimate for _, estimate in",
-    ),
-    Mutant(REFERENCE, "return min(smallest_eigenvalue(", "return max(smallest_eigenvalue("),
+    Mutant(DENSE, "gamma(2 * (self.size + 1)) * _norm(R) + ", ""),
+    Mutant(DENSE, "gamma(2 * (self.size + 1))", "gamma(self.size + 1)"),
+    Mutant(DENSE, "_norm(R) + ROUNDING * (largest + abs(s))", "_norm(R)"),
+    Mutant(DENSE, "ROUNDING * (largest + abs(s))", "ROUNDING * abs(s)"),
+    Mutant(DENSE, "ROUNDING * (largest + abs(s))", "ROUNDING * largest"),
+    Mutant(DENSE, "float(abs(diagonal).max())", "float(abs(diagonal).min())"),
+    Mutant(DENSE, "clean=False)\n        if info:", "clean=False)\n        if False:"),
+    Mutant(DENSE, "(w / v).max()", "(w / v).min()"),
+    Mutant(DENSE, "np.abs(R, out=R)", "pass"),
+    Mutant(DENSE, "            B *= D[:, None]\n", ""),
+    Mutant(DEFINITE, "least = min(least, s - SAFE * error)", "least = min(least, s - error)"),
+    Mutant(DEFINITE, "least = min(least, s - SAFE * error)", "least = min(least, s)"),
+    Mutant(DEFINITE, "least = min(least, ", "least = max(least % 1e308, "),
+    Mutant(DEFINITE, "s - SAFE * error >= SMALLEST:", "s - SAFE * error > 0:"),
+    Mutant(DEFINITE, "block.shifted(D[rows], s)", "block.shifted(0 * D[rows] + 1, s)"),
     Mutant(REFERENCE, "if not np.isfinite(proof.bound_mm):", "if False:"),
     # λmin(DKD) of a band
-    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(L) + 1)) * _norm(L) + ", ""),
-    Mutant(SPARSE_DEFINITE, "gamma(2 * (len(L) + 1))", "gamma(len(band) + 1)"),
-    Mutant(SPARSE_DEFINITE, "_norm(L) + U * (largest + abs(s))", "_norm(L)"),
-    Mutant(SPARSE_DEFINITE, "U * (largest + abs(s))", "U * abs(s)"),
-    Mutant(SPARSE_DEFINITE, "U * (largest + abs(s))", "U * largest"),
-    Mutant(SPARSE_DEFINITE, "s - 1.01 * rounding", "s - rounding"),
-    Mutant(SPARSE_DEFINITE, "s - 1.01 * rounding", "s"),
-    Mutant(SPARSE_DEFINITE, "float(abs(shifted[0]).max())", "float(abs(shifted[0]).min())"),
-    Mutant(SPARSE_DEFINITE, "if info == 0:", "if True:"),
-    Mutant(SPARSE_DEFINITE, "trans=1), lower=1).max()", "trans=1), lower=1).min()"),
-    Mutant(SPARSE_DEFINITE, "np.abs(L, out=L)", "pass"),
-    Mutant(SPARSE_DEFINITE, "if bound >= SMALLEST:", "if bound > 0:"),
-    Mutant(SPARSE_DEFINITE, "least = min(least, _of_band", "least = max(0, _of_band"),
-    Mutant(SPARSE_DEFINITE, "K.data * d[K.indices] * np.repeat(d, np.diff(K.indptr))", "K.data"),
-    Mutant(SPARSE_DEFINITE, " * np.repeat(d, np.diff(K.indptr))", ""),
+    Mutant(BANDED, "gamma(2 * (len(L) + 1)) * _norm(L) + ", ""),
+    Mutant(BANDED, "gamma(2 * (len(L) + 1))", "gamma(len(L) + 1)"),
+    Mutant(BANDED, "_norm(L) + U * (largest + abs(s))", "_norm(L)"),
+    Mutant(BANDED, "U * (largest + abs(s))", "U * abs(s)"),
+    Mutant(BANDED, "U * (largest + abs(s))", "U * largest"),
+    Mutant(BANDED, "float(abs(band[0]).max())", "float(abs(band[0]).min())"),
+    Mutant(BANDED, "return None if info else gamma", "return gamma"),
+    Mutant(BANDED, "trans=1), lower=1).max()", "trans=1), lower=1).min()"),
+    Mutant(BANDED, "np.abs(L, out=L)", "pass"),
+    Mutant(STIFFNESS_BLOCK, "M.data * rows[M.indices] * np.repeat(columns, np.diff(M.indptr))", "M.data"),
+    Mutant(STIFFNESS_BLOCK, " * np.repeat(columns, np.diff(M.indptr))", ""),
     # The equations of a contact set: no proof rests on them, but a bound that is tight does
     Mutant(AUGMENTED, "self.rho * g - lam_C", "self.rho * g"),
     Mutant(AUGMENTED, "self.rho * (self.A_C.T @ x - g)", "self.rho * (self.A_C.T @ x)"),
@@ -161,6 +164,7 @@ MUTANTS = [
     Mutant(BLOCK, "np.where(closed | (s < s_error), s_error, 0.0)", "np.where(s < 0, s_error, 0.0)"),
     Mutant(BLOCK, "if not (self.kappa > 0 and self.sigma2 > 0):", "if not self.sigma2 > 0:"),
     Mutant(BLOCK, "if not (self.kappa > 0 and self.sigma2 > 0):", "if not self.kappa > 0:"),
+    Mutant(BLOCK, " + distance) / certain", " + distance)"),
     Mutant(BLOCK, "np.where(np.isfinite(bounds), bounds, np.inf)", "bounds"),
     Mutant(BLOCK, "scale * np.sqrt(energy) + missed", "missed"),
     Mutant(BLOCK, "scale * np.sqrt(energy) + missed", "scale * np.sqrt(energy) / 2 + missed"),
@@ -188,13 +192,18 @@ MUTANTS = [
     Mutant(BLOCK, "gamma(2 * n) * self.stiffest * size**2 + ", ""),
     Mutant(BLOCK, "gamma(2 * n) * self.stiffest * size**2", "gamma(n) * self.stiffest * size**2"),
     Mutant(BLOCK, "scale = np.exp2(exponent(abs(z).max(axis=0, initial=0.0)))", "scale = 1.0"),
+    Mutant(BLOCK, "outer(assembly.altered.A_columns, abs(z)", "outer(0 * assembly.altered.A_columns, abs(z)"),
     Mutant(BLOCK, "gamma(depth) * (abs(g) + abs(A).T @ x_size) + depth", "depth"),
     Mutant(BLOCK, "gamma(depth) * (abs(g) + abs(A).T @ x_size)", "gamma(depth) * (abs(A).T @ x_size)"),
     Mutant(BLOCK, "gamma(depth) * (abs(g) + abs(A).T @ x_size)", "gamma(depth) * abs(g)"),
     Mutant(BLOCK, "(abs(g) + abs(A).T @ x_size) + depth * ETA", "(abs(g) + abs(A).T @ x_size)"),
+    Mutant(BLOCK, "        error = error + assembly.altered.of_gaps(x_size)\n", "        pass\n"),
     Mutant(INDEPENDENCE, "sigma2 = least - uncertainty", "sigma2 = least"),
+    Mutant(INDEPENDENCE, "least = min(least, _least(", "least = max(least, _least("),
     Mutant(
-        INDEPENDENCE, "least = min(least, smallest_eigenvalue(", "least = max(least, smallest_eigenvalue("
+        INDEPENDENCE,
+        "        sigma2 -= 2 * SAFE * np.sqrt(sigma2) * assembly.altered.norm_A\n",
+        "        pass\n",
     ),
     # max (K⁻¹)_ii ≤ (1 + c/κ) (row + ε ‖X‖_F)²
     Mutant(COMPLIANCE, "SAFE * (1 + relative) * row**2", "SAFE * row**2"),
@@ -209,6 +218,9 @@ MUTANTS = [
     Mutant(RESIDUAL, "error += gamma(depth) * size + depth * ETA", "error += gamma(depth) * size"),
     Mutant(RESIDUAL, "abs(f) + abs(A) @ abs(lam)", "abs(f)"),
     Mutant(RESIDUAL, "abs(f) + abs(A) @ abs(lam)", "abs(A) @ abs(lam)"),
+    Mutant(
+        RESIDUAL, "        error += assembly.altered.of_forces(", "        1 * assembly.altered.of_forces("
+    ),
     Mutant(RESIDUAL, "gamma(n) * abs(d).max(axis=0) + gamma(1)", "gamma(1)"),
     Mutant(
         RESIDUAL, "gamma(n) * abs(d).max(axis=0) + gamma(1)", "gamma(n) / 2 * abs(d).max(axis=0) + gamma(1)"
@@ -218,6 +230,7 @@ MUTANTS = [
     Mutant(RESIDUAL, "error + stiffest * error_of_d + gamma", "error + gamma"),
     Mutant(RESIDUAL, " + gamma(1) * (abs(r) + abs(Kd))", ""),
     Mutant(RESIDUAL, " + (n + 1) * ETA\n", "\n"),
+    Mutant(RESIDUAL, "outer(assembly.altered.K,", "outer(0 * assembly.altered.K,"),
     Mutant(RESIDUAL, "(scaled[0] * head_size + scaled[1]", "(scaled[1]"),
     Mutant(RESIDUAL, "(scaled[0] * head_size + scaled[1] * tail_size", "(scaled[0] * head_size"),
     Mutant(RESIDUAL, " + 4 * n * ETA)", ")"),
@@ -235,26 +248,24 @@ MUTANTS = [
     Mutant(JUDGE, "REFERENCE_SHARE * limit_mm", "limit_mm"),
     Mutant(JUDGE, "REFERENCE_SHARE * limit_mm", "2 * REFERENCE_SHARE * limit_mm"),
     Mutant(JUDGE, "if not reference.bound_mm <= ", "if reference.bound_mm > "),
-    Mutant(JUDGE, "max(np.max(np.abs(force)), np.max(-lam, initial=0.0))", "np.max(np.abs(force))"),
-    Mutant(JUDGE, "reference_gap > 2 * limit_mm", "reference_gap > limit_mm"),
-    Mutant(BASELINE, "max(errors.get(key, (0.0, 0.0))[0], error)", "error"),
-    Mutant(BASELINE, "max(bound_mm, then_bound_mm)", "bound_mm"),
-    Mutant(BASELINE, "max(bound_mm, then_bound_mm)", "then_bound_mm"),
-    # |ŷ − y| ≤ ‖a‖₁ e + γ_{k+1} (|g| + |a|ᵀ|x|)
-    Mutant(GAP_ERROR, "self.norms * error_mm", "error_mm"),
-    Mutant(GAP_ERROR, "self.norms * error_mm + rounding", "self.norms * error_mm"),
-    Mutant(GAP_ERROR, "self.norms * error_mm + rounding", "rounding"),
-    Mutant(GAP_ERROR, "abs(g) + self.size @ abs(x)", "self.size @ abs(x)"),
-    Mutant(GAP_ERROR, "abs(g) + self.size @ abs(x)", "abs(g)"),
-    Mutant(GAP_ERROR, "abs(assembly.A).T", "assembly.A.T"),
-    Mutant(GAP_ERROR, "gamma(k + 2)", "gamma(k)"),
-    Mutant(GAP_ERROR, "gamma(k + 2)", "gamma(2)"),
     Mutant(KKT, "max(float((-y).max(initial=0.0)), float(", "max(float("),
     Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "0.0"),
     Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "float(y[lam > 0].min(initial=0.0))"),
     Mutant(KKT, "(abs(p) + size)", "abs(p)"),
     Mutant(KKT, "(abs(p) + size)", "(abs(Q) @ lam)"),
     Mutant(KKT, "4 * EPS * float((abs(p) + size)", "8 * EPS * float((abs(p) + size)"),
+    # What reading has altered
+    Mutant(ALTERATION, "outer(self.f, np.ones_like(x_size)) + ", ""),
+    Mutant(ALTERATION, " + outer(self.K, x_size)", ""),
+    Mutant(ALTERATION, " + outer(self.A_rows, lam_size)", ""),
+    Mutant(ALTERATION, "outer(self.g, np.ones_like(x_size)) +", "outer(0 * self.g, np.ones_like(x_size)) +"),
+    Mutant(ALTERATION, " + np.multiply.outer(self.A_columns, x_size)", ""),
+    Mutant(ALTERATION, "max(self.A_rows.max(initial=0.0), ", "max("),
+    Mutant(ALTERATION, ", self.A_columns.max(initial=0.0))", ", 0.0)"),
+    Mutant(READ, "off_K + abs(K - given)", "abs(K - given)"),
+    Mutant(READ, "off_K + abs(K - given)", "off_K"),
+    Mutant(READ, "lost[~same] = U * abs(rounded[~same])", "lost[~same] = U / 4 * abs(rounded[~same])"),
+    Mutant(READ, "off + 2 * U * count.multiply(size)", "off"),
     # D/√κ (‖Dr‖/√κ + ‖δ‖ √(‖DKD‖/σ²)), refined
     Mutant(SPARSE_BOUND, "(force / np.sqrt(self.kappa) + distance)", "distance"),
     Mutant(
@@ -311,23 +322,25 @@ MUTANTS = [
 
 #: Which tests must fail.
 TESTS = {
-    CERTIFICATE: ("terms_certificate", "terms_residual", "sparse_terms"),
-    EXACT: ("terms_residual", "exact_residual"),
+    CERTIFICATE: ("terms_certificate", "terms_residual", "sparse_terms", "altered"),
+    EXACT: ("terms_residual", "altered", "exact_residual"),
     LENGTH: ("terms_residual",),
-    DEFINITE: ("terms_definite",),
-    SPARSE_DEFINITE: ("sparse_terms", "sparse_certificate"),
+    DEFINITE: ("terms_definite", "sparse_terms", "sparse_certificate"),
+    DENSE: ("terms_definite", "sparse_terms", "certificate"),
+    BANDED: ("terms_definite", "sparse_certificate"),
+    STIFFNESS_BLOCK: ("sparse_terms", "sparse_certificate"),
     SPARSE_BOUND: ("terms_sparse",),
     SLICED: ("sliced_forces",),
     AUGMENTED: ("sparse_terms", "sparse_certificate"),
     BALANCE: ("sparse_terms", "sparse_certificate"),
-    REFERENCE: ("terms_verdict",),
-    BLOCK: ("terms_batched",),
-    INDEPENDENCE: ("terms_batched",),
+    REFERENCE: ("terms_verdict", "altered"),
+    BLOCK: ("terms_batched", "altered"),
+    INDEPENDENCE: ("terms_batched", "altered"),
     COMPLIANCE: ("terms_batched",),
-    RESIDUAL: ("terms_batched", "series_bound"),
+    RESIDUAL: ("terms_batched", "altered", "series_bound"),
     ASSESS: ("terms_batched",),
     JUDGE: ("terms_verdict", "harness_judge"),
-    BASELINE: ("gate_baseline",),
-    GAP_ERROR: ("allowed_gap",),
     KKT: ("terms_verdict",),
+    ALTERATION: ("altered",),
+    READ: ("altered",),
 }

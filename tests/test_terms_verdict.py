@@ -58,7 +58,7 @@ def test_reference_takes_the_least_proven_eigenvalue_of_the_parts() -> None:
 
     blocks = (np.full((1, 1), 4.0), np.full((1, 1), 1.0))
     assembly = Assembly(Stiffness.of(*blocks), sp.csc_array(np.eye(2)))
-    assert 0.8 <= proven_lambda_min(Prepared(assembly)) < 1.0
+    assert 0.4 <= proven_lambda_min(Prepared(assembly)) < 1.0  # half of an estimate
     assert 0.2 <= proven_lambda_min(Overestimated(assembly)) < 1.0
 
 
@@ -71,4 +71,5 @@ def test_reference_proves_each_part_by_its_own_eigenvalue(known: bool) -> None:
 
     soft = np.diag([1.0, 10.0, 100.0])
     assembly = Assembly(Stiffness.of(soft, 1e16 * soft), sp.csc_array(np.eye(6)))
-    assert 0.8 <= proven_lambda_min((Factored if known else Prepared)(assembly)) < 1.0
+    least = 0.8 if known else 0.4  # of what Lanczos found, and half of an estimate
+    assert least <= proven_lambda_min((Factored if known else Prepared)(assembly)) < 1.0

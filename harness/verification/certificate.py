@@ -113,7 +113,8 @@ def _proven(
     norms = np.sqrt(np.asarray((in_units * in_units).sum(axis=0)).ravel())
     is_open = s.value - s.error > 1.01 * norms * error
     diagonal = assembly.K.diagonal
-    scaled, own = diagonal * units**2, assembly.K.slices
+    scaled = diagonal * units**2
+    own = assembly.K.slices
     trace = np.concatenate([np.full(rows.stop - rows.start, scaled[rows].sum()) for rows in own])
     rows = sp.csr_array(A)
     single = np.flatnonzero(np.diff(rows.indptr) == 1)
