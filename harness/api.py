@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 import harness.verification.judge as referee
 from harness.conformance.check import run as check_solver
 from harness.planning.road import chosen_form
-from harness.scene.answer import answer_of, form_of, guess_of
+from harness.solving.answer import answer_of, form_of, guess_of
 from harness.series.session import Job, Result, SeriesSession
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference import reference_of

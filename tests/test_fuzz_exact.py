@@ -21,7 +21,7 @@ from promises import promised, promises
 from solving import SLOW, TOLERANCES
 
 from harness import InputError, own_matrices, solve_dual
-from harness.measurement.solver_session import SolverSession
+from harness.solving.session import SolverSession
 from harness.verification.batched.assess import assess
 from harness.verification.batched.bound import Bound
 from harness.verification.certificate import certify

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from harness.scene.answer import answer_of
+from harness.solving.answer import answer_of
 from harness.verification.reference import refined_active_set
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.sparse_prepared import SparsePrepared

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from synthetic_results import row, write_rows
 
 from harness.planning.road import chosen_form
-from harness.scene.answer import answer_of
+from harness.solving.answer import answer_of
 from harness.verification.judge import judge
 from harness.verification.reference import Reference, refined_active_set
 from problems.build import load_case, prepared

@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from small import make_load, make_strips, solve_by_nnls
 
-from harness.measurement.solver_session import SolverSession
+from harness.solving.session import SolverSession
 from harness.verification.reference import refined_active_set
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase

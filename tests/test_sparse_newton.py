@@ -12,7 +12,7 @@ from small import make_load, make_prepared, make_strips, solve_by_nnls
 from sparse_matrices import band_matrix, graph_matrix
 from test_matrices import write_mtx
 
-from harness.measurement.solver_session import SolverSession
+from harness.solving.session import SolverSession
 from harness.verification.reference import reference, refined_active_set
 from problems.build import load_case, prepared
 from problems.forms import sparse_prepared

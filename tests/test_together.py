@@ -12,7 +12,7 @@ from small import make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
 from harness.conformance.known_problems import contact_rows
-from harness.measurement.solver_session import SolverSession
+from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.banded_inverse import BandedInverse, banded_inverse, order_along_joint

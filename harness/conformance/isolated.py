@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from harness.measurement.answers import error_text
+from harness.solving.answers import error_text
 from harness.measurement.child import await_end, receive
 from harness.measurement.describe import IMPORT_S
 from harness.measurement.limited import POLL_S, Limited

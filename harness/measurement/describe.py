@@ -15,7 +15,7 @@ from problems.errors import Fault, InputError
 from problems.forms.names import FORMS, default_form
 from solvers.base import Form
 
-from .answers import shown
+from harness.solving.answers import shown
 from .child import await_end, receive
 from .limited import POLL_S, Limited
 from .solver_code import code_of

@@ -9,7 +9,7 @@ import numpy as np
 
 from problems.forms.assembly import Matrix
 
-from .answers import Refused
+from harness.solving.answers import Refused
 
 
 class StoredFiles:

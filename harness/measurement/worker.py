@@ -25,9 +25,9 @@ from problems.scene import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .answers import Refused, error_text, figures, save
+from harness.solving.answers import Refused, error_text, figures, save
 from .child import Events, await_end, receive
-from .solver_session import SolverSession
+from harness.solving.session import SolverSession
 from .stored_files import StoredFiles
 from .yardstick import yardstick
 

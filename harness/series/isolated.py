@@ -14,14 +14,14 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from harness.measurement.answers import error_text
+from harness.solving.answers import error_text
 from harness.measurement.child import Events, await_end, receive
 from harness.measurement.limited import POLL_S, Limited
 from harness.measurement.process import START_S
 from harness.measurement.stored_files import StoredFiles
 from harness.results.provenance import provenance
 from harness.results.records import Row
-from harness.verification.batched.assess import Assessment
+from harness.verification.assess import Assessment
 from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase

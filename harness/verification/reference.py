@@ -1,67 +1,44 @@
-"""The reference that answers are compared with: an active-set solution, refined, with a proven bound.
+"""The reference that answers are compared with: forces from anywhere, refined, with a proven bound.
 
-For the contact set C found by block principal pivoting, the optimality conditions are linear,
-
-    [ K    A_C ] [ x   ]   [ f   ]
-    [ A_Cᵀ  0  ] [ λ_C ] = [ g_C ],
-
-and are solved by iterative refinement: nearly exact residuals from the original K, A, f, g, corrections
-through the Cholesky factors of K and Q_CC, x and λ as sums of two float64. The set is corrected and the
-refinement repeated until λ_C ≥ 0 and g − Aᵀx ≥ 0 hold for the refined values. The bound is that of
-`certificate.py` and holds whatever C is.
+Nothing is searched for here. Candidates are the problem's exact answer, if it was made from one, forces that
+the caller has, and the answers of the in-house methods in turn; each is refined and its error bounded from K, A,
+f and g alone (see `proof`), until a bound is at most a tenth of the limit. The bound does not depend on where
+the forces came from; the best one is kept.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
+import scipy.linalg as sla
 from numpy.typing import NDArray
 
+from harness.solving.candidates import candidates
 from problems.forms import balance
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.balance import balanced_units
+from problems.forms.balance import balanced_units, least_eigenvalue
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.scene import MadeScene, Scene
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
-from . import augmented, sparse_definite
-from .certificate import certify
 from .definite import smallest_eigenvalue
-from .exact_residual import gaps
-from .principal_pivoting import Stop, contact_set
-from .refinement import ENOUGH, refined_solution, units_of
-from .sparse_bound import PROVEN_ENOUGH_MM, Proven, SparseBound
+from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
+from .proof import Proof, Proven
 
-MAX_SET_CORRECTIONS = 20
-STOPPED = "the search for the contact set was stopped"
+STOPPED = "no further method was tried"
 UNPROVEN = "could not be proven"
 
 
-@dataclass(frozen=True)
-class Reference:
-    """x (n,) in mm, λ (m,) in N, the closed contacts, and a bound on max|x − x*| in mm.
-
-    unit_mm, gap_unit_mm : the length of one unit of x and of the gaps, mm.
-    """
-
-    x: Vector
-    lam: Vector
-    active: NDArray[np.bool_]
-    bound_mm: float
-    route: str
-    unit_mm: Vector | float = 1.0
-    gap_unit_mm: Vector | float = 1.0
-
-
 def default_limit_s(m: int) -> float:
-    """Seconds for the search of the contact set among m contacts: 60 per thousand, at least 60."""
+    """Seconds after which no further candidate is tried: 60 per thousand contacts, at least 60."""
     return 0.06 * max(m, 1000)
 
 
@@ -70,57 +47,64 @@ def reference_of(
     prepared: Prepared,
     load: LoadCase,
     limit_s: float | None = None,
-    guess: Vector | None = None,
+    given: Sequence[Vector] = (),
 ) -> Reference:
-    """The reference of a scene: the answer that it was made from, if any, else the refined one.
-
-    limit_s : of the search for the contact set, by default `default_limit_s(m)`. What it has found by then is
-        refined and certified; if the bound is wide, answers cannot be judged, and `route` says why.
-    """
-    if isinstance(scene, MadeScene):
+    """The reference of a scene: the answer that it was made from, if any, else that of its load case."""
+    if isinstance(scene, MadeScene) and scene.made.x is not None and scene.made.lam is not None:
         made = scene.made
-        if made.x is None or made.lam is None:
-            return reference(prepared, load, limit_s, guess)
-        route = "chosen, exact"
-        return Reference(made.x, made.lam, made.lam > 0, 0.0, route, made.unit_mm, made.gap_unit_mm)
-    return reference(prepared, load, limit_s, guess)
+        x, lam = scene.made.x, scene.made.lam
+        return Reference(x, lam, lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm)
+    return reference(prepared, load, limit_s, given)
 
 
 def reference(
-    prepared: Prepared,
-    load: LoadCase,
-    limit_s: float | None = None,
-    guess: Vector | None = None,
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Vector] = ()
 ) -> Reference:
-    """The reference of a load case, from the cache if it was computed before for these matrices."""
+    """The reference of a load case, from the cache if it was proven before for these matrices."""
     if prepared.key is None:
-        return refined_active_set(prepared, load, limit_s, guess)
+        return best_of_candidates(prepared, load, limit_s, given)
     key = cache.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
-
     stored = cache.load(key)
-    if stored is None:
-        found = refined_active_set(prepared, load, limit_s, guess)
-        if STOPPED not in found.route:  # else a longer search may find more
-            made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam, "active": found.active}
-            cache.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
-        return found
-    arrays, facts = stored
-    x, lam, active = (np.array(arrays[name]) for name in ("x", "lam", "active"))
-    return Reference(x, lam, active, facts["bound_mm"], facts["route"])
+    if stored is not None:
+        arrays, facts = stored
+        x, lam = (np.array(arrays[name]) for name in ("x", "lam"))
+        return Reference(x, lam, lam > 0, facts["bound_mm"], facts["route"])
+    found = best_of_candidates(prepared, load, limit_s, given)
+    if found.bound_mm <= REFERENCE_SHARE * LIMIT_MM:  # else another candidate may prove more
+        made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam}
+        cache.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
+    return found
 
 
-def of_refined(refined: Proven) -> Reference:
-    """What a refinement in the sparse form has proven."""
-    return Reference(refined.x.hi, refined.lam.hi, refined.active, refined.bound_mm, "proven")
+def best_of_candidates(
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Vector] = ()
+) -> Reference:
+    """given : λ (m,) N, tried first. limit_s : after it no further candidate is tried."""
+    limit_s = default_limit_s(prepared.assembly.m) if limit_s is None else limit_s
+    proof, end = proof_of(prepared), time.monotonic() + limit_s
+    best: Proven | None = None
+    stopped = ""
+    for lam in chain(given, candidates(prepared, load)):
+        (found,) = proof.proven([load], [lam])
+        if best is None or found.bound_mm < best.bound_mm:
+            best = found
+        if best.bound_mm <= REFERENCE_SHARE * LIMIT_MM:
+            break
+        if time.monotonic() > end:
+            stopped = f", {STOPPED} after {limit_s:g} s"
+            break
+    assert best is not None
+    route = ("proven" if np.isfinite(best.bound_mm) else UNPROVEN) + stopped
+    return Reference(best.x.hi, best.lam.hi, best.active, best.bound_mm, route)
 
 
-def sparse_bound(prepared: SparsePrepared) -> SparseBound | None:
-    """What load cases of an assembly share of their proofs; None where nothing can be proven so."""
-    return SparseBound.of(prepared, proven_lambda_min(prepared))
+def proof_of(prepared: Prepared) -> Proof:
+    """What the load cases of an assembly share."""
+    return Proof(prepared, proven_lambda_min(prepared))
 
 
 def proven_lambda_min(prepared: Prepared) -> float:
-    """κ ≤ λmin(DKD), from the cache if it was proven before for this assembly."""
+    """κ ≤ λmin(DKD) in balanced units, from the cache if it was proven before for this assembly."""
     if prepared.key is None:
         return _proven_lambda_min(prepared)
     key = cache.digest("lambda_min", prepared.key, _code())
@@ -129,90 +113,20 @@ def proven_lambda_min(prepared: Prepared) -> float:
 
 
 def _proven_lambda_min(prepared: Prepared) -> float:
-    if isinstance(prepared, SparsePrepared):
-        return sparse_definite.smallest_eigenvalue(prepared, balanced_units(prepared.assembly))
-    estimates = _lambda_min_of_blocks(prepared)
-    blocks = map(_dense, prepared.assembly.blocks)
-    return min(smallest_eigenvalue(K, estimate) for K, estimate in zip(blocks, estimates, strict=True))
+    assembly, least = prepared.assembly, np.inf
+    D, sparse = balanced_units(assembly), isinstance(prepared, SparsePrepared)
+    for k, (K, rows) in enumerate(zip(assembly.blocks, assembly.slices, strict=True)):
+        factor = prepared.sparse_factors[k] if sparse else None
+        solve = factor.solve if factor else partial(_solved, prepared.factors[k])
+        least = min(least, smallest_eigenvalue(K, least_eigenvalue(solve, D[rows]), D[rows], factor))
+    return float(least)
 
 
-def _lambda_min_of_blocks(prepared: Prepared) -> list[float]:
-    """An estimate for each block: λmin of all would be lost in the rounding of a much stiffer one.
-
-    Where the facts hold λmin of all blocks and each cond(K_i), that, or max_j k_jj / cond(K_i) ≤ λmin(K_i).
-    """
-    blocks, facts = prepared.assembly.blocks, prepared.facts
-    least, conditions = facts.get("lambda_min"), facts.get("cond_blocks")
-    if not (isinstance(least, float) and isinstance(conditions, list)):
-        return [float(np.linalg.eigvalsh(_dense(K))[0]) for K in blocks]
-    return [max(least, float(K.diagonal().max()) / c) for K, c in zip(blocks, conditions, strict=True)]
-
-
-def _dense(K: Any) -> Matrix:
-    return K.toarray() if sp.issparse(K) else K
+def _solved(U: Matrix, b: Vector) -> Vector:
+    """(UᵀU)⁻¹b."""
+    return sla.cho_solve((U, False), b, check_finite=False)
 
 
 def _code() -> str:
     """The fingerprint of the code for references: those of other code are recomputed."""
     return fingerprint([Path(__file__), Path(balance.__file__)], within=["harness/verification"])
-
-
-def refined_active_set(
-    prepared: Prepared,
-    load: LoadCase,
-    limit_s: float | None = None,
-    guess: Vector | None = None,
-) -> Reference:
-    """The active set, refined and certified.
-
-    guess : λ (m,) N of an answer, from whose set the search starts; with a sparse K the answer itself is
-        refined, if that proves enough. The proof does not depend on where it came from.
-    """
-    if guess is not None and isinstance(prepared, SparsePrepared):
-        bound = sparse_bound(prepared)
-        refined = bound.proven([load], [guess])[0] if bound else None
-        if refined is not None and refined.bound_mm <= PROVEN_ENOUGH_MM:
-            return of_refined(refined)
-    return certified_active_set(prepared, load, limit_s, guess)
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def certified_active_set(
-    prepared: Prepared, load: LoadCase, limit_s: float | None = None, guess: Vector | None = None
-) -> Reference:
-    """The same by factorisations for contact sets, the first that of the guess."""
-    p = prepared.dual_load(load)
-    active = np.zeros(len(p), dtype=bool)
-    limit_s = default_limit_s(len(p)) if limit_s is None else limit_s
-    end = time.monotonic() + limit_s
-    if guess is not None:
-        active = guess > 0
-    elif (p > 0).any():  # else Q is not needed
-        active = _contact_set(prepared, load, p, stop=lambda: time.monotonic() > end)
-    stopped = time.monotonic() > end
-    for _ in range(MAX_SET_CORRECTIONS):
-        x, lam = refined_solution(prepared, load, active)
-        s = gaps(prepared.assembly, load.g, x)
-        tiny = ENOUGH * abs(prepared.assembly.at_junction(x.hi)).max(initial=0) + s.error
-        wrong = np.where(active, lam.hi < 0, s.value < -tiny)
-        if not wrong.any():
-            break
-        active = active ^ wrong
-    kappa, units = proven_lambda_min(prepared), units_of(prepared)
-    proof = certify(prepared.assembly, load, x, lam, active, kappa, units)
-    undecided = int((~(proof.closed | proof.open)).sum())
-    if not np.isfinite(proof.bound_mm):
-        route = UNPROVEN
-    elif prepared.assembly.altered:
-        route = "proven; what reading has rounded or symmetrised is counted"
-    else:
-        route = "proven" + (f", {undecided} contacts weakly active" if undecided else "")
-    if stopped:
-        route += f", {STOPPED} after {limit_s:g} s"
-    return Reference(proof.x.hi, proof.lam.hi, active, proof.bound_mm, route)
-
-
-def _contact_set(prepared: Prepared, load: LoadCase, p: Vector, stop: Stop) -> NDArray[np.bool_]:
-    if isinstance(prepared, SparsePrepared):
-        return augmented.contact_set(prepared, load, p > 0, stop)
-    return contact_set(prepared.compliance, p, stop=stop)

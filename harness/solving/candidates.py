@@ -1,0 +1,38 @@
+"""The forces of a load case by the in-house methods in turn: what a reference may be proven from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from problems.errors import InputError
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.prepared import Prepared
+from problems.forms.sparse_prepared import SparsePrepared
+
+from .answer import answer_of
+
+DENSE = ("newton", "ipm-fast", "ipm", "gi", "lemke")
+SPARSE = ("newton", "mprgp")
+TOLERANCE_MM = 1e-11
+
+
+def candidates(prepared: Prepared, load: LoadCase) -> Iterator[Vector]:
+    """λ (m,) N ≥ 0, none if no contact would overlap; a method is run when its answer is asked for."""
+    none = np.zeros(prepared.assembly.m)
+    if not (prepared.dual_load(load) > 0).any():
+        yield none
+        return
+    from solvers.registry import make_solver  # slow to import
+
+    sparse = isinstance(prepared, SparsePrepared)
+    for name in SPARSE if sparse else DENSE:
+        try:
+            form = "sparse" if sparse else "dual"
+            answer = answer_of(name, make_solver(name, {}), prepared, form, load, TOLERANCE_MM)
+        except (InputError, ArithmeticError, np.linalg.LinAlgError, RuntimeError):
+            continue  # it gave no answer
+        if answer.lam is not None:
+            yield answer.lam
+    yield none
