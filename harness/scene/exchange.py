@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from rich.console import Console
 
 from harness.planning.road import cheaper
-from harness.verification.independence import independence
+from harness.verification.definite import independence
 from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
@@ -140,7 +140,7 @@ def _refuse_unusable(path: Path, origin: dict[str, Path]) -> tuple[Form, Prepare
         data = prepared(scene, form=form)
         if not isinstance(data, SparsePrepared):
             _ = data.Q
-        elif data.sparse_factors and data.assembly.m and not independence(data.assembly) > 0:
+        elif data.sparse_factors and data.assembly.m and not independence(data.assembly.A) > 0:
             allowed = "no column may depend on the others"
             raise InputError.one(scene.source_of("A"), "A", "dependent columns", allowed)
         return form, data, load_case(scene, form)

@@ -14,9 +14,9 @@ import numpy as np
 import threadpoolctl
 from numpy.typing import NDArray
 
-from harness.solving.session import SolverSession
 from harness.results.provenance import provenance
 from harness.results.records import Row
+from harness.solving.session import SolverSession
 from harness.verification.assess import Assessment, assess
 from harness.verification.judge import judge
 from harness.verification.reference import best_of_candidates, proof_of

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from .answers import Refused
-from .session import SolverSession
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form, default_form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer, Solver
+
+from .answers import Refused
+from .session import SolverSession
 
 NO_ANSWER = "gave no answer; try another solver or form"
 

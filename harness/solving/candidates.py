@@ -8,6 +8,7 @@ import numpy as np
 
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
+from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
 
@@ -16,23 +17,21 @@ from .answer import answer_of
 DENSE = ("newton", "ipm-fast", "ipm", "gi", "lemke")
 SPARSE = ("newton", "mprgp")
 TOLERANCE_MM = 1e-11
+NO_CONTACT = "no contact closes"
 
 
-def candidates(prepared: Prepared, load: LoadCase) -> Iterator[Vector]:
-    """λ (m,) N ≥ 0, none if no contact would overlap; a method is run when its answer is asked for."""
-    none = np.zeros(prepared.assembly.m)
+def candidates(prepared: Prepared, load: LoadCase) -> Iterator[tuple[str, Vector]]:
+    """Names and λ (m,) N; a method is run when its answer is asked for, none where no contact overlaps."""
     if not (prepared.dual_load(load) > 0).any():
-        yield none
+        yield NO_CONTACT, np.zeros(prepared.assembly.m)
         return
     from solvers.registry import make_solver  # slow to import
 
-    sparse = isinstance(prepared, SparsePrepared)
-    for name in SPARSE if sparse else DENSE:
+    form: Form = "sparse" if isinstance(prepared, SparsePrepared) else "dual"
+    for name in SPARSE if form == "sparse" else DENSE:
         try:
-            form = "sparse" if sparse else "dual"
             answer = answer_of(name, make_solver(name, {}), prepared, form, load, TOLERANCE_MM)
         except (InputError, ArithmeticError, np.linalg.LinAlgError, RuntimeError):
             continue  # it gave no answer
         if answer.lam is not None:
-            yield answer.lam
-    yield none
+            yield f"{name}, refined", answer.lam

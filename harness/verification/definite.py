@@ -45,7 +45,9 @@ STEPS = 5  # of the power method, for v
 SMALLEST = 2.0**-1000
 
 
-def smallest_eigenvalue(K: Any, estimate: float, D: Vector | None = None, factor: Factor | None = None) -> float:
+def smallest_eigenvalue(
+    K: Any, estimate: float, D: Vector | None = None, factor: Factor | None = None
+) -> float:
     """κ ≤ λmin(DKD), proven, K (n, n) symmetric, dense or sparse; 0 if no positive κ was found.
 
     estimate : of λmin(DKD); the better it is, the sharper the bound. factor : of a sparse K.

@@ -106,11 +106,17 @@ class Residual:
         x1, after = cut(hi, top, bits)
         x2, x3 = cut(after, top - bits, bits)
         x3, after = x3 + lo, after + lo  # rounded by at most a rounding of themselves
-        most, most3, most_after, most_lo = (abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after, lo))
+        most, most3, most_after, most_lo = (
+            abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after, lo)
+        )
         # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one; by the second half
         # of x M₃ is left out.
         rounding, again = gamma(longest + 8), 4 * gamma(TERMS) ** 2
-        of_M1, of_M2, of_M3 = rounding * most3 + again * most, rounding * most_after, rounding * most + most_lo
+        of_M1, of_M2, of_M3 = (
+            rounding * most3 + again * most,
+            rounding * most_after,
+            rounding * most + most_lo,
+        )
         of_each = SAFE * np.stack([of_M1, of_M2, of_M3, 8 * ETA * (1 + most) * (most > 0)])
         for rows, panel in panels:
             entries, count, above, of_row = _scaled(panel, unit)
@@ -155,7 +161,9 @@ def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[
         return entries, np.full_like(top, panel.shape[1]), top, lambda of_row: of_row
     entries, count = panel.data * unit[panel.indices], np.diff(panel.indptr)
     largest = np.zeros(len(count))
-    largest[count > 0] = np.maximum.reduceat(abs(entries), panel.indptr[:-1][count > 0]) if entries.size else 0
+    largest[count > 0] = (
+        np.maximum.reduceat(abs(entries), panel.indptr[:-1][count > 0]) if entries.size else 0
+    )
     return entries, count[:, None], exponent(largest)[:, None], lambda of_row: np.repeat(of_row[:, 0], count)
 
 

@@ -15,16 +15,13 @@ matter where λ came from. The bound is made small by a refinement of x and λ_C
 
     x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
 
-by preconditioned conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v. The preconditioner is the inverse of
-Q_CC if M ≈ Q⁻¹ were exact, P v = M_CC v − M_CN M_NN⁻¹ M_NC v; the first step, which is the only one if it is, also
-takes contacts out of C whose force would be negative. C = {λ_i q_ii > s_i} at each pass (semismooth Newton;
-Hintermüller, Ito and Kunisch, SIAM J. Optim. 13:865–888, 2002). Load cases are columns, left out when done.
+by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M ≈ Q⁻¹ (see `near`). Load cases
+are columns, left out when done.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,15 +29,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.banded_inverse import BandedInverse, BandFactor, Windows, banded_inverse, of_windows
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
 
 from .balanced import Balanced
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
+from .near import ClosedContacts, Near
 
 MAX_PASSES = 30
-MAX_SETS = 10  # tried with M in a pass
 MAX_WORSE = 2  # passes in a row that do not halve the bound
 MAX_PRODUCTS = 60  # of conjugate gradients in a pass
 REDUCTION = 1e-6  # of y_C in a pass
@@ -72,9 +67,9 @@ class Proof:
         self.balanced, self.kappa = Balanced.of(prepared), kappa
 
     @cached_property
-    def near(self) -> tuple[BandedInverse | None, Vector]:
-        """M, if there is one, and about the diagonal of Q, in the units of the matrices."""
-        return near_inverse(self.balanced.prepared)
+    def near(self) -> Near:
+        """Made when an answer is first refined."""
+        return Near.of(self.balanced.prepared, self.balanced.R[:, 0])
 
     @cached_property
     def spread(self) -> float:
@@ -88,7 +83,7 @@ class Proof:
         self,
         loads: Sequence[LoadCase],
         lams: Sequence[Vector],
-        xs: Sequence[Vector] | None = None,
+        xs: Iterable[Vector] | None = None,
         enough_mm: float = 0.0,
     ) -> list[Proven]:
         """From forces λ (m,) N of each load case, and about their displacements x (n,), if known.
@@ -98,7 +93,7 @@ class Proof:
         units, load = self.balanced, self.balanced.load(loads)
         f, g = np.broadcast_to(load.f, (len(units.D), len(loads))), load.g
         lam = np.maximum(np.column_stack(lams), 0.0) / units.R
-        x = units.solve(f - units.A @ lam) if xs is None else np.column_stack(xs) / units.D
+        x = units.solve(f - units.A @ lam) if xs is None else np.column_stack(list(xs)) / units.D
         state = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
         best: list[Proven | None] = [None] * len(loads)
         worse, left = np.zeros(len(loads), dtype=int), np.arange(len(loads))
@@ -121,7 +116,10 @@ class Proof:
             dx, dlam = self._corrections(r.value[:, going], s.value[:, going], lam2.hi, enough_mm)
             moved = lam2.plus(dlam)
             negative = moved.hi < 0
-            state = x2.plus(dx), DoubleDouble(np.where(negative, 0, moved.hi), np.where(negative, 0, moved.lo))
+            state = (
+                x2.plus(dx),
+                DoubleDouble(np.where(negative, 0, moved.hi), np.where(negative, 0, moved.lo)),
+            )
         return [each for each in best if each is not None]
 
     def bounds(self, x: DoubleDouble, lam: DoubleDouble, r: Enclosure, s: Enclosure) -> tuple[Vector, Vector]:
@@ -143,7 +141,7 @@ class Proof:
         units = self.balanced
         dx = units.solve(r)
         y = s - units.At @ dx
-        starts = [_Start(self, *columns) for columns in zip(y.T, lam.T, strict=True)]
+        starts = [ClosedContacts(self.near, *columns) for columns in zip(y.T, lam.T, strict=True)]
         C = np.column_stack([start.C for start in starts])
         dlam = np.column_stack([start.dlam for start in starts])
         w = units.solve(units.A @ dlam)
@@ -170,60 +168,3 @@ class Proof:
     def _found(self, x: DoubleDouble, lam: DoubleDouble, bound_mm: float) -> Proven:
         D, R = self.balanced.D[:, 0], self.balanced.R[:, 0]
         return Proven(DoubleDouble(D * x.hi, D * x.lo), DoubleDouble(R * lam.hi, R * lam.lo), bound_mm)
-
-
-class _Start:
-    """C (m,) of a load case and its first dλ. y : the gaps of the refined x; λ : as it is."""
-
-    def __init__(self, proof: Proof, y: Vector, lam: Vector) -> None:
-        self.M, diagonal = proof.near
-        self.R, self.factor = proof.balanced.R[:, 0], None
-        C = lam * diagonal * self.R**2 > y
-        self.C, self.dlam = C, np.where(C, 0.0, -lam)
-        for _ in range(MAX_SETS if self.M else 0):
-            self._factor(C)
-            if self.factor is None:
-                return
-            dlam = -self._solved(np.where(C, y, 0.0), lam)
-            negative = C & (lam + dlam < 0)
-            self.C, self.dlam = C, np.where(C, np.maximum(dlam, -lam), -lam)
-            if not negative.any():
-                return
-            C = C & ~negative
-
-    def precondition(self, v: Vector) -> Vector:
-        """P v, v (m,) zero outside C."""
-        return v if self.factor is None else np.where(self.C, self._solved(v, 0.0), 0.0)
-
-    def _solved(self, v: Vector, lam: Vector | float) -> Vector:
-        """u with (M⁻¹u)_C = v_C and u_N = λ_N: u = M(v − t), M_NN t_N = (M v)_N − λ_N."""
-        u = self._times(v)
-        t = np.empty_like(u)
-        order = self.M.order
-        t[order] = self.factor.solve((np.where(self.factor_C, 0.0, u - lam) * self.R)[order])
-        return u - self._times(t * self.R)
-
-    def _times(self, v: Vector) -> Vector:
-        """M v in balanced units."""
-        u, order = np.empty_like(v), self.M.order
-        u[order] = self.M.product((v / self.R)[order])
-        return u / self.R
-
-    def _factor(self, C: Contacts) -> None:
-        self.factor_C, self.factor = C, None
-        with suppress(np.linalg.LinAlgError):
-            self.factor = self.M.factor(~C[self.M.order])
-
-
-def near_inverse(prepared: Prepared) -> tuple[BandedInverse | None, Vector]:
-    """M ≈ Q⁻¹, if one can be made, and about the diagonal of Q, (m,) mm/N."""
-    if isinstance(prepared, SparsePrepared):
-        found = prepared.approximate_inverse
-        return (found.M, found.diagonal) if found else (None, np.ones(prepared.assembly.m))
-    nodes, Q = prepared.assembly.contact_nodes, prepared.Q
-    with suppress(np.linalg.LinAlgError):
-        if nodes is None:
-            windows = Windows(np.arange(len(Q)), len(Q))
-            return of_windows(windows, lambda window: np.array(Q, order="F")), np.diag(Q)
-        return banded_inverse(Q, nodes), np.diag(Q)
-    return None, np.diag(Q)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from harness.solving.candidates import candidates
 from problems.forms import balance
-from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.balance import balanced_units, least_eigenvalue
 from problems.forms.prepared import Prepared
 from problems.forms.sparse_prepared import SparsePrepared
@@ -83,19 +83,21 @@ def best_of_candidates(
     limit_s = default_limit_s(prepared.assembly.m) if limit_s is None else limit_s
     proof, end = proof_of(prepared), time.monotonic() + limit_s
     best: Proven | None = None
-    stopped = ""
-    for lam in chain(given, candidates(prepared, load)):
+    route = stopped = ""
+    mine = (("given, refined", lam) for lam in given)
+    for name, lam in chain(mine, candidates(prepared, load)):
         (found,) = proof.proven([load], [lam])
         if best is None or found.bound_mm < best.bound_mm:
-            best = found
+            best, route = found, name
         if best.bound_mm <= REFERENCE_SHARE * LIMIT_MM:
             break
         if time.monotonic() > end:
             stopped = f", {STOPPED} after {limit_s:g} s"
             break
-    assert best is not None
-    route = ("proven" if np.isfinite(best.bound_mm) else UNPROVEN) + stopped
-    return Reference(best.x.hi, best.lam.hi, best.active, best.bound_mm, route)
+    if best is None:  # no method gave an answer
+        (best,), route = proof.proven([load], [np.zeros(prepared.assembly.m)]), "no forces"
+    said = "proven" if np.isfinite(best.bound_mm) else UNPROVEN
+    return Reference(best.x.hi, best.lam.hi, best.active, best.bound_mm, f"{said}: {route}{stopped}")
 
 
 def proof_of(prepared: Prepared) -> Proof:
@@ -114,17 +116,19 @@ def proven_lambda_min(prepared: Prepared) -> float:
 
 def _proven_lambda_min(prepared: Prepared) -> float:
     assembly, least = prepared.assembly, np.inf
-    D, sparse = balanced_units(assembly), isinstance(prepared, SparsePrepared)
-    for k, (K, rows) in enumerate(zip(assembly.blocks, assembly.slices, strict=True)):
-        factor = prepared.sparse_factors[k] if sparse else None
-        solve = factor.solve if factor else partial(_solved, prepared.factors[k])
-        least = min(least, smallest_eigenvalue(K, least_eigenvalue(solve, D[rows]), D[rows], factor))
+    D = balanced_units(assembly)
+    factors = prepared.sparse_factors if isinstance(prepared, SparsePrepared) else prepared.factors
+    for K, rows, U in zip(assembly.blocks, assembly.slices, factors, strict=True):
+        sparse = None if isinstance(U, np.ndarray) else U
+        solve = sparse.solve if sparse else partial(_solved, U)
+        least = min(least, smallest_eigenvalue(K, least_eigenvalue(solve, D[rows]), D[rows], sparse))
     return float(least)
 
 
-def _solved(U: Matrix, b: Vector) -> Vector:
+def _solved(U: Any, b: Vector) -> Vector:
     """(UᵀU)⁻¹b."""
-    return sla.cho_solve((U, False), b, check_finite=False)
+    x: Vector = sla.cho_solve((U, False), b, check_finite=False)
+    return x
 
 
 def _code() -> str:
