@@ -16,7 +16,7 @@ InputError. Matrices are cached as by the command line.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -30,15 +30,17 @@ import harness.verification.judge as referee
 from harness.conformance.check import run as check_solver
 from harness.planning.road import chosen_form
 from harness.series.session import Job, Result, SeriesSession
-from harness.solving.answer import answer_of, form_of
+from harness.solving.answer import answer_of, forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.dual_alone import DualAlone, load_of
 from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.forms.names import FORMS, Form
+from problems.forms.prepared import dual_alone, load_of
+from problems.forms.problem import in_form
+from problems.input.stored_matrices import SMALL
 from problems.input.user_matrices import SYMMETRY, checked
 from problems.load_cases.base import LoadCases
 from problems.load_cases.listed import Listed
@@ -111,7 +113,8 @@ def own_matrices(
     given = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
     arrays = {name: M if sp.issparse(M) else np.asarray(M) for name, M in (("K", K), ("A", A))}
     arrays |= {name: np.array(value) for name, value in given.items()}
-    assembly, load = checked(arrays, dict.fromkeys(arrays, title))
+    sparse = sp.issparse(K) and K.shape[0] > SMALL
+    assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
     return MadeScene(title, title, ManufacturedProblem(assembly, load))
 
 
@@ -200,7 +203,7 @@ def solve_dual(
         raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
     name, chosen = _solver(solver, options)
     form = form_of(name, chosen.forms, "dual")
-    return replace(answer_of(name, chosen, DualAlone(Q), form, load_of(p), tolerance), x=None)
+    return forces_of(name, chosen, in_form(dual_alone(Q), form), load_of(p), tolerance)
 
 
 def solve_series(

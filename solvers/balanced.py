@@ -20,15 +20,14 @@ of its own for it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Vector
-from problems.forms.balance import balanced_units
+from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.stiffness.block import scaled
 
 from .base import Answer, WarmStart
 
@@ -44,17 +43,16 @@ class Units:
 
     @classmethod
     def of(cls, assembly: Assembly) -> Units:
-        D = balanced_units(assembly)
+        D = assembly.K.units
         lengths = np.sqrt((sp.diags_array(D) @ assembly.A).power(2).sum(axis=0))
         return cls(D, np.ldexp(1.0, -np.frexp(lengths)[1]))
 
     def problem(self, given: Problem) -> Problem:
         """With DK̂D for K̂ and DBR for B."""
         assembly = given.assembly
-        d = [self.D[rows] for rows in assembly.slices]
-        blocks = tuple(_scaled(K, own, own) for K, own in zip(assembly.blocks, d, strict=True))
-        A = _scaled(assembly.A, self.D, self.R)
-        return in_form(SparsePrepared(Assembly(blocks, A, parts=assembly.parts)), given.form)
+        A = scaled(assembly.A, self.D, self.R)
+        K = assembly.K.scaled(self.D)
+        return in_form(Prepared(Assembly(K, A, parts=assembly.parts)), given.form)
 
     def unit(self, load: LoadCase) -> float:
         """u; 1 if there are neither loads nor gaps."""
@@ -88,15 +86,8 @@ class Units:
 
 
 def balanced(problem: Problem) -> tuple[Problem, Units | None]:
-    """A problem whose matrices are sparse in balanced units, with these; any other as it is."""
-    if not sp.issparse(problem.blocks[0]):
+    """A problem in the sparse form in balanced units, with these; any other as it is."""
+    if problem.form != "sparse":
         return problem, None
     units = Units.of(problem.assembly)
     return units.problem(problem), units
-
-
-def _scaled(given: Any, rows: Vector, columns: Vector) -> sp.csc_array:
-    """diag(rows) M diag(columns) of a sparse M, CSC."""
-    M = sp.csc_array(given)
-    entries = M.data * rows[M.indices] * np.repeat(columns, np.diff(M.indptr))
-    return sp.csc_array((entries, M.indices, M.indptr), shape=M.shape)

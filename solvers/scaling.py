@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.prepared import Prepared
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.problem import Problem, in_form
-from problems.forms.sparse_prepared import SparsePrepared
 
 from .base import Answer, Batch, Solver, WarmStart
 
@@ -26,34 +23,6 @@ from .base import Answer, Batch, Solver, WarmStart
 def contact_units(A: sp.csc_array) -> Vector:
     """c (m,), powers of two, with max_i |a_ij| / c_j between 1/√2 and √2."""
     return np.exp2(np.round(np.log2(abs(A).max(axis=0).toarray().ravel())))
-
-
-class UnitContacts(Prepared):
-    """A prepared assembly with the columns of A divided by c."""
-
-    def __init__(self, base: Prepared, c: Vector) -> None:
-        given = base.assembly
-        A = sp.csc_array(given.A @ sp.diags_array(1 / c))
-        super().__init__(Assembly(given.blocks, A, given.nodes, given.parts))
-        self.base, self.c = base, c
-
-    @cached_property
-    def factors(self) -> tuple[Matrix, ...]:
-        return self.base.factors
-
-    @cached_property
-    def Q(self) -> Matrix:
-        return np.asfortranarray(self.base.Q / self.c / self.c[:, None])
-
-    def solve_K(self, b: Matrix) -> Matrix:
-        return self.base.solve_K(b)
-
-
-def unit_contacts(base: Prepared, c: Vector) -> Prepared:
-    """The prepared assembly with the columns of A divided by c."""
-    if isinstance(base, SparsePrepared):
-        return base.with_contacts(sp.csc_array(base.assembly.A @ sp.diags_array(1 / c)))
-    return UnitContacts(base, c)
 
 
 @dataclass(frozen=True)
@@ -85,7 +54,7 @@ class Scaled(Solver):
         c = contact_units(problem.assembly.A)
         if (c == 1).all():
             return _Scaled(self.solver.convert(problem), None)
-        return _Scaled(self.solver.convert(in_form(unit_contacts(problem.prepared, c), problem.form)), c)
+        return _Scaled(self.solver.convert(in_form(problem.prepared.in_contact_units(c), problem.form)), c)
 
     def prepare(self, data: _Scaled) -> _Scaled:
         return replace(data, inner=self.solver.prepare(data.inner))

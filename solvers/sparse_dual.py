@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from problems.forms.assembly import Matrix
-from problems.forms.problem import stacked
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.assembly import stacked
+from problems.forms.prepared import Prepared
 
 from .base import Answer, LoadCase
 from .kkt import EPS
@@ -17,21 +16,14 @@ from .kkt import EPS
 ROUNDING_MM = 1e-7  # what x may be off: a δ beyond is an error, not rounding
 
 
-def with_p(prepared: SparsePrepared, loads: Sequence[LoadCase]) -> list[LoadCase]:
+def with_p(prepared: Prepared, loads: Sequence[LoadCase]) -> list[LoadCase]:
     """With p = AᵀK⁻¹f − g, (m,) mm; K⁻¹f is computed once if they share their f."""
     columns = prepared.dual_load(stacked(loads)).T
     return [LoadCase(load.f, load.g, p) for load, p in zip(loads, columns, strict=True)]
 
 
-def gaps(prepared: SparsePrepared, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
-    """y = g − AᵀK⁻¹(f − Aλ), (m, k) mm: Qλ and p alone can be large, and cancel."""
-    A, cases = prepared.assembly.A, stacked(loads)
-    y: Matrix = cases.g - A.T @ prepared.solve_K(cases.f - A @ lam)
-    return y
-
-
 def with_x(
-    prepared: SparsePrepared, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float
+    prepared: Prepared, answers: Sequence[Answer], loads: Sequence[LoadCase], tolerance: float
 ) -> list[Answer]:
     """With x = K⁻¹(f − Aλ) refined by δ, and judged by it: "solved" if the KKT residual of y = g − Aᵀx is at
     most max(tolerance, min(4 max(ε|g| + ε|A|ᵀ|x| + |A|ᵀ|δ|), ROUNDING_MM)).
@@ -43,8 +35,8 @@ def with_x(
     assembly, cases = prepared.assembly, stacked([loads[k] for k in known])
     lam = np.column_stack([np.asarray(answers[k].lam) for k in known])
     b = cases.f - assembly.A @ lam
-    x = prepared.solve_K(b)
-    delta = prepared.solve_K(b - assembly.multiply_K(x))
+    x = prepared.assembly.K.solve(b)
+    delta = prepared.assembly.K.solve(b - assembly.K.multiply(x))
     x = x + delta
     y, size = cases.g - assembly.A.T @ x, abs(assembly.A).T
     rounding = 4 * (EPS * (abs(cases.g) + size @ abs(x)) + size @ abs(delta)).max(axis=0)

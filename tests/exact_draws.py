@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from harness.conformance.known_problems import contact_rows
 from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.stiffness.operator import Stiffness
 
 Random = np.random.Generator
 Integers = NDArray[np.int64]
@@ -179,4 +180,5 @@ def _in_units(
         ExactLoad(LoadCase(a * S * f / v, a * C * g), a * x / S, a * lam / (C * v)) for x, lam, f, g in loads
     )
     units = f"C 2^±{contact_bits}, S 2^±{unknown_bits}, v {v:.0e}, a {a:.0e}"
-    return ExactProblem(f"{kind}; {units}", Assembly(scaled, contacts, None, names), made, v < 2.0**800)
+    assembly = Assembly(Stiffness.of(*scaled), contacts, None, names)
+    return ExactProblem(f"{kind}; {units}", assembly, made, v < 2.0**800)

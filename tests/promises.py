@@ -33,9 +33,9 @@ def promises(data: Prepared, each: ExactLoad, condition: float) -> dict[str, tup
     the rounding of K⁻¹f: where it is less, the judge knows of cond(K), not of nearly dependent contacts.
     """
     m, c = data.assembly.m, abs(data.assembly.A).max(axis=0).toarray().ravel()
-    D = float(np.diag(data.solve_K(np.eye(data.assembly.n))).max())
+    D = float(np.diag(data.assembly.K.solve(np.eye(data.assembly.n))).max())
     weakest = float(np.linalg.eigvalsh(data.Q / c / c[:, None])[0])
-    size = float(max(abs(v).max() for v in (each.x, data.solve_K(each.load.f), each.load.g / c)))
+    size = float(max(abs(v).max() for v in (each.x, data.assembly.K.solve(each.load.f), each.load.g / c)))
     rounding = conditioned_limit(0.0, condition, size)
     judged = LIMIT_MM if D <= COMPLIANCE and rounding <= LIMIT_MM else np.inf
     force = float((c * each.lam).sum())

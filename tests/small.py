@@ -13,20 +13,21 @@ import scipy.sparse as sp
 from harness.conformance.known_problems import contact_rows, stiffness
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 
 def make_prepared(seed: int, pairs: int, tools: int = 0) -> Prepared:
     """Two parts in contact at `pairs` nodes, the first one also with `tools` rigid supports."""
     random = np.random.default_rng(seed)
     blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
-    return Prepared(Assembly(blocks, contact_rows(pairs, tools)))
+    return Prepared(Assembly(Stiffness.of(*blocks), contact_rows(pairs, tools)))
 
 
 def make_strips(elements: int) -> Prepared:
     """Two strings under tension on elastic beds (N/mm), a contact at each node: condition number ≈ 1e3."""
     main, side = np.full(elements, 2e3 + 2.0), np.full(elements - 1, -1e3)
     K = np.diag(main) + np.diag(side, 1) + np.diag(side, -1)
-    return Prepared(Assembly((K, 0.5 * K), contact_rows(elements, 0)))
+    return Prepared(Assembly(Stiffness.of(K, 0.5 * K), contact_rows(elements, 0)))
 
 
 def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[LoadCase, LoadCase]:
@@ -46,5 +47,5 @@ def solve_by_nnls(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:
     closed = lam > 0
     lam[closed] = np.linalg.solve(prepared.Q[np.ix_(closed, closed)], p[closed])
     # Not Prepared.recover, so that the expectation has nothing in common with it.
-    K = sla.block_diag(*prepared.assembly.blocks)
+    K = sla.block_diag(*prepared.assembly.K.matrices)
     return np.linalg.solve(K, case.f - sp.csr_array(prepared.assembly.A) @ lam), lam

@@ -42,7 +42,7 @@ def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[An
 
 def eigenvalues(prepared: Prepared) -> tuple[float, float]:
     """λmin and λmax of K."""
-    values = [np.linalg.eigvalsh(K) for K in prepared.assembly.blocks]
+    values = [np.linalg.eigvalsh(K) for K in prepared.assembly.K.matrices]
     return min(float(v[0]) for v in values), max(float(v[-1]) for v in values)
 
 
@@ -56,7 +56,7 @@ def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vecto
     Clarabel's τ is a share of the data where that is above 1.
     """
     low, high = eigenvalues(prepared)
-    size = max(float(abs(v).max(initial=0.0)) for v in (x, prepared.solve_K(case.f)))
+    size = max(float(abs(v).max(initial=0.0)) for v in (x, prepared.assembly.K.solve(case.f)))
     conditioning = 100 * high / low * 2.0**-53 * size
     if name in ACTIVE_SET:
         return conditioning

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from harness.verification.certificate import certify
 from harness.verification.exact_residual import DoubleDouble
 from problems.forms.assembly import Assembly, LoadCase
+from problems.stiffness.operator import Stiffness
 
 
 def array(*values: float) -> np.ndarray:
@@ -21,7 +22,8 @@ def doubled(hi: np.ndarray, lo: np.ndarray | None = None) -> DoubleDouble:
 def diagonal(*stiffness: float, A: list[list[float]] | None = None) -> Assembly:
     """Independent springs, N/mm; each against a rigid tool unless A says otherwise."""
     K = np.asfortranarray(np.diag(array(*stiffness)))
-    return Assembly((K,), sp.csc_array(np.eye(len(K)) if A is None else array(*A).reshape(len(K), -1)))
+    normals = np.eye(len(K)) if A is None else array(*A).reshape(len(K), -1)
+    return Assembly(Stiffness.of(K), sp.csc_array(normals))
 
 
 def bound_of(

@@ -79,7 +79,7 @@ def test_both_forms_are_stated_rightly() -> None:
     prepared = make_prepared(5, 8, 3)
     case, load = make_load(6, prepared)
     _, n, m = prepared.Q, prepared.assembly.n, prepared.assembly.m
-    K = sla.block_diag(*prepared.assembly.blocks)
+    K = sla.block_diag(*prepared.assembly.K.matrices)
     x, lam = cp.Variable(n), cp.Variable(m)
     rows = prepared.assembly.A.T.toarray() @ x <= case.g
     settings = {"solver": "CLARABEL", "tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}

@@ -30,7 +30,7 @@ def ours() -> NDArray[np.float64]:
     ]
     scene = make_scene(joint, SelfWeight(kind="self_weight", part="a"), *springs)
     data = prepared(scene)
-    x = data.solve_K(load_case(scene).f)
+    x = data.assembly.K.solve(load_case(scene).f)
     at = [int(np.flatnonzero((joint.nodes == point).all(axis=1))[0]) for point in POINTS]
     return np.asarray(x[at])
 

@@ -27,6 +27,7 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.input.user_matrices import read_matrices
 from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 
 EXTENDED = np.finfo(np.longdouble).nmant > 53
@@ -247,7 +248,7 @@ def altered(n: int = 1, m: int = 1, **parts: float) -> Alteration:
 
 def off_by(part: Alteration, x: float, lam: float, f: float, g: float) -> float:
     """The certificate's bound for one spring of 1 N/mm against a tool."""
-    made = Assembly(diagonal(1.0).blocks, diagonal(1.0).A, altered=part)
+    made = Assembly(diagonal(1.0).K, diagonal(1.0).A, altered=part)
     zero = np.zeros(1)
     at, forced = DoubleDouble(np.array([x]), zero), DoubleDouble(np.array([lam]), zero)
     return certify(
@@ -276,7 +277,7 @@ def test_residuals_are_off_by_each_alteration() -> None:
     x, lam = DoubleDouble(rng.standard_normal(2), zero), DoubleDouble(rng.random(2), zero)
     for name in ("K", "A_rows", "A_columns", "f", "g"):
         part = altered(2, 2, **{name: 0.25})
-        made = Assembly(diagonal(1.0, 2.0).blocks, diagonal(1.0, 2.0).A, altered=part)
+        made = Assembly(diagonal(1.0, 2.0).K, diagonal(1.0, 2.0).A, altered=part)
         wanted_r = {"K": 0.25 * abs(x.hi).max(), "A_rows": 0.25 * lam.hi.max(), "f": 0.25}.get(name, 0.0)
         wanted_s = {"A_columns": 0.25 * abs(x.hi).max(), "g": 0.25}.get(name, 0.0)
         at = split(made, x.hi[:, None])
@@ -299,7 +300,7 @@ def test_block_each_alteration_of_the_constants_counts() -> None:
     zero, one = np.zeros((1, 1)), np.ones((1, 1))
 
     def bound(part: Alteration | None) -> Bound:
-        made = Assembly(diagonal(1.0).blocks, diagonal(1.0).A, altered=part)
+        made = Assembly(diagonal(1.0).K, diagonal(1.0).A, altered=part)
         return Bound(Prepared(made), 1.0, 1.0, 1.0, 1.0, np.eye(1))
 
     def found(part: Alteration | None) -> float:
@@ -310,9 +311,9 @@ def test_block_each_alteration_of_the_constants_counts() -> None:
     missed = bound(altered(A_columns=0.25))._translation(one, np.zeros(1))[0]
     assert 1.25 <= missed <= 1.26
     for part, least in ((altered(A_columns=0.25), 0.75), (altered(A_rows=0.25), 0.75)):
-        made = Assembly(diagonal(1.0).blocks, diagonal(1.0).A, altered=part)
+        made = Assembly(diagonal(1.0).K, diagonal(1.0).A, altered=part)
         assert 0 < independence(made) <= least**2
-    assert independence(Assembly(diagonal(1.0).blocks, diagonal(1.0).A, altered=altered(A_rows=2.0))) == 0.0
+    assert independence(Assembly(diagonal(1.0).K, diagonal(1.0).A, altered=altered(A_rows=2.0))) == 0.0
 
 
 # What cannot be proven is said so.
@@ -321,7 +322,7 @@ def test_block_each_alteration_of_the_constants_counts() -> None:
 @pytest.mark.parametrize("f", [1.7e308, 1e308])
 def test_a_load_that_overflows_is_not_called_proven(f: float) -> None:
     K = np.array([[2.0, -1.0], [-1.0, 2.0]])
-    made = Prepared(Assembly((np.asfortranarray(K),), sp.csc_array(np.eye(2))))
+    made = Prepared(Assembly(Stiffness.of(np.asfortranarray(K)), sp.csc_array(np.eye(2))))
     found = refined_active_set(made, LoadCase(np.full(2, f), np.zeros(2)))
     assert found.bound_mm == np.inf
     assert found.route == UNPROVEN

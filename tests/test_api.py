@@ -42,7 +42,7 @@ from solvers.registry import modules
 def matrices(seed: int = 3) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
     data = make_prepared(seed, 6, tools=2)
     load = make_load(seed, data)[1]
-    return data, load, (sp.block_diag(data.assembly.blocks), data.assembly.A, load.f, load.g)
+    return data, load, (sp.block_diag(data.assembly.K.matrices), data.assembly.A, load.f, load.g)
 
 
 def dual(seed: int = 3) -> tuple[Matrix, Vector, Vector]:

@@ -14,9 +14,10 @@ from harness.solving.session import SolverSession
 from harness.verification.reference import reference
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
 from solvers.balanced import Units, balanced
 from solvers.base import Answer, Form, WarmStart
 from solvers.registry import in_house, make_solver
@@ -59,7 +60,7 @@ def test_a_model_in_balanced_units_and_back_is_the_same_to_the_last_bit() -> Non
     assert is_power_of_two(R)
     assert is_power_of_two(np.array([u]))
     assert len(set(D)) > 3  # mixed units indeed
-    for K, mine, rows in zip(given.blocks, problem.blocks, given.assembly.slices, strict=True):
+    for K, mine, rows in zip(given.blocks, problem.blocks, given.assembly.K.slices, strict=True):
         back = sp.diags_array(1 / D[rows]) @ mine @ sp.diags_array(1 / D[rows])
         assert abs(back - K).max() == 0
     back = sp.diags_array(1 / D) @ problem.assembly.A @ sp.diags_array(1 / R)
@@ -73,7 +74,7 @@ def test_everything_is_of_the_size_of_one() -> None:
     given, load = opened("three-part-stack")
     problem, units = balanced(given)
     assert units is not None
-    diagonal = problem.assembly.diagonal_K()
+    diagonal = problem.assembly.K.diagonal
     assert 0.5 <= diagonal.min() <= diagonal.max() <= 2
     assert problem.G is not None
     lengths = np.sqrt(problem.G.power(2).sum(axis=1))
@@ -137,10 +138,10 @@ def test_the_answer_does_not_depend_on_the_units_of_the_model(name: str) -> None
     S, C = np.exp2(random.integers(-20, 21, n)), np.exp2(random.integers(-20, 21, m))
     blocks = tuple(
         sp.csc_array(sp.diags_array(S[rows]) @ K @ sp.diags_array(S[rows]))
-        for K, rows in zip(problem.blocks, base.assembly.slices, strict=True)
+        for K, rows in zip(problem.blocks, base.assembly.K.slices, strict=True)
     )
     A = sp.csc_array(sp.diags_array(S) @ base.assembly.A @ sp.diags_array(C))
-    other = in_form(SparsePrepared(Assembly(blocks, A)), "sparse")
+    other = in_form(Prepared(Assembly(Stiffness.of(*blocks), A)), "sparse")
     changed = LoadCase(S * case.f, C * case.g)
     answers = []
     for each, given in ((problem, case), (other, changed)):

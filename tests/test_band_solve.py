@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import lapack
 
-from problems.forms.band_solve import FEW, PANEL, band_solve
+from problems.stiffness.band_solve import FEW, PANEL, band_solve
 
 
 @pytest.mark.parametrize("width", [PANEL, PANEL + 1, 100, 2 * PANEL, 200])

@@ -124,11 +124,11 @@ def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(steps) > 3
     forbid_building(monkeypatch)
     second = build.prepared(SCENE, lambda text, _: pytest.fail(text))
-    for one, other in zip(first.assembly.blocks, second.assembly.blocks, strict=True):
+    for one, other in zip(first.assembly.K.matrices, second.assembly.K.matrices, strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(first.Q, second.Q)
     assert first.facts == second.facts
-    for array in (second.Q, *second.assembly.blocks, *second.factors):
+    for array in (second.Q, *second.assembly.K.matrices, *second.assembly.K.factors):
         assert isinstance(array, np.memmap)
         assert not array.flags.writeable
 
@@ -146,12 +146,12 @@ def test_prepared_holds_what_it_says() -> None:
     made = build.prepared(SCENE)
     A = made.assembly.A.toarray()
     np.testing.assert_array_equal(A, np.vstack([np.eye(20), -np.eye(20)]))
-    for K, U in zip(made.assembly.blocks, made.factors, strict=True):
+    for K, U in zip(made.assembly.K.matrices, made.assembly.K.factors, strict=True):
         np.testing.assert_array_equal(np.tril(U, -1), 0)
         np.testing.assert_allclose(U.T @ U, K, atol=1e-12 * abs(K).max())
-    inverses = [np.linalg.inv(K) for K in made.assembly.blocks]
+    inverses = [np.linalg.inv(K) for K in made.assembly.K.matrices]
     np.testing.assert_allclose(made.Q, sum(inverses), rtol=1e-9)
-    values = np.concatenate([np.linalg.eigvalsh(K) for K in made.assembly.blocks])
+    values = np.concatenate([np.linalg.eigvalsh(K) for K in made.assembly.K.matrices])
     assert made.facts["lambda_min"] == pytest.approx(values.min(), rel=1e-6)
     assert made.facts["lambda_max"] == pytest.approx(values.max(), rel=1e-6)
     assert json.dumps(made.facts)
@@ -160,7 +160,7 @@ def test_prepared_holds_what_it_says() -> None:
 def test_a_truncated_part_of_a_scene_stops_the_run(root: Path) -> None:
     made = build.prepared(SCENE)
     assert made.Q.size
-    path = root / made.Q_key / "Q.npy"
+    path = root / str(made.key) / "Q.npy"
     path.write_bytes(path.read_bytes()[:-16])
     with pytest.raises(InputError, match=r"Q\.npy"):
         _ = build.prepared(SCENE).Q
@@ -179,7 +179,7 @@ OWN = "input.user_matrices"  # makes a user's matrices, no joint's
     "module",
     [
         *("fem.hermite", "fem.plate", "condensation.condense", "condensation.condensed_part"),
-        *("model.joint", "model.part", "forms.factorisation", "forms.stages", "effects.supports", OWN),
+        *("model.joint", "model.part", "stiffness.dense", "forms.stages", "effects.supports", OWN),
     ],
 )
 def test_a_change_of_the_code_that_builds_changes_the_key(

@@ -240,7 +240,7 @@ def test_known_answers_fulfil_the_optimality_conditions() -> None:
         prepared, assembly = trial.prepared, trial.prepared.assembly
         for case in trial.cases:
             gap = case.load.g - assembly.A.T @ case.x
-            force = assembly.multiply_K(case.x) - case.load.f + assembly.A @ case.lam
+            force = assembly.K.multiply(case.x) - case.load.f + assembly.A @ case.lam
             assert np.abs(force).max() < 1e-9
             assert gap.min() > -1e-12
             assert case.lam.min() >= 0

@@ -68,7 +68,7 @@ def full_stiffness(part: dict[str, Any]) -> tuple[sp.csc_array, NDArray[np.int_]
 @pytest.mark.parametrize("part", PARTS, ids=str)
 def test_equals_the_dense_schur_complement(part: dict[str, Any]) -> None:
     joint = make_joint(part, contacts=[["a", "tool"]])
-    found = prepared(make_scene(joint, *stiffeners(part))).assembly.blocks[0]
+    found = prepared(make_scene(joint, *stiffeners(part))).assembly.K.matrices[0]
     sparse, keep = full_stiffness(part)
     K, other = sparse.toarray(), np.setdiff1d(np.arange(sparse.shape[0]), keep)
     expected = K[np.ix_(keep, keep)] - K[np.ix_(keep, other)] @ np.linalg.solve(
@@ -86,7 +86,7 @@ def test_solution_equals_that_of_the_whole_plate(part: dict[str, Any]) -> None:
     f = np.zeros(K.shape[0])
     f[keep] = load
     whole = spsolve(K, f)[keep]
-    np.testing.assert_allclose(made.solve_K(load), whole, atol=1e-9 * abs(whole).max())
+    np.testing.assert_allclose(made.assembly.K.solve(load), whole, atol=1e-9 * abs(whole).max())
 
 
 def test_nodes_stand_in_the_order_of_the_unknowns() -> None:
@@ -96,7 +96,7 @@ def test_nodes_stand_in_the_order_of_the_unknowns() -> None:
         made = prepared(make_scene(joint))
         nodes = [(400.0 * ix / 6, 120.0 * iy / 4) for iy in range(5) for ix in range(7)]
         np.testing.assert_allclose(made.assembly.nodes, nodes)
-        flexibility = made.solve_K(np.eye(35))
+        flexibility = made.assembly.K.solve(np.eye(35))
         # the part is built in at one edge: the mean flexibility falls towards it
         by_line = np.diag(flexibility).reshape(5, 7).mean(axis=1)
         assert (by_line[0] > by_line[-1]) == ("north" in part["clamped"])
@@ -128,7 +128,7 @@ def test_a_part_that_floats_is_refused(points: tuple[tuple[float, float], ...]) 
     joint = make_joint({"south": LONG}, contacts=[["a", "tool"]])
     effects = [Supports(kind="supports", part="a", points=points)] if points else []
     with pytest.raises(InputError, match="held against every rigid motion"):
-        _ = prepared(make_scene(joint, *effects)).factors
+        _ = prepared(make_scene(joint, *effects)).assembly.K.factors
 
 
 # --- A narrow clamped strip along y, pressed on a flat obstacle -----------------------------------------

@@ -10,7 +10,7 @@ from test_newton import definite
 
 from problems.forms.assembly import LoadCase
 from problems.forms.banded_inverse import banded_inverse
-from problems.forms.dual_alone import DualAlone, load_of
+from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import Problem, in_form
 from solvers.active_set.batched import BatchedSweeps
 from solvers.base import Answer, WarmStart
@@ -34,7 +34,7 @@ def decaying() -> np.ndarray:
 
 def problem(Q: np.ndarray, seed: int, mean: float) -> tuple[Problem, LoadCase]:
     p = np.random.default_rng(seed).standard_normal(len(Q)) + mean
-    made = in_form(DualAlone(Q), "dual")
+    made = in_form(dual_alone(Q), "dual")
     (load,) = made.loads([load_of(p)])
     return made, load
 

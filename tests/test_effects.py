@@ -57,7 +57,7 @@ def test_fastener_closes_the_gap() -> None:
     """The sign: without contact the parts come closer, x_a − x_b > 0."""
     scene = make_scene(JOINT, Fasteners(kind="fasteners", preload=10.0, points=((200.0, 60.0),)))
     made = prepared(scene)
-    approach = made.assembly.A.T @ made.solve_K(load_case(scene).f)
+    approach = made.assembly.A.T @ made.assembly.K.solve(load_case(scene).f)
     assert (approach > 0).all()
 
 

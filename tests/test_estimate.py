@@ -14,10 +14,9 @@ from harness.scene import validate
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.names import Form
-from problems.forms.sparse_factor import half_bandwidth
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.scene import JointScene
 from problems.scene import read_scene
+from problems.stiffness.banded import half_bandwidth
 
 GALLERY = ("three-part-stack", "installed-fasteners", "sheet-over-former", "plate-on-frame", "padded-panel")
 
@@ -28,11 +27,11 @@ def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_m
     assert isinstance(scene, JointScene)
     estimate = estimated_sparse(scene, 1e9)
     data = prepared(scene, form="sparse")
-    assert isinstance(data, SparsePrepared)
+    assert not data.assembly.K.dense
     assert (estimate.n, estimate.m) == (data.assembly.asked, data.assembly.m)
     assert estimate.unknowns == data.assembly.n
-    assert estimate.half_bandwidth == max(map(half_bandwidth, data.assembly.blocks))
-    stored = 8 * sum(factor.numbers for factor in data.sparse_factors)
+    assert estimate.half_bandwidth == max(map(half_bandwidth, data.assembly.K.matrices))
+    stored = 8 * sum(factor.numbers for factor in data.assembly.K.factors)
     assert estimate.stored_mib == pytest.approx(stored / 2**20)
 
 

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from harness.verification.exact_residual import DoubleDouble, Enclosure, forces, gaps, two_product, two_sum
 from problems.forms.assembly import Assembly
+from problems.stiffness.operator import Stiffness
 
 
 def exactly(v: np.ndarray) -> list[Fraction]:
@@ -51,7 +52,7 @@ def small_assembly(rng: np.random.Generator) -> Assembly:
         A[k, k] = 1.0
         A[7 + k, k] = -1.0
     A[14, 3] = 0.3
-    return Assembly(tuple(blocks), sp.csc_array(A))
+    return Assembly(Stiffness.of(*blocks), sp.csc_array(A))
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -62,7 +63,7 @@ def test_residuals_lie_within_their_bounds(seed: int) -> None:
     x, lam, f, g = doubled(rng, 15), doubled(rng, 7), wild(rng, 15), wild(rng, 7)
     x_exact, lam_exact = (total(exactly(v.hi), exactly(v.lo)) for v in (x, lam))
     K = np.zeros((15, 15))
-    for block, rows in zip(made.blocks, made.slices, strict=True):
+    for block, rows in zip(made.K.matrices, made.K.slices, strict=True):
         K[rows, rows] = block
     Kx, Al, Ax = times(K, x_exact), times(A, lam_exact), times(A.T, x_exact)
     r = [a - b - c for a, b, c in zip(exactly(f), Kx, Al, strict=True)]
@@ -78,7 +79,7 @@ def test_a_residual_that_cancels_is_still_known(seed: int) -> None:
     size = 300
     B = rng.standard_normal((size, size))
     K = np.asfortranarray(B + B.T) * 1e5
-    made = Assembly((K,), sp.csc_array((size, 1)))
+    made = Assembly(Stiffness.of(K), sp.csc_array((size, 1)))
     x = rng.standard_normal(size)
     nothing = np.zeros(1)
     f = K @ x

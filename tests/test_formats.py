@@ -148,7 +148,7 @@ def test_the_imported_problem_has_the_scenes_answer(tmp_path: Path) -> None:
     own = read_scene(str(tmp_path / "stack.npz"))
     one, two = prepared(scene), prepared(own)
     np.testing.assert_array_equal(two.Q, one.Q)
-    for K, L in zip(one.assembly.blocks, two.assembly.blocks, strict=True):
+    for K, L in zip(one.assembly.K.matrices, two.assembly.K.matrices, strict=True):
         np.testing.assert_array_equal(K, L)
     np.testing.assert_array_equal(load_case(own).f, load_case(scene).f)
 
@@ -195,6 +195,8 @@ from pathlib import Path
 import numpy as np
 
 from problems.formats import Data
+from problems.stiffness.operator import Stiffness
+from problems.stiffness.operator import Stiffness
 
 DESCRIPTION = "a file .plain of f"
 SUFFIXES = (".plain",)
@@ -372,7 +374,9 @@ def test_the_expected_error_is_that_of_rounding(digits: int) -> None:
     errors = []
     for unit in 1.17 ** np.arange(9):
         coarse = Prepared(
-            Assembly((rounded(data.assembly.blocks[0] * unit, digits) / unit,), data.assembly.A)
+            Assembly(
+                Stiffness.of(rounded(data.assembly.K.matrices[0] * unit, digits) / unit), data.assembly.A
+            )
         )
         errors.append(abs(solve_by_nnls(coarse, load)[0] - x).max())
     expected = expected_error(data, x, lam, digits)
@@ -403,7 +407,7 @@ def test_a_built_problem_is_exported_with_all_its_terms(tmp_path: Path) -> None:
     scene = read_scene(SCENE)
     assert isinstance(scene, JointScene)
     base = prepared(untied(scene))
-    bare = sla.block_diag(*base.assembly.blocks)
+    bare = sla.block_diag(*base.assembly.K.matrices)
     assert abs(found["K"] - bare).max() == pytest.approx(5.0)
     assert abs(wanted["f"]).max() == pytest.approx(2.5)
 

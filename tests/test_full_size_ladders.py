@@ -54,7 +54,7 @@ def test_the_answer_is_exact(name: str) -> None:
     made = SMALL[name]
     A, (x, lam) = exactly(made.assembly.A.toarray()), map(exactly, (made.x, made.lam))
     Kx = np.concatenate(
-        [exactly(K) @ x[s] for K, s in zip(made.assembly.blocks, made.assembly.slices, strict=True)]
+        [exactly(K) @ x[s] for K, s in zip(made.assembly.K.matrices, made.assembly.K.slices, strict=True)]
     )
     y = exactly(made.load.g) * 2**60 - A.T @ x
     assert (Kx + A @ lam == exactly(made.load.f) * 2**60).all()
@@ -73,7 +73,7 @@ def test_the_share_without_a_force_is_as_named(percent: int) -> None:
 def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_of_two() -> None:
     for n in (1, 22, 64):
         d = spectrum(n, 1e4)
-        (K,) = exact_model(d).assembly().blocks
+        (K,) = exact_model(d).assembly().K.matrices
         np.testing.assert_allclose(np.linalg.eigvalsh(K), 64 * np.sort(d), rtol=1e-9)
     H = sla.hadamard(64, dtype=float)
     np.testing.assert_array_equal(K, (H * d) @ H)  # 64 = the stiffness of the grid's smallest eigenvalue
@@ -83,7 +83,7 @@ def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_o
 def test_the_problem_is_one_whole(name: str) -> None:
     """The Hadamard blocks of one part overlap those of the other, so that no contact stands alone."""
     assembly = SMALL[name].assembly
-    K = sp.block_diag([K != 0 for K in assembly.blocks])
+    K = sp.block_diag([K != 0 for K in assembly.K.matrices])
     graph = sp.block_array([[K, assembly.A != 0], [(assembly.A != 0).T, None]])
     assert sp.csgraph.connected_components(graph, directed=False)[0] == 1
 
@@ -103,7 +103,7 @@ def test_in_house_solvers_are_right(name: str, solver: str, form: Form, toleranc
     assert answer.lam is not None
     x = answer.x if answer.x is not None else data.recover(answer.lam, made.load)
     known = Reference(made.x, made.lam, made.lam > 0, 0.0, "chosen, exact")
-    condition = max(float(np.linalg.cond(K)) for K in made.assembly.blocks)
+    condition = max(float(np.linalg.cond(K)) for K in made.assembly.K.matrices)
     limit = conditioned_limit(1e-7, condition, float(abs(made.x).max()))
     assert judge(data, made.load, known, x, answer.lam, limit).verdict == "within"
 

@@ -85,7 +85,7 @@ def test_nearly_equal_contacts_whose_sets_alternate(index: int) -> None:
 
 def _check(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
     data = Prepared(made.assembly)
-    spectra = [np.linalg.eigvalsh(K) for K in made.assembly.blocks]
+    spectra = [np.linalg.eigvalsh(K) for K in made.assembly.K.matrices]
     condition = max(each[-1] for each in spectra) / min(each[0] for each in spectra)
     if not 0 < condition < LARGEST_CONDITION:
         return
@@ -185,7 +185,7 @@ def _check_solver(
 def _check_interface(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
     """As a user's own matrices, once as they are and once with a contact twice; Q and p by themselves."""
     assembly, each = made.assembly, made.loads[0]
-    K = sp.block_diag(assembly.blocks)
+    K = sp.block_diag(assembly.K.matrices)
     try:
         data = prepared(own_matrices(K, assembly.A, each.load.f, each.load.g))
         known = refined_active_set(data, each.load)

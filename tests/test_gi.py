@@ -14,6 +14,7 @@ from small import make_load, make_prepared, solve_by_nnls
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from problems.stiffness.operator import Stiffness
 from solvers.active_set.gi_border import Border
 from solvers.active_set.goldfarb_idnani import _State, goldfarb_idnani
 from solvers.active_set.growing_factor import BLOCK, GrowingFactor
@@ -175,7 +176,7 @@ def test_the_rounding_of_a_large_matrix_does_not_weigh_on_refined_slacks() -> No
 def two_contacts_of_one_node(Q: np.ndarray, form: Form) -> Answer:
     """A spring of 1 N/mm pulled by 1 N towards two stops at 0.5 and 0.25 mm: x = 0.25 mm, λ = (0, 0.75) N."""
     A = sp.csc_array(np.array([[1.0, 1.0]]))
-    prepared = Prepared(Assembly((np.eye(1),), A), (np.eye(1),), Q)
+    prepared = Prepared(Assembly(Stiffness.of(np.eye(1)), A), Q=lambda: Q)
     f, g = np.array([1.0]), np.array([0.5, 0.25])
     load = LoadCase(f, g, prepared.dual_load(LoadCase(f, g)))
     solver = GoldfarbIdnani()

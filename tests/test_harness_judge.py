@@ -14,14 +14,15 @@ from harness.verification.judge import Judgement, conditioned_limit, judge
 from harness.verification.reference import Reference
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 X, LAM = np.array([0.75, 0.25]), np.array([1.5])
 
 
 def judged(x: np.ndarray, lam: np.ndarray, bound_mm: float = 1e-15) -> Judgement:
     springs = (np.array([[2.0]]), np.array([[2.0]]))
-    assembly = Assembly(springs, sp.csc_array([[1.0], [-1.0]]))
-    prepared = Prepared(assembly, (np.array([[2**0.5]]),) * 2, np.array([[1.0]]))
+    assembly = Assembly(Stiffness.of(*springs), sp.csc_array([[1.0], [-1.0]]))
+    prepared = Prepared(assembly)
     load = LoadCase(np.array([3.0, -1.0]), np.array([0.5]))
     reference = Reference(X, LAM, np.array([True]), bound_mm, "by hand")
     return judge(prepared, load, reference, np.asarray(x), np.asarray(lam), 1e-7)
@@ -90,8 +91,8 @@ def test_what_overflows_is_infinite_and_outside(x: list[float]) -> None:
 def test_lengths_in_other_units_are_judged_in_millimetres() -> None:
     """The first unknown in units of 2 mm, the gap in units of 1/4 mm."""
     springs = (np.array([[8.0]]), np.array([[2.0]]))
-    assembly = Assembly(springs, sp.csc_array([[8.0], [-4.0]]))
-    prepared = Prepared(assembly, (np.array([[8**0.5]]), np.array([[2**0.5]])), np.array([[16.0]]))
+    assembly = Assembly(Stiffness.of(*springs), sp.csc_array([[8.0], [-4.0]]))
+    prepared = Prepared(assembly)
     load = LoadCase(np.array([6.0, -1.0]), np.array([2.0]))
     units = {"unit_mm": np.array([2.0, 1.0]), "gap_unit_mm": np.array([0.25])}
     x, lam = X / units["unit_mm"], LAM / 4

@@ -19,7 +19,8 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 from harness.solving.answer import answer_of
 from harness.verification.reference import refined_active_set
 from problems.forms.assembly import Assembly, LoadCase
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 from solvers.registry import make_solver
 
 E, NU, RADIUS = 70e3, 0.33, 100.0  # N/mm², –, mm
@@ -60,7 +61,7 @@ def hertz(elements: int) -> Contact:
     rows = np.searchsorted(free, up[top])
     A = sp.csc_array((np.ones(len(top)), (rows, np.arange(len(top)))), shape=(len(free), len(top)))
     nodes = basis.doflocs[:, free].T
-    data = SparsePrepared(Assembly((sp.csc_array(K[free][:, free]),), A, nodes, ("solid",)))
+    data = Prepared(Assembly(Stiffness.of(sp.csc_array(K[free][:, free])), A, nodes, ("solid",)))
     load = LoadCase(np.zeros(len(free)), x**2 / (2 * RADIUS) - PRESSED)
 
     answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)

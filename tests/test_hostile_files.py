@@ -271,7 +271,7 @@ def test_no_stage_of_a_scene_is_opened_altered(own_cache: Path) -> None:
     def open_all() -> None:
         data = prepared(scene)
         assert data.Q.size
-        assert data.factors
+        assert data.assembly.K.factors
         reference(data, load_case(scene))
 
     open_all()

@@ -71,14 +71,14 @@ def test_there_are_enough_rungs_and_none_twice() -> None:
 def test_the_answer_satisfies_the_optimality_conditions_without_rounding(name: str) -> None:
     made = made_of(name)
     A, (x, lam, f, g) = whole(made.assembly.A.toarray()), map(whole, (made.x, made.lam, *load_of(made)))
-    parts = zip(made.assembly.blocks, made.assembly.slices, strict=True)
+    parts = zip(made.assembly.K.matrices, made.assembly.K.slices, strict=True)
     Kx = np.concatenate([whole(K) @ x[rows] for K, rows in parts])
     y = g * WHOLE - A.T @ x
     assert (Kx + A @ lam == f * WHOLE).all()
     assert (lam >= 0).all()
     assert (y >= 0).all()
     assert not (lam * y).any()
-    assert all((K == K.T).all() for K in made.assembly.blocks)
+    assert all((K == K.T).all() for K in made.assembly.K.matrices)
 
 
 def load_of(made: ManufacturedProblem) -> tuple[Any, Any]:
@@ -97,7 +97,7 @@ def test_the_share_of_contacts_without_a_force_is_as_named(percent: int) -> None
 def test_the_spectrum_is_as_named(condition: float) -> None:
     d = spectrum(64, condition)
     assert d[-1] / d[0] == condition
-    for K in made_of(f"hard/conditioning/{condition:.0e}").assembly.blocks:
+    for K in made_of(f"hard/conditioning/{condition:.0e}").assembly.K.matrices:
         values = np.linalg.eigvalsh(K)
         np.testing.assert_allclose(values, 64 * d, atol=1e-15 * 64 * values[-1])
 

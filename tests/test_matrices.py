@@ -15,7 +15,7 @@ from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
-from problems.input.user_matrices import read_mtx
+from problems.input.user_matrices import checked, read_mtx
 from problems.scene import read_scene
 
 RNG = np.random.default_rng(11)
@@ -51,8 +51,8 @@ def write_mtx(folder: Path, **changes: Any) -> Path:
 
 
 def check_data(made: Prepared, load: LoadCase) -> None:
-    assert [block.shape for block in made.assembly.blocks] == [(4, 4), (4, 4)]
-    np.testing.assert_allclose(sla.block_diag(*made.assembly.blocks), DATA["K"], rtol=1e-15)
+    assert [block.shape for block in made.assembly.K.matrices] == [(8, 8)]
+    np.testing.assert_allclose(sla.block_diag(*made.assembly.K.matrices), DATA["K"], rtol=1e-15)
     np.testing.assert_array_equal(made.assembly.A.toarray(), DATA["A"])
     np.testing.assert_array_equal(load.f, DATA["f"])
     np.testing.assert_array_equal(load.g, DATA["g"])
@@ -94,22 +94,36 @@ def test_interleaved_blocks_become_one(tmp_path: Path) -> None:
     order = np.array([0, 4, 1, 5, 2, 6, 3, 7])
     K = DATA["K"][np.ix_(order, order)]
     made, load = opened(write_npz(tmp_path, K=K, A=DATA["A"][order], f=DATA["f"][order]))
-    assert [block.shape for block in made.assembly.blocks] == [(8, 8)]
-    np.testing.assert_allclose(made.solve_K(load.f), np.linalg.solve(K, load.f), rtol=1e-12)
+    assert [block.shape for block in made.assembly.K.matrices] == [(8, 8)]
+    np.testing.assert_allclose(made.assembly.K.solve(load.f), np.linalg.solve(K, load.f), rtol=1e-12)
 
 
-def test_blocks_of_different_sizes(tmp_path: Path) -> None:
-    K = sla.block_diag(K1[:1, :1], K1, K1[:3, :3])
-    made, _ = opened(write_npz(tmp_path, K=K))
-    assert [len(block) for block in made.assembly.blocks] == [1, 4, 3]
-    np.testing.assert_array_equal(sla.block_diag(*made.assembly.blocks), K)
+@pytest.mark.parametrize(
+    ("bodies", "blocks"),
+    [
+        ([1, 4, 3], [8]),  # small bodies share a block
+        ([300, 212, 1, 500], [512, 501]),
+        ([1] * 1100, [512, 512, 76]),
+        ([100, 700, 100, 600], [100, 700, 700]),  # no larger than the largest body
+    ],
+)
+def test_blocks_of_different_sizes(bodies: list[int], blocks: list[int], tmp_path: Path) -> None:
+    K = sp.csr_array(sp.block_diag([np.ones((size, size)) + np.eye(size) for size in bodies]))
+    n = K.shape[0]
+    data = {"K": K, "A": sp.eye_array(n, 1), "f": np.zeros(n), "g": np.zeros(1)}
+    made, _ = checked(data, {})
+    assert [len(block) for block in made.K.matrices] == blocks
+    assert len(made.parts) == len(blocks)
+    assert (sp.block_diag(made.K.matrices) != K).nnz == 0
+    (whole,) = checked(data, {}, sparse=True)[0].K.matrices
+    assert (whole != K).nnz == 0
 
 
 def test_rounding_in_the_symmetry_of_K_is_taken_out(tmp_path: Path) -> None:
     K = DATA["K"].copy()
     K[0, 1] += 1e-13
     made, _ = opened(write_npz(tmp_path, K=K))
-    np.testing.assert_array_equal(made.assembly.blocks[0], made.assembly.blocks[0].T)
+    np.testing.assert_array_equal(made.assembly.K.matrices[0], made.assembly.K.matrices[0].T)
 
 
 @pytest.mark.parametrize("key", ["K", "A", "f", "g"])
@@ -131,7 +145,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "infinity in g": (changed("g", 1, np.inf), "g = 'NaN or infinity'"),
     "NaN in A": (changed("A", (0, 0), np.nan), "A = 'NaN or infinity'"),
     "asymmetric": (changed("K", (0, 1), 9.0), "max|K − Kᵀ|"),
-    "indefinite": (changed("K", (5, 5), -1.0), "K of part 2"),
+    "indefinite": (changed("K", (5, 5), -1.0), "the pivot of unknown 5"),
     "negative": ({"K": -DATA["K"]}, "K of part 1"),
     "singular": ({"K": sla.block_diag(K1, np.ones((4, 4)))}, "positive definite"),
     "ill-conditioned": ({"K": np.diag([1e-8, 1, 1, 1, 1, 1, 1, 1e8])}, "cond(K) = 1e+16"),

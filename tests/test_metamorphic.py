@@ -18,6 +18,7 @@ from solving import CASES, IN_HOUSE, MINIMISERS, allowed, eigenvalues, solve
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.manufactured.ladder import make_rung
+from problems.stiffness.operator import Stiffness
 from solvers.base import Form
 
 
@@ -35,11 +36,13 @@ class Changed:
 def permuted(prepared: Prepared, case: LoadCase) -> Changed:
     """The nodes of each part and the contacts in another order."""
     random, assembly = np.random.default_rng(1), prepared.assembly
-    orders = [random.permutation(len(K)) for K in assembly.blocks]
-    blocks = tuple(K[np.ix_(order, order)] for K, order in zip(assembly.blocks, orders, strict=True))
-    rows = np.concatenate([s.start + order for s, order in zip(assembly.slices, orders, strict=True)])
+    orders = [random.permutation(len(K)) for K in assembly.K.matrices]
+    blocks = tuple(K[np.ix_(order, order)] for K, order in zip(assembly.K.matrices, orders, strict=True))
+    rows = np.concatenate([s.start + order for s, order in zip(assembly.K.slices, orders, strict=True)])
     columns = random.permutation(assembly.m)
-    made = Prepared(Assembly(blocks, sp.csc_array(assembly.A.toarray()[np.ix_(rows, columns)])))
+    made = Prepared(
+        Assembly(Stiffness.of(*blocks), sp.csc_array(assembly.A.toarray()[np.ix_(rows, columns)]))
+    )
     x_back, lam_back = np.argsort(rows), np.argsort(columns)
     load = LoadCase(case.f[rows], case.g[columns])
     return Changed(made, load, lambda x: x[x_back], lambda lam: lam[lam_back])
@@ -48,9 +51,9 @@ def permuted(prepared: Prepared, case: LoadCase) -> Changed:
 def in_other_units(prepared: Prepared, case: LoadCase) -> Changed:
     """Lengths in units of 4 mm, forces in units of 1/2 N."""
     length, force = 4.0, 0.5
-    blocks = tuple(K * length / force for K in prepared.assembly.blocks)
+    blocks = tuple(K * length / force for K in prepared.assembly.K.matrices)
     load = LoadCase(case.f / force, case.g / length)
-    made = Prepared(Assembly(blocks, prepared.assembly.A))
+    made = Prepared(Assembly(Stiffness.of(*blocks), prepared.assembly.A))
     return Changed(made, load, lambda x: x * length, lambda lam: lam * force, length)
 
 
@@ -59,28 +62,32 @@ def with_a_redundant_contact(prepared: Prepared, case: LoadCase) -> Changed:
     assembly = prepared.assembly
     normal = np.zeros((assembly.n, 1))
     normal[-1] = 1.0
-    made = Prepared(Assembly(assembly.blocks, sp.csc_array(sp.hstack([assembly.A, normal]))))
+    made = Prepared(Assembly(assembly.K, sp.csc_array(sp.hstack([assembly.A, normal]))))
     return Changed(made, LoadCase(case.f, np.append(case.g, 100.0)), lam=lambda lam: lam[:-1])
 
 
 def with_the_parts_swapped(prepared: Prepared, case: LoadCase) -> Changed:
     """The second part first, and all displacements counted the other way."""
-    assembly, size = prepared.assembly, len(prepared.assembly.blocks[0])
+    assembly, size = prepared.assembly, len(prepared.assembly.K.matrices[0])
     order = np.roll(np.arange(assembly.n), -size)
-    made = Prepared(Assembly(assembly.blocks[::-1], sp.csc_array(-assembly.A.toarray()[order])))
+    made = Prepared(
+        Assembly(Stiffness.of(*assembly.K.matrices[::-1]), sp.csc_array(-assembly.A.toarray()[order]))
+    )
     return Changed(made, LoadCase(-case.f[order], case.g), lambda x: -np.roll(x, size))
 
 
 def shifted(prepared: Prepared, case: LoadCase) -> Changed:
     """Everything a quarter of a millimetre further: the supports' springs take up the force of it."""
     shift = np.full(prepared.assembly.n, 0.25)
-    f = case.f + prepared.assembly.multiply_K(shift)
+    f = case.f + prepared.assembly.K.multiply(shift)
     return Changed(prepared, LoadCase(f, case.g + prepared.assembly.A.T @ shift), lambda x: x - shift)
 
 
 def doubled(prepared: Prepared, case: LoadCase) -> Changed:
     """K and f twice as large: the same displacements under twice the forces."""
-    made = Prepared(Assembly(tuple(2 * K for K in prepared.assembly.blocks), prepared.assembly.A))
+    made = Prepared(
+        Assembly(Stiffness.of(*(2 * K for K in prepared.assembly.K.matrices)), prepared.assembly.A)
+    )
     return Changed(made, LoadCase(2 * case.f, case.g), lam=lambda lam: lam / 2)
 
 
@@ -95,7 +102,7 @@ def problem(kind: str) -> tuple[Prepared, LoadCase]:
         return prepared, make_load(22, prepared)[0]
     made = make_rung(kind).made
     assert made is not None
-    return Prepared(Assembly(made.assembly.blocks, made.assembly.A)), made.load
+    return Prepared(Assembly(made.assembly.K, made.assembly.A)), made.load
 
 
 TRIED = [("plain", *case) for case in CASES if case[0] not in MINIMISERS]
@@ -133,7 +140,7 @@ def test_a_load_in_two_steps_leads_to_the_same_place(kind: str, name: str, form:
     prepared, case = problem(kind)
     x, _, bound = solved(name, form, prepared, case)
     first, _, _ = solved(name, form, prepared, LoadCase(case.f / 2, case.g))
-    left = LoadCase(case.f - prepared.assembly.multiply_K(first), case.g - prepared.assembly.A.T @ first)
+    left = LoadCase(case.f - prepared.assembly.K.multiply(first), case.g - prepared.assembly.A.T @ first)
     second, _, second_bound = solved(name, form, prepared, left)
     assert abs(first - x).max() > 0.01
     # What the first step is off by stands in the second one's load, and is made good by it.

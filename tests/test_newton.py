@@ -12,6 +12,7 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.manufactured.ladder import make_rung
+from problems.stiffness.operator import Stiffness
 from solvers.active_set.block_pivoting import MAX_STALE_PASSES, block_pivoting
 from solvers.active_set.bordered_factor import BorderedFactor
 from solvers.active_set.contact_sets import ContactSets, trial_of
@@ -188,8 +189,8 @@ def test_sets_that_make_no_progress_give_way_to_an_interior_point(
     made = make_rung("hard/pivoting/fathi-064").made
     assert made is not None
     order = np.random.default_rng(5).permutation(64)
-    K = np.asfortranarray(made.assembly.blocks[0][np.ix_(order, order)])
-    problem = in_form(Prepared(Assembly((K,), made.assembly.A)), "dual")
+    K = np.asfortranarray(made.assembly.K.matrices[0][np.ix_(order, order)])
+    problem = in_form(Prepared(Assembly(Stiffness.of(K), made.assembly.A)), "dual")
     (load,) = problem.loads([made.load])
     solver = ActiveSetNewton(nested=False)
     state = solver.prepare(problem)

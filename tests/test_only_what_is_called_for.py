@@ -60,7 +60,7 @@ from problems.scene import read_scene
 scene = read_scene(scene_file)
 made = prepared(scene)
 load = load_case(scene)
-blocks = {f"K{i}": K for i, K in enumerate(made.assembly.blocks)}
+blocks = {f"K{i}": K for i, K in enumerate(made.assembly.K.matrices)}
 np.savez(out, f=load.f, g=load.g, Q=made.Q, key=scene.key, **blocks)
 print(*[m for m in sys.modules if m.startswith("problems.")])
 """

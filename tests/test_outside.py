@@ -127,7 +127,7 @@ def test_the_matrices_are_those_of_linear_triangles() -> None:
                 at = [a * (ny + 2) + b for a, b in corners]
                 K[np.ix_(at, at)] += w * hx * hy / 2 * gradients.T @ gradients
     inner = [a * (ny + 2) + b for a in range(1, nx + 1) for b in range(1, ny + 1)]
-    made = journal_bearing.problem(nx, ny, eccentricity).assembly.blocks[0]
+    made = journal_bearing.problem(nx, ny, eccentricity).assembly.K.matrices[0]
     assert sp.issparse(made)
     np.testing.assert_allclose(made.toarray(), K[np.ix_(inner, inner)], rtol=1e-12, atol=1e-14)
 

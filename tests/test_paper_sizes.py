@@ -48,7 +48,7 @@ def smallest() -> Prepared:
 def test_condition_of_the_smallest_problem(smallest: Prepared) -> None:
     """By all eigenvalues of both blocks, where the build takes a few by Lanczos."""
     assert (smallest.assembly.n, smallest.assembly.m) == (4386, 2193)
-    values = np.concatenate([np.linalg.eigvalsh(K) for K in smallest.assembly.blocks])
+    values = np.concatenate([np.linalg.eigvalsh(K) for K in smallest.assembly.K.matrices])
     condition = values.max() / values.min()
     assert condition == pytest.approx(2.63e6, rel=0.01)
     assert smallest.facts["cond_K"] == pytest.approx(condition, rel=1e-6)

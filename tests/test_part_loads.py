@@ -42,7 +42,7 @@ FREE_JOINT = make_joint(OVERHANG, contacts=[["a", "tool"]])
 def solved(joint: Joint, *effects: Effect) -> tuple[NDArray[np.float64], Prepared]:
     scene = make_scene(joint, *effects)
     made = prepared(scene)
-    return made.solve_K(load_case(scene).f), made
+    return made.assembly.K.solve(load_case(scene).f), made
 
 
 def strip(*effects: Effect) -> NDArray[np.float64]:

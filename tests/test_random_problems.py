@@ -22,6 +22,7 @@ from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.ladders.units import rescaled
 from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
+from problems.stiffness.operator import Stiffness
 
 LONG = bool(os.environ.get("RIVETBENCH_LONG"))
 SEEDS = st.integers(0, 2**32 - 1)
@@ -42,7 +43,7 @@ def problem(seed: int, pairs: int, tools: int) -> tuple[Prepared, LoadCase]:
     random = np.random.default_rng(seed)
     sizes = [pairs + tools, *([pairs] if pairs else [])]
     blocks = tuple(rounded(stiffness(random, size), 64) for size in sizes)
-    prepared = Prepared(Assembly(blocks, contact_rows(pairs, tools)[: sum(sizes)]))
+    prepared = Prepared(Assembly(Stiffness.of(*blocks), contact_rows(pairs, tools)[: sum(sizes)]))
     n, m = prepared.assembly.n, prepared.assembly.m
     if seed % 2:
         f, g = random.normal(0, 500, n), random.uniform(0, 0.5, m)
@@ -51,7 +52,7 @@ def problem(seed: int, pairs: int, tools: int) -> tuple[Prepared, LoadCase]:
     lam = rounded(random.uniform(0, 100, m) * (random.random(m) < 0.5), 16)
     y = np.where(lam > 0, 0.0, rounded(random.uniform(0, 0.5, m) * (random.random(m) < 0.6), 256))
     A = prepared.assembly.A
-    return prepared, LoadCase(prepared.assembly.multiply_K(x) + A @ lam, A.T @ x + y)
+    return prepared, LoadCase(prepared.assembly.K.multiply(x) + A @ lam, A.T @ x + y)
 
 
 def exact(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:
@@ -120,7 +121,7 @@ def test_in_house_solvers_hold_or_say_so(
     made = manufacture(exact_model(*d), seed, Shares(closed, weak * (1 - closed)))
     C = np.exp2(np.random.default_rng(seed).integers(-contact_bits, contact_bits + 1, 2**bits))
     made = rescaled(made, 1.0, C, 2.0**force_bits)
-    prepared = Prepared(Assembly(made.assembly.blocks, made.assembly.A))
+    prepared = Prepared(Assembly(made.assembly.K, made.assembly.A))
     assert made.x is not None
     condition = max(part.max() for part in d)
     limit = conditioned_limit(1e-7, condition, abs(made.x).max())

@@ -22,6 +22,7 @@ from harness.verification.reference import reference, refined_active_set
 from problems.build import prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 Exact = list[Fraction]
 
@@ -48,13 +49,13 @@ def conditioned(condition: float, seed: int, pairs: int = 5) -> tuple[Prepared, 
         K = (basis * np.geomspace(1, condition, pairs)) @ basis.T
         blocks.append((K + K.T) / 2)
     load = LoadCase(random.normal(0, 100, 2 * pairs), random.uniform(0.01, 0.5, pairs))
-    return Prepared(Assembly(tuple(blocks), contact_rows(pairs, 0))), load
+    return Prepared(Assembly(Stiffness.of(*blocks), contact_rows(pairs, 0))), load
 
 
 def exact_solution(made: Prepared, load: LoadCase, active: NDArray[np.bool_]) -> tuple[Exact, Exact, Exact]:
     """x, λ_C and the open gaps of the contact set, all exact for the given floating-point data."""
     n, rows = made.assembly.n, np.flatnonzero(active)
-    K, A = sla.block_diag(*made.assembly.blocks), made.assembly.A.toarray()
+    K, A = sla.block_diag(*made.assembly.K.matrices), made.assembly.A.toarray()
     A_C = A[:, rows]
     zero = np.zeros((len(rows), len(rows)))
     M = [[Fraction(float(v)) for v in row] for row in np.block([[K, A_C], [A_C.T, zero]])]
@@ -87,7 +88,7 @@ def test_refinement_reaches_further_than_the_plain_solution() -> None:
     rows = np.flatnonzero(found.active)
     lam = np.zeros(made.assembly.m)
     lam[rows] = np.linalg.solve(made.Q[np.ix_(rows, rows)], made.dual_load(load)[rows])
-    plain = abs(made.solve_K(load.f - made.assembly.A @ lam) - expected).max()
+    plain = abs(made.assembly.K.solve(load.f - made.assembly.A @ lam) - expected).max()
     assert abs(found.x - expected).max() < 1e-3 * plain
 
 
@@ -131,7 +132,9 @@ def test_recovered_displacements_are_refined_once() -> None:
     """Factors that are wrong by 1e-4 leave an error of its square."""
     made = make_prepared(1, 25)
     load, x, lam = chosen(made, 1, 0.4, 0.0)
-    blunt = Prepared(made.assembly, tuple(U * (1 + 1e-4) for U in made.factors))
+    blunt = Prepared(replace(made.assembly, K=Stiffness.of(*made.assembly.K.matrices)))
+    for block, U in zip(blunt.assembly.K.blocks, made.assembly.K.factors, strict=True):
+        block.U = U * (1 + 1e-4)  # type: ignore[attr-defined]
     error = abs(blunt.recover(lam, load) - x).max() / abs(x).max()
     assert 1e-9 < error < 1e-7
 
@@ -153,7 +156,7 @@ def chosen(made: Prepared, seed: int, closed: float, weak: float) -> tuple[LoadC
     opening = np.where(kind > closed + weak, random.uniform(0.01, 1, m), 0.0)
     x = random.normal(0, 0.3, made.assembly.n)
     A = made.assembly.A
-    return LoadCase(made.assembly.multiply_K(x) + A @ lam, A.T @ x + opening), x, lam
+    return LoadCase(made.assembly.K.multiply(x) + A @ lam, A.T @ x + opening), x, lam
 
 
 @pytest.mark.parametrize("weak", [0.0, 0.3])
@@ -164,7 +167,7 @@ def test_chosen_answer_is_recovered(closed: float, weak: float, pairs: int, tool
     load, x, lam = chosen(made, 6, closed, weak)
     found = refined_active_set(made, load)
     # The data of the chosen answer are rounded: K⁻¹ times that is what may be missing.
-    data = np.finfo(float).eps * made.assembly.m * abs(made.solve_K(abs(load.f))).max()
+    data = np.finfo(float).eps * made.assembly.m * abs(made.assembly.K.solve(abs(load.f))).max()
     assert abs(found.x - x).max() <= found.bound_mm + data + 1e-12
     np.testing.assert_allclose(found.lam, lam, atol=1e-6)
     assert found.bound_mm < 1e-12

@@ -24,7 +24,7 @@ def rescaled(seed: int, bits: int) -> tuple[Prepared, LoadCase, np.ndarray, np.n
     x, lam = solve_by_nnls(given, case)
     c = np.exp2(np.random.default_rng(seed).integers(-bits, bits + 1, given.assembly.m))
     A = sp.csc_array(given.assembly.A @ sp.diags_array(c))
-    return Prepared(Assembly(given.assembly.blocks, A)), LoadCase(case.f, case.g * c), x, lam / c, c
+    return Prepared(Assembly(given.assembly.K, A)), LoadCase(case.f, case.g * c), x, lam / c, c
 
 
 @pytest.mark.parametrize(("name", "form"), IN_HOUSE)

@@ -23,11 +23,12 @@ from harness.verification.exact_residual import gamma
 from harness.verification.reference import refined_active_set
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 
 def exact(assembly: Assembly, f: np.ndarray, x: np.ndarray, lam: np.ndarray) -> list[Fraction]:
     """f − Kx − Aλ in rational numbers; x a list of parts."""
-    K, A = sla.block_diag(*assembly.blocks), assembly.A.toarray()
+    K, A = sla.block_diag(*assembly.K.matrices), assembly.A.toarray()
     xs = [sum(map(Fraction, parts)) for parts in zip(*x, strict=True)]
     rows = zip(f, K, A, strict=True)
     return [
@@ -46,7 +47,7 @@ def test_the_residual_against_rational_numbers(seed: int) -> None:
     n, m = prepared.assembly.n, prepared.assembly.m
     lam = rng.uniform(0, 100, (m, 3))
     f = rng.normal(0, 500, (n, 3))
-    x = split(prepared.assembly, prepared.solve_K(f - prepared.assembly.A @ lam))
+    x = split(prepared.assembly, prepared.assembly.K.solve(f - prepared.assembly.A @ lam))
     np.testing.assert_array_equal(x.head + x.tail, x.rounded)
     r, error = residual(prepared.assembly, f, x, lam)
     for k in range(3):
@@ -54,8 +55,10 @@ def test_the_residual_against_rational_numbers(seed: int) -> None:
         off = [abs(Fraction(a) - b) for a, b in zip(r[:, k], wanted, strict=True)]
         assert all(o <= Fraction(e) for o, e in zip(off, error[:, k], strict=True))
     assert error.max() < 1e-10
-    stiffest = max(float(abs(K).sum(axis=0).max()) for K in prepared.assembly.blocks)
-    d = prepared.solve_K(r) * (1 + 1e-3 * rng.standard_normal((n, 3)))  # a correction that leaves something
+    stiffest = max(float(abs(K).sum(axis=0).max()) for K in prepared.assembly.K.matrices)
+    d = prepared.assembly.K.solve(r) * (
+        1 + 1e-3 * rng.standard_normal((n, 3))
+    )  # a correction that leaves something
     there, r, error = refined(prepared.assembly, x, r, error, d, stiffest)
     for k in range(3):
         wanted = exact(prepared.assembly, f[:, k], np.array([there.head[:, k], there.tail[:, k]]), lam[:, k])
@@ -72,7 +75,7 @@ def test_a_large_correction_is_in_doubt_by_its_product(step: str) -> None:
     smooth = np.ones(n) + 1e-6 * rng.standard_normal(n)
     P = np.eye(n) - np.ones((n, n)) / n  # takes the mean away
     K = P @ np.diag(rng.uniform(1, 2, n) * 1e5) @ P + np.eye(n) * 1e-3
-    assembly = Assembly((np.asfortranarray((K + K.T) / 2),), sp.csc_array(np.eye(n, 1)))
+    assembly = Assembly(Stiffness.of(np.asfortranarray((K + K.T) / 2)), sp.csc_array(np.eye(n, 1)))
     zero, nothing = np.zeros((n, 1)), np.zeros((1, 1))
     at = split(assembly, zero)
     r, error = residual(assembly, zero, at, nothing)
@@ -92,7 +95,7 @@ def test_products_that_cancel_are_still_in_doubt() -> None:
     """Kx = 0, its sums without rounding: what a sum of K₂x₁ may lose is there all the same, in each row."""
     n, rest = 64, 2.0**-40  # 1 is cut off, the rest is K₂
     K = np.asfortranarray((1 + rest) * (-1.0) ** np.add.outer(np.arange(n), np.arange(n)))
-    assembly = Assembly((K,), sp.csc_array(np.eye(n, 1)))
+    assembly = Assembly(Stiffness.of(K), sp.csc_array(np.eye(n, 1)))
     zero = np.zeros((n, 1))
     r, error = residual(assembly, zero, split(assembly, np.ones((n, 1))), np.zeros((1, 1)))
     assert not r.any()
@@ -124,18 +127,18 @@ def test_independence_of_contacts() -> None:
     pair = sp.csc_array(sp.vstack([eye, -eye]))
     chain = sp.csc_array(sp.block_array([[eye, None], [-eye, eye], [None, -eye]]))
     for A, wanted in ((pair, 2.0), (chain, 1.0), (sp.csc_array(eye), 1.0)):
-        found = independence(Assembly((np.eye(A.shape[0]),), A))
+        found = independence(Assembly(Stiffness.of(np.eye(A.shape[0])), A))
         # what is proven of a small matrix is a share of what is true
         assert 0.8 * wanted <= found <= wanted
     twice = sp.csc_array(sp.hstack([eye, eye]))
-    assert independence(Assembly((np.eye(4),), twice)) == 0.0
+    assert independence(Assembly(Stiffness.of(np.eye(4)), twice)) == 0.0
 
 
 @pytest.mark.parametrize("make", [lambda: make_prepared(2, 40, 7), lambda: make_strips(80)])
 def test_the_largest_compliance_is_above_and_close(make: Callable[[], Prepared]) -> None:
     prepared = make()
-    kappa = min(np.linalg.eigvalsh(K)[0] for K in prepared.assembly.blocks)
-    wanted = max(np.diag(np.linalg.inv(K)).max() for K in prepared.assembly.blocks)
+    kappa = min(np.linalg.eigvalsh(K)[0] for K in prepared.assembly.K.matrices)
+    wanted = max(np.diag(np.linalg.inv(K)).max() for K in prepared.assembly.K.matrices)
     assert wanted <= largest_compliance(prepared, kappa) <= 1.05 * wanted < 1 / kappa
     assert np.isinf(largest_compliance(prepared, 0.0))
 
@@ -188,7 +191,7 @@ def test_the_residuals_are_those_of_the_judge() -> None:
     rng = np.random.default_rng(0)
     case, _ = make_load(2, prepared)
     lam, x = rng.uniform(0, 50, 15), rng.normal(0, 0.1, 27)
-    K, A = sla.block_diag(*prepared.assembly.blocks), prepared.assembly.A.toarray()
+    K, A = sla.block_diag(*prepared.assembly.K.matrices), prepared.assembly.A.toarray()
     for own in (None, x):
         found = answer(prepared, case, lam, own)
         at = np.linalg.solve(K, case.f - A @ lam) if own is None else own
@@ -225,14 +228,14 @@ def test_weakly_active_contacts_do_not_widen_the_bound() -> None:
     y = np.where(np.arange(m) % 3 == 2, rng.uniform(0.05, 1, m), 0.0)
     x = rng.normal(0, 0.3, n)
     A = prepared.assembly.A
-    case = LoadCase(prepared.assembly.multiply_K(x) + A @ lam, A.T @ x + y)
+    case = LoadCase(prepared.assembly.K.multiply(x) + A @ lam, A.T @ x + y)
     noisy = lam + np.where(lam == 0, 1e-13, 0.0)
     assert abs(answer(prepared, case, noisy).x - x).max() <= answer(prepared, case, noisy).bound_mm < 1e-9
 
 
 def test_nothing_is_vouched_for_where_K_is_not_proven_definite() -> None:
     blocks = (stiffness(np.random.default_rng(0), 3),)
-    prepared = Prepared(Assembly(blocks, sp.csc_array(np.eye(3))))
+    prepared = Prepared(Assembly(Stiffness.of(*blocks), sp.csc_array(np.eye(3))))
     found = Bound.of(prepared)
     none = replace(found, kappa=0.0).bound(*(np.zeros((3, 2)) for _ in range(5)))
     assert np.isinf(none).all()

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from harness.verification.exact_residual import DoubleDouble, forces, gaps
 from harness.verification.sliced_forces import SlicedForces
 from problems.forms.assembly import Assembly
-from problems.forms.balance import balanced_units
+from problems.stiffness.operator import Stiffness
 
 
 def assembly(random: np.random.Generator) -> Assembly:
@@ -24,7 +24,7 @@ def assembly(random: np.random.Generator) -> Assembly:
     A = np.zeros((16, 5))
     A[np.arange(5), np.arange(5)], A[9 + np.arange(5), np.arange(5)] = 1.0, -0.3
     A[15, 2] = 1e-3
-    return Assembly(tuple(sp.csc_array((K + K.T) / 2) for K in blocks), sp.csc_array(A))
+    return Assembly(Stiffness.of(*(sp.csc_array((K + K.T) / 2) for K in blocks)), sp.csc_array(A))
 
 
 def doubled(random: np.random.Generator, *shape: int) -> DoubleDouble:
@@ -37,12 +37,12 @@ def doubled(random: np.random.Generator, *shape: int) -> DoubleDouble:
 def test_residuals_lie_within_their_bounds(seed: int, shared: bool) -> None:
     random = np.random.default_rng(seed)
     made, k = assembly(random), 3
-    D = balanced_units(made)[:, None]
+    D = made.K.units[:, None]
     x, lam = doubled(random, 16, k), doubled(random, 5, k)
     x = DoubleDouble(x.hi * D, x.lo * D)
     f = random.standard_normal((16, 1 if shared else k)) * 10.0 ** random.uniform(-8, 8, (16, 1))
     found = SlicedForces(made, D)(f, x, lam)
-    whole = sp.block_diag(made.blocks).toarray(), made.A.toarray()
+    whole = sp.block_diag(made.K.matrices).toarray(), made.A.toarray()
     factors = [[[Fraction(float(v.hi[i, c])) + Fraction(float(v.lo[i, c])) for i in range(len(v.hi))]
                 for c in range(k)] for v in (x, lam)]  # fmt: skip
     for column in range(k):
@@ -60,7 +60,7 @@ def test_residuals_lie_within_their_bounds(seed: int, shared: bool) -> None:
 def test_columns_are_the_residuals_of_each() -> None:
     random = np.random.default_rng(0)
     made, k = assembly(random), 4
-    D = balanced_units(made)[:, None]
+    D = made.K.units[:, None]
     x, lam = doubled(random, 16, k), doubled(random, 5, k)
     f, g = random.standard_normal((16, k)), random.standard_normal((5, k))
     r, s = SlicedForces(made, D)(f, x, lam), gaps(made, g, x)
@@ -77,8 +77,8 @@ def test_the_rounding_of_the_smallest_products_counts() -> None:
     random, n = np.random.default_rng(3), 500
     B = random.random((n, n))
     K = sp.csc_array((B + B.T) / 2 + n * np.eye(n))
-    made = Assembly((K,), sp.csc_array((n, 1)))
-    x, D, nothing = random.random((n, 1)), balanced_units(made)[:, None], np.zeros((1, 1))
+    made = Assembly(Stiffness.of(K), sp.csc_array((n, 1)))
+    x, D, nothing = random.random((n, 1)), made.K.units[:, None], np.zeros((1, 1))
     f = K @ x
     for _ in range(3):
         found = SlicedForces(made, D)(f, DoubleDouble(x, 0 * x), DoubleDouble(nothing, nothing))

@@ -160,7 +160,7 @@ def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: 
     assert not found["lam"].any()
     data = prepared(read_scene(str(tmp_path / "scene.toml")))
     f = load_case(read_scene(str(tmp_path / "scene.toml"))).f
-    for K, own in zip(data.assembly.blocks, data.assembly.slices, strict=True):
+    for K, own in zip(data.assembly.K.matrices, data.assembly.K.slices, strict=True):
         np.testing.assert_allclose(found["x"][own], np.linalg.solve(K, f[own]), atol=1e-12)
     assert record["closest_mm"] == pytest.approx(found["gap_after"].min(), rel=1e-9)
     assert any("not called for" in line and "piqp was not run" in line for line in record["skipped"])
@@ -394,7 +394,7 @@ def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> No
     scene = read_scene(str(path))
     assert isinstance(scene, JointScene)
     made = prepared(scene)
-    stored = sum(a.nbytes for a in (*made.assembly.blocks, *made.factors, made.Q))
+    stored = sum(a.nbytes for a in (*made.assembly.K.matrices, *made.assembly.K.factors, made.Q))
     estimate = estimated(scene, 1e9)
     assert estimate.stored_mib == pytest.approx(stored / 2**20)
     assert (estimate.n, estimate.m) == (made.assembly.n, made.assembly.m)

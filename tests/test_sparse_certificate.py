@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from lambda_min import proven_in_units
 from sparse_matrices import band_matrix, chain, graph_matrix
 
 from harness.verification import augmented
@@ -14,12 +15,11 @@ from harness.verification.certificate import certify
 from harness.verification.exact_residual import DoubleDouble
 from harness.verification.reference import refined_active_set
 from harness.verification.refinement import units_of
-from harness.verification.sparse_definite import smallest_eigenvalue
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.balance import balanced_units
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
 from problems.scene import read_scene, scene_names
+from problems.stiffness.operator import Stiffness
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
 
@@ -40,22 +40,22 @@ def exact_problem(seed: int, n: int = 60, m: int = 14) -> tuple[Assembly, LoadCa
     lam = np.where(kind == 0, random.integers(1, 2**16, m), 0).astype(float)
     y = np.where(kind == 2, random.integers(1, 2**10, m), 0).astype(float)
     junction = 2 * np.arange(n // 2)
-    assembly = Assembly((sp.csc_array(K),), sp.csc_array(A), junction=junction)
+    assembly = Assembly(Stiffness.of(sp.csc_array(K)), sp.csc_array(A), junction=junction)
     return assembly, LoadCase(K @ x + A @ lam, A.T @ x + y), x, lam
 
 
 def in_units(assembly: Assembly, load: LoadCase, s: Vector) -> tuple[Assembly, LoadCase]:
     """The same problem with x_i/s_i for x_i."""
     S = sp.diags_array(s)
-    blocks = tuple(sp.csc_array(S @ K @ S) for K in assembly.blocks)
-    changed = Assembly(blocks, sp.csc_array(S @ assembly.A), junction=assembly.junction)
+    blocks = tuple(sp.csc_array(S @ K @ S) for K in assembly.K.matrices)
+    changed = Assembly(Stiffness.of(*blocks), sp.csc_array(S @ assembly.A), junction=assembly.junction)
     return changed, LoadCase(s * load.f, load.g)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_reference_is_within_its_bound_of_the_exact_answer(seed: int) -> None:
     assembly, load, x, lam = exact_problem(seed)
-    found = refined_active_set(SparsePrepared(assembly), load)
+    found = refined_active_set(Prepared(assembly), load)
     assert abs(assembly.at_junction(found.x - x)).max() <= found.bound_mm <= 1e-12 * abs(x).max()
     assert (found.active[lam > 0]).all()
 
@@ -65,8 +65,8 @@ def test_the_reference_is_within_its_bound_of_the_exact_answer(seed: int) -> Non
 def test_any_answer_is_within_the_bound(seed: int, size: float) -> None:
     """x moved anywhere, λ ≥ 0 changed anywhere, any set taken for closed; all on a grid, so exactly known."""
     assembly, load, x, lam = exact_problem(seed)
-    random, D = np.random.default_rng(seed + 50), units_of(SparsePrepared(assembly))
-    kappa = smallest_eigenvalue(SparsePrepared(assembly), np.asarray(D))
+    random, D = np.random.default_rng(seed + 50), units_of(Prepared(assembly))
+    kappa = proven_in_units(assembly.K, np.asarray(D))
     wrong_x = x + size * random.integers(-8, 9, len(x))
     wrong_lam = np.maximum(lam + size * random.integers(-8, 9, len(lam)), 0)
     for active in (lam > 0, random.random(len(lam)) < 0.5, np.zeros(len(lam), dtype=bool)):
@@ -87,10 +87,10 @@ def test_the_bound_does_not_depend_on_the_units_of_inner_unknowns(seed: int) -> 
     s = np.exp2(np.random.default_rng(seed).integers(-30, 31, assembly.n))
     s[assembly.junction] = 1.0
     other, other_load = in_units(assembly, load, s)
-    given, changed = SparsePrepared(assembly), SparsePrepared(other)
-    D = balanced_units(other)
-    np.testing.assert_array_equal(D * s, balanced_units(assembly))
-    assert smallest_eigenvalue(changed, D) == smallest_eigenvalue(given, D * s) > 0
+    given, changed = Prepared(assembly), Prepared(other)
+    D = other.K.units
+    np.testing.assert_array_equal(D * s, assembly.K.units)
+    assert proven_in_units(other.K, D) == proven_in_units(assembly.K, D * s) > 0
     one, two = refined_active_set(given, load), refined_active_set(changed, other_load)
     assert one.bound_mm == two.bound_mm > 0
     np.testing.assert_array_equal(one.x, two.x * s)
@@ -122,17 +122,14 @@ def test_lambda_min_is_proven_for_matrices_that_are_nearly_singular(seed: int) -
     random = np.random.default_rng(seed)
     n = int(random.integers(2, 11))
     K = band_matrix(random, n, int(random.integers(0, 4)))
-    D = balanced_units(Assembly((K,), sp.csc_array((n, 0))))
+    D = Stiffness.of(K).units
     least = float(np.linalg.eigvalsh(D[:, None] * K.toarray() * D)[0])
     proven = []
     for left in (1e-2, 1e-5, 1e-8, 1e-12, 1e-15, 1e-16, 0.0, -1e-16):
         near = sp.csc_array(K - sp.diags_array((least - left) / D**2))
-        prepared = SparsePrepared(Assembly((near,), sp.csc_array((n, 0))))
-        units = balanced_units(prepared.assembly)
-        try:
-            kappa = smallest_eigenvalue(prepared, units)
-        except np.linalg.LinAlgError:
-            kappa = 0.0
+        held = Stiffness.of(near)
+        units = held.units
+        kappa = proven_in_units(held, units)
         if kappa > 0:
             assert is_semidefinite(near.toarray(), units, kappa)
             assert not is_semidefinite(near.toarray(), units, 16 * kappa)
@@ -148,10 +145,9 @@ def test_lambda_min_of_a_chain_held_softly(n: int) -> None:
         if K.diagonal()[1] == 6.0:  # c is lost in rounding
             break
         for order in (np.arange(n), np.random.default_rng(1).permutation(n)):
-            prepared = SparsePrepared(Assembly((sp.csc_array(K[order][:, order]),), sp.csc_array((n, 0))))
-            D = balanced_units(prepared.assembly)
-            assert (D == 0.5).all()
-            kappa = smallest_eigenvalue(prepared, D)
+            held = Stiffness.of(sp.csc_array(K[order][:, order]))
+            assert (held.units == 0.5).all()
+            kappa = proven_in_units(held, held.units)
             assert kappa <= 0.75 * c
             assert c < 1e-11 or kappa >= 0.3 * c
 
@@ -160,12 +156,8 @@ def test_the_softest_block_counts_and_a_general_one_too() -> None:
     random = np.random.default_rng(2)
     blocks = (sp.csc_array(3 * (chain(40) + 2.0**-12 * sp.eye_array(40))), graph_matrix(random, 400))
     for order in (blocks, blocks[::-1]):
-        prepared = SparsePrepared(Assembly(order, sp.csc_array((440, 0))))
-        assert (
-            0.3 * 2.0**-12
-            <= smallest_eigenvalue(prepared, balanced_units(prepared.assembly))
-            <= 0.75 * 2.0**-12
-        )
+        held = Stiffness.of(*order)
+        assert 0.3 * 2.0**-12 <= proven_in_units(held, held.units) <= 0.75 * 2.0**-12
 
 
 @pytest.mark.parametrize("name", GALLERY)
@@ -186,8 +178,8 @@ def test_both_references_of_a_scene_agree(name: str) -> None:
 def test_the_equations_of_a_contact_set(seed: int) -> None:
     """λ and y of any set, against the dense equations; nothing closed needs no factor of its own."""
     assembly, load, *_ = exact_problem(seed)
-    prepared = SparsePrepared(assembly)
-    K, A = assembly.blocks[0].toarray(), assembly.A.toarray()
+    prepared = Prepared(assembly)
+    K, A = assembly.K.matrices[0].toarray(), assembly.A.toarray()
     for share in (0.0, 0.4, 1.0):
         active = np.random.default_rng(seed).random(assembly.m) < share
         lam, y, slack_lam, slack_y = augmented.solution(prepared, load, active)

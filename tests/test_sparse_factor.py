@@ -12,20 +12,14 @@ from sparse_matrices import band_matrix, chain, graph_matrix, renumbered
 
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.assembly import Assembly, Matrix
+from problems.forms.assembly import Matrix
 from problems.forms.names import FORMS
-from problems.forms.sparse_factor import (
-    BandFactor,
-    GeneralFactor,
-    NotPositiveDefinite,
-    Renumbered,
-    expected_numbers,
-    factored,
-    half_bandwidth,
-    lower_band,
-)
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.scene import read_scene
+from problems.stiffness.banded import BandedBlock, half_bandwidth, lower_band
+from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.general import GeneralBlock
+from problems.stiffness.operator import Stiffness
+from problems.stiffness.sparse import sparse_block
 
 
 def close(found: Matrix, expected: Matrix) -> None:
@@ -44,13 +38,15 @@ def test_each_factor_solves_as_the_dense_matrix_does(seed: int) -> None:
     n = int(random.integers(300, 500))
     band, (far, nodes), graph = band_matrix(random, n, 3), scattered(random, n, 3), graph_matrix(random, 800)
     for K, where, kind in (
-        (band, None, BandFactor),
-        (far, None, Renumbered),
-        (far, nodes, Renumbered),
-        (graph, None, GeneralFactor),
+        (band, None, BandedBlock),
+        (far, None, BandedBlock),
+        (far, nodes, BandedBlock),
+        (graph, None, GeneralBlock),
     ):
-        factor = factored(K, where)
+        factor = sparse_block(K, where)
         assert type(factor) is kind
+        assert getattr(factor, "order", None) is None or K is far
+        factor.factor()
         assert factor.numbers < K.shape[0] ** 2 / 2
         for b in (random.standard_normal(K.shape[0]), random.standard_normal((K.shape[0], 3))):
             close(factor.solve(b), np.linalg.solve(K.toarray(), b))
@@ -69,7 +65,8 @@ def test_small_matrices_of_any_band(n: int, half: int, seed: int) -> None:
     assert band.shape == (half_bandwidth(K) + 1, n)
     for d in range(len(band)):
         np.testing.assert_array_equal(band[d, : n - d], np.diag(dense, -d))
-    for factor in (factored(K), GeneralFactor(K), Renumbered(np.arange(n)[::-1], lower_band(K[::-1, ::-1]))):
+    backwards = BandedBlock(K, half_bandwidth(K), np.arange(n)[::-1])
+    for factor in (sparse_block(K), GeneralBlock(K, n), backwards):
         close(factor.solve(b), np.linalg.solve(dense, b))
 
 
@@ -79,12 +76,15 @@ def test_the_size_of_a_factor_is_known_before_it_is_made(seed: int) -> None:
     random = np.random.default_rng(seed)
     far, nodes = scattered(random, 400, 3)
     for K, where in ((band_matrix(random, 400, 3), None), (far, None), (far, nodes)):
-        assert expected_numbers(K, where) == factored(K, where).numbers
+        block = sparse_block(K, where)
+        assert block.numbers == sum(array.size for array in block.factor())
     for shape in ((290, 280 + 10 * seed), (25, 24, 23 + seed)):
         K = renumbered(grid(*shape), random.permutation(int(np.prod(shape))))
-        factor = factored(K)
-        assert isinstance(factor, GeneralFactor)
-        assert expected_numbers(K) / 2.5 < 1.5 * factor.numbers < 2.5 * expected_numbers(K)
+        block = sparse_block(K)
+        assert isinstance(block, GeneralBlock)
+        expected = block.numbers
+        block.factor()
+        assert expected / 2.5 < 1.5 * block.numbers < 2.5 * expected
 
 
 def grid(*shape: int) -> sp.csc_array:
@@ -112,14 +112,14 @@ def test_a_mechanism_is_named_by_an_unknown_that_moves(seed: int) -> None:
     ):
         K = renumbered(sp.csc_array(sp.block_diag([held, 1e3 * chain(loose)])), order)
         with pytest.raises(NotPositiveDefinite) as caught:
-            factored(K)
+            sparse_block(K).factor()
         assert order[caught.value.unknown] >= n
 
 
 def test_the_block_of_a_mechanism_counts() -> None:
     blocks = (band_matrix(np.random.default_rng(1), 7, 2), chain(3))
     with pytest.raises(NotPositiveDefinite) as caught:
-        _ = SparsePrepared(Assembly(blocks, sp.csc_array((10, 0)))).sparse_factors
+        _ = Stiffness.of(*blocks).factors
     assert 7 <= caught.value.unknown < 10
     assert str(caught.value.unknown) in str(caught.value)
 
@@ -137,9 +137,9 @@ def test_the_block_of_a_mechanism_counts() -> None:
 )
 def test_what_is_indefinite_or_singular_has_no_factor(K: list[list[float]], moving: set[int]) -> None:
     matrix = sp.csc_array(np.array(K))
-    for made in (factored, GeneralFactor):
+    for block in (sparse_block(matrix), GeneralBlock(matrix, len(K))):
         with pytest.raises(NotPositiveDefinite) as caught:
-            made(matrix)
+            block.factor()
         assert caught.value.unknown in moving
 
 

@@ -17,10 +17,9 @@ from problems.build import load_case, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
 from problems.forms.assembly import Assembly, Matrix
-from problems.forms.sparse_factor import half_bandwidth
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.scene import JointScene
 from problems.scene import read_scene, scene_names
+from problems.stiffness.banded import half_bandwidth
 from problems.uncondensed.whole_model import WholeModel
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
@@ -31,7 +30,7 @@ HELD = {"north": END, "clamped": ["north"]}
 def condensed(model: Assembly, V: Matrix) -> Matrix:
     """SV, V (n, k), S the Schur complement of K̂ on the junction: the other unknowns go by SuperLU."""
     assert model.junction is not None
-    K = sp.csc_array(sp.block_diag(model.blocks))
+    K = sp.csc_array(sp.block_diag(model.K.matrices))
     inner = np.setdiff1d(np.arange(model.n), model.junction)
     K_jj, K_ij = K[model.junction][:, model.junction], sp.csc_array(K[inner][:, model.junction])
     eliminated: Matrix = K_jj @ V - K_ij.T @ splu(sp.csc_array(K[inner][:, inner])).solve(K_ij @ V)
@@ -41,12 +40,12 @@ def condensed(model: Assembly, V: Matrix) -> Matrix:
 def check_same(scene: JointScene) -> None:
     """K, A, p, Qv and K⁻¹f of both."""
     dense, whole = prepared(scene), prepared(scene, form="sparse")
-    assert isinstance(whole, SparsePrepared)
+    assert not whole.assembly.K.dense
     case, load = load_case(scene), load_case(scene, "sparse")
-    random, model, K = np.random.default_rng(1), whole.assembly, sp.block_diag(dense.assembly.blocks)
+    random, model, K = np.random.default_rng(1), whole.assembly, sp.block_diag(dense.assembly.K.matrices)
     junction = model.junction
     assert (model.asked, model.m) == (dense.assembly.n, dense.assembly.m)
-    assert not any((block != block.T).nnz for block in model.blocks)  # to the last bit: proofs rely on it
+    assert not any((block != block.T).nnz for block in model.K.matrices)  # to the last bit: proofs rely on it
     V = np.eye(model.asked) if model.n < 3000 else random.standard_normal((model.asked, 9))
     np.testing.assert_allclose(condensed(model, V), K @ V, rtol=0, atol=1e-9 * abs(K).max())
     np.testing.assert_array_equal(model.at_junction(model.A.toarray()), dense.assembly.A.toarray())
@@ -57,8 +56,8 @@ def check_same(scene: JointScene) -> None:
     whole_force[junction] = force
     lam = random.standard_normal(model.m)
     for found, expected in (
-        (model.at_junction(whole.solve_K(load.f)), dense.solve_K(case.f)),
-        (model.at_junction(whole.solve_K(whole_force)), dense.solve_K(force)),
+        (model.at_junction(whole.assembly.K.solve(load.f)), dense.assembly.K.solve(case.f)),
+        (model.at_junction(whole.assembly.K.solve(whole_force)), dense.assembly.K.solve(force)),
         (whole.dual_load(load), dense.dual_load(case)),
         (whole.compliance @ lam, dense.Q @ lam),
     ):
@@ -79,8 +78,8 @@ def test_every_effect(kind: str, tmp_path: Path) -> None:
     check_same(scene)
     without = replace(scene, effects=())
     if kind not in ("rigid_tool", "shims", "initial_gap", "measured_gap"):
-        K, f = (prepared(scene, form="sparse").assembly.blocks, load_case(scene, "sparse").f)
-        K0, f0 = (prepared(without, form="sparse").assembly.blocks, load_case(without, "sparse").f)
+        K, f = (prepared(scene, form="sparse").assembly.K.matrices, load_case(scene, "sparse").f)
+        K0, f0 = (prepared(without, form="sparse").assembly.K.matrices, load_case(without, "sparse").f)
         assert len(K) != len(K0) or (f != f0).any() or any((a != b).nnz for a, b in zip(K, K0, strict=True))
 
 
@@ -115,7 +114,7 @@ def test_the_numbering_is_one_and_narrow(name: str) -> None:
         assert (
             np.flatnonzero(place < 0) == np.sort(np.concatenate([*clamped, np.zeros(0, dtype=int)]))
         ).all()
-    for parts, K in zip(model.numbering.blocks, model.assembly().blocks, strict=True):
+    for parts, K in zip(model.numbering.blocks, model.assembly().K.matrices, strict=True):
         along = sum(len(model.models[part].plate.x) for part in parts)
         across = sum(len(model.models[part].free_lines) for part in parts)
         assert half_bandwidth(K) <= 4 * (min(along, across) + 2) - 1
@@ -129,7 +128,7 @@ def test_what_is_built_in_is_left_out(turned: bool, clamped: list[str]) -> None:
     scene = make_scene(make_joint(one, HELD | {"name": "b"}, contacts=[("a", "b")], nodes=nodes))
     model = prepared(scene, form="sparse").assembly
     lines = nodes[1] + 4 - len(clamped), nodes[1] + 2 - 1
-    assert [K.shape[0] for K in model.blocks] == [4 * nodes[0] * count for count in lines]
+    assert [K.shape[0] for K in model.K.matrices] == [4 * nodes[0] * count for count in lines]
     assert model.junction is not None
     assert model.nodes is not None
     np.testing.assert_array_equal(model.nodes[model.junction], np.tile(scene.joint.nodes, (2, 1)))
@@ -150,7 +149,7 @@ def test_a_plate_on_a_frame() -> None:
     """Simply supported square plate: 0.00406235 q a⁴/D in the middle."""
     scene = read_scene("gallery/plate-on-frame")
     whole = prepared(scene, form="sparse")
-    x = whole.assembly.at_junction(whole.solve_K(load_case(scene, "sparse").f)).reshape(17, 17)
+    x = whole.assembly.at_junction(whole.assembly.K.solve(load_case(scene, "sparse").f)).reshape(17, 17)
     D = 70e3 * 5.0**3 / (12 * (1 - 0.3**2))
     assert x[8, 8] == pytest.approx(0.00406235 * 2700e-9 * 9.80665 * 5.0 * 1000.0**4 / D, rel=2e-3)
 

@@ -15,8 +15,8 @@ from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
 from solvers.base import Answer, WarmStart
 from solvers.registry import make_solver
 
@@ -29,11 +29,11 @@ def session_of(data: Prepared, **options: Any) -> SolverSession:
     return made
 
 
-def strips() -> tuple[Prepared, SparsePrepared]:
+def strips() -> tuple[Prepared, Prepared]:
     """Dense, and the same as sparse blocks."""
     dense = make_strips(150)
-    blocks = tuple(sp.csc_array(K) for K in dense.assembly.blocks)
-    return dense, SparsePrepared(Assembly(blocks, dense.assembly.A))
+    blocks = tuple(sp.csc_array(K) for K in dense.assembly.K.matrices)
+    return dense, Prepared(Assembly(Stiffness.of(*blocks), dense.assembly.A))
 
 
 @pytest.mark.parametrize("kind", ["band", "face", "none"])
@@ -91,6 +91,6 @@ def test_contacts_all_over_an_area_are_refused_with_the_reason() -> None:
 
 def test_an_indefinite_K_is_refused_with_the_reason() -> None:
     K = sp.csc_array(sp.diags_array([[1.0] * 9 + [-1.0]], offsets=[0]))
-    data = SparsePrepared(Assembly((K,), sp.eye_array(10, 3, format="csc")))
+    data = Prepared(Assembly(Stiffness.of(K), sp.eye_array(10, 3, format="csc")))
     answer = session_of(data).next(LoadCase(np.ones(10), np.zeros(3)), None)
     assert "K is not positive definite" in answer.details["cause"]

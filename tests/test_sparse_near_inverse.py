@@ -7,11 +7,9 @@ import pytest
 import scipy.sparse as sp
 from sparse_matrices import band_matrix, graph_matrix
 
-from problems.forms.assembly import Assembly
-from problems.forms.near_compliance import near_compliance
-from problems.forms.near_inverse import near_inverse
-from problems.forms.sparse_factor import BandFactor, lower_band
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.stiffness.banded import BandedBlock, half_bandwidth
+from problems.stiffness.operator import Stiffness
+from problems.stiffness.selected_inverse import selected_inverse
 
 SINGLE = 2e-5  # of √(Z_ii Z_jj): float32, through a few dozen blocks
 
@@ -30,10 +28,10 @@ def test_the_inverse_near_the_diagonal(half: int, seed: int) -> None:
     n = int(random.integers(1, 60)) if seed else 4 * (half + 1)
     K = band_matrix(random, n, half)
     Z, scale = inverse_of(K)
-    factor = BandFactor(lower_band(K))
+    L = BandedBlock(K, half_bandwidth(K)).L
     for reach in {0, 1, half, 2 * half + 1, n - 1, n}:
         rows = np.flatnonzero(random.random(n) < random.choice([0.3, 1.0]))
-        near = near_inverse(factor, rows, reach)
+        near = selected_inverse(L, rows, reach)
         for start in range(len(rows)):
             last = int(np.searchsorted(rows, rows[start] + reach, side="right"))
             for stop in {start + 1, (start + 1 + last) // 2, last}:
@@ -44,7 +42,7 @@ def test_the_inverse_near_the_diagonal(half: int, seed: int) -> None:
 
 def test_it_is_symmetric_to_the_last_bit() -> None:
     K = band_matrix(np.random.default_rng(5), 40, 4)
-    Z = near_inverse(BandFactor(lower_band(K)), np.arange(40), 40).submatrix(0, 40)
+    Z = selected_inverse(BandedBlock(K, half_bandwidth(K)).L, np.arange(40), 40).submatrix(0, 40)
     np.testing.assert_allclose(Z, Z.T, rtol=0, atol=SINGLE * abs(Z).max())
 
 
@@ -70,17 +68,17 @@ def test_the_compliance_of_windows_of_contacts(seed: int) -> None:
     Q = A.T @ np.linalg.solve(sp.block_diag(blocks).toarray(), A.toarray())
     scale = np.sqrt(np.diag(Q))
     windows = [random.choice(m, int(random.integers(1, 8)), replace=False) for _ in range(10)]
-    prepared = SparsePrepared(Assembly(blocks, A))
-    near = near_compliance(prepared.assembly, prepared.sparse_factors, windows)  # type: ignore[arg-type]
+    near = Stiffness.of(*blocks).local_compliance(A, windows)
+    assert near is not None
     for W in windows:
-        found = near.submatrix(W)
+        found = near(W)
         assert found.flags.f_contiguous
         assert (abs(found - Q[np.ix_(W, W)]) <= 4 * SINGLE * np.outer(scale[W], scale[W])).all()
         part = W[: len(W) // 2 + 1]
-        np.testing.assert_array_equal(near.submatrix(part), found[: len(part), : len(part)])
+        np.testing.assert_array_equal(near(part), found[: len(part), : len(part)])
 
 
 def test_without_a_band_there_is_none() -> None:
     K = graph_matrix(np.random.default_rng(3), 800)
-    prepared = SparsePrepared(Assembly((K,), sp.csc_array(sp.eye_array(800, 5))))
-    assert prepared.near_compliance([np.arange(5)]) is None
+    A = sp.csc_array(sp.eye_array(800, 5))
+    assert Stiffness.of(K).local_compliance(A, [np.arange(5)]) is None

@@ -15,13 +15,14 @@ from test_matrices import write_mtx
 from harness.solving.session import SolverSession
 from harness.verification.reference import reference, refined_active_set
 from problems.build import load_case, prepared
-from problems.forms import sparse_prepared
+from problems.forms import approximate_inverse
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.forms.sparse_factor import BandFactor, GeneralFactor
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.scene import read_scene, scene_names
+from problems.stiffness.banded import BandedBlock
+from problems.stiffness.general import GeneralBlock
+from problems.stiffness.operator import Stiffness
 from solvers.active_set import sparse_newton
 from solvers.base import Answer
 from solvers.registry import make_solver
@@ -61,8 +62,8 @@ def test_a_scene_of_the_gallery(name: str) -> None:
     assert answer.x.shape == (data.assembly.n,)
     assert abs(data.assembly.at_junction(answer.x) - known.x).max() <= LIMIT_MM
     assert (answer.lam >= 0).all()
-    out_of_balance = data.assembly.multiply_K(answer.x) + data.assembly.A @ answer.lam - load.f
-    assert abs(out_of_balance).max() <= 1e-9 * data.assembly.norm_K() * abs(answer.x).max()
+    out_of_balance = data.assembly.K.multiply(answer.x) + data.assembly.A @ answer.lam - load.f
+    assert abs(out_of_balance).max() <= 1e-9 * data.assembly.K.norm * abs(answer.x).max()
     assert answer.details["closed"] == pytest.approx(known.active.sum(), abs=2)  # weakly active ones
     assert answer.details.get("factorisations") is None  # settled by sweeps
 
@@ -81,7 +82,7 @@ def banded(seed: int) -> Prepared:
     blocks = tuple(band_matrix(random, n, 4) for _ in range(2))
     normals = sp.csc_array(sp.eye_array(n) + 0.5 * sp.eye_array(n, k=1))[:, ::3]
     return Prepared(
-        Assembly(tuple(K.toarray() for K in blocks), sp.csc_array(sp.vstack([normals, -normals])))
+        Assembly(Stiffness.of(*(K.toarray() for K in blocks)), sp.csc_array(sp.vstack([normals, -normals])))
     )
 
 
@@ -125,8 +126,8 @@ def test_what_sweeps_do_not_settle_is_settled_by_sets(
     if forced == "one sweep":
         monkeypatch.setattr(sparse_newton, "MAX_SWEEPS", 1)
     else:
-        monkeypatch.setattr(SparsePrepared, "near_compliance", lambda *_: None)
-    monkeypatch.setattr(sparse_prepared, "FEW", -1)  # else M is exact, and one sweep enough
+        monkeypatch.setattr(Stiffness, "local_compliance", lambda *_: None)
+    monkeypatch.setattr(approximate_inverse, "FEW", -1)  # else M is exact, and one sweep enough
     by_sets = 0
     for load in cases(dense, 6, 3):
         session = session_of(dense)
@@ -141,7 +142,7 @@ def test_what_sweeps_do_not_settle_is_settled_by_sets(
 
 @pytest.mark.parametrize("name", ["gallery/heavy-sheet-on-tool", "gallery/sheet-over-former"])
 def test_sets_alone_solve_a_scene(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SparsePrepared, "near_compliance", lambda *_: None)
+    monkeypatch.setattr(Stiffness, "local_compliance", lambda *_: None)
     scene = read_scene(name)
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = session_of(data).next(load, None)
@@ -153,11 +154,11 @@ def test_sets_alone_solve_a_scene(name: str, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize("with_nodes", [False, True])
-@pytest.mark.parametrize("kind", [BandFactor, GeneralFactor])
-def test_a_users_own_sparse_matrices(kind: type, with_nodes: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("band", [True, False])
+def test_a_users_own_sparse_matrices(band: bool, with_nodes: bool, tmp_path: Path) -> None:
     """K in Matrix Market files, a contact on any unknowns; no grid, in one case no band."""
     random, n, m = np.random.default_rng(7), 800, 40
-    K = graph_matrix(random, n) if kind is GeneralFactor else band_matrix(random, n, 3)
+    K = band_matrix(random, n, 3) if band else graph_matrix(random, n)
     unit = sp.eye_array(n, format="csc")
     ends = random.permutation(n)
     A = sp.csc_array(unit[:, ends[:m]] - unit[:, ends[m : 2 * m]])
@@ -169,14 +170,14 @@ def test_a_users_own_sparse_matrices(kind: type, with_nodes: bool, tmp_path: Pat
         path = write_mtx(tmp_path, K=K, A=A, f=f, g=g)
     scene = read_scene(str(path))
     data = prepared(scene, form="sparse")
-    assert isinstance(data, SparsePrepared)
+    assert not data.assembly.K.dense
     load = load_case(scene, "sparse")
-    dense = Prepared(Assembly((K.toarray(order="F"),), A))
+    dense = Prepared(Assembly(Stiffness.of(K.toarray(order="F")), A))
     x, lam = solve_by_nnls(dense, load)
     assert 0 < (lam > 0).sum() < m
     session = session_of(data)
     check(session.next(load, None), x, lam)
-    assert {type(factor) for factor in data.sparse_factors} == {kind}
+    assert isinstance(data.assembly.K.blocks[0], BandedBlock if band else GeneralBlock)
     found = refined_active_set(data, load)
     assert abs(found.x - x).max() <= found.bound_mm + 1e-11
     assert found.bound_mm <= 1e-12

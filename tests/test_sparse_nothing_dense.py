@@ -43,7 +43,7 @@ import resource, sys
 from problems.build import load_case, prepared
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.stiffness.dense import DenseBlock
 from problems.scene import read_scene
 from harness.verification.judge import judge
 from harness.verification.reference import refined_active_set
@@ -58,8 +58,7 @@ def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-for kind in (Prepared, SparsePrepared):
-    kind.factors = kind.Q = property(dense)
+DenseBlock.U = Prepared.Q = property(dense)
 for path in sys.argv[1:]:
     before = peak()
     scene = read_scene(path)
@@ -105,7 +104,7 @@ RUN_API = """
 import resource, sys
 from harness import load_scene, solve
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.stiffness.dense import DenseBlock
 
 
 def dense(self):
@@ -116,8 +115,7 @@ def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-for kind in (Prepared, SparsePrepared):
-    kind.factors = kind.Q = property(dense)
+DenseBlock.U = Prepared.Q = property(dense)
 solve(load_scene(sys.argv[1]), form="sparse")
 before = peak()
 for solver in (None, "newton"):

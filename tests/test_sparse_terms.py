@@ -1,4 +1,4 @@
-"""Terms of the sparse form's proof, each where it dominates: units in the certificate, λmin of a band.
+"""Terms of the sparse form's proof, each where it dominates: units in the certificate, λmin in units.
 
 The errors are exact: in closed form, or in rational numbers. `mutate_proofs.py` takes the terms out in turn.
 """
@@ -6,23 +6,20 @@ The errors are exact: in closed form, or in rational numbers. `mutate_proofs.py`
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from lambda_min import proven_in_units
 from springs import array, diagonal, doubled
 
-from harness.verification import augmented, sparse_definite
+from harness.verification import augmented
 from harness.verification.certificate import Certificate, certify
-from harness.verification.exact_residual import U, gamma
 from harness.verification.reference import refined_active_set
-from harness.verification.sparse_definite import _of_band, smallest_eigenvalue
 from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase, Vector
-from problems.forms.balance import balanced_units
-from problems.forms.sparse_factor import lower_band
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 E = 2.0**-20
 #: Two springs, 1/D_i² each: DKD = I, κ = 1.
@@ -45,7 +42,7 @@ def test_an_error_counts_in_the_unit_of_its_unknown(asked: int, wrong: int) -> N
     """x_wrong is off by E: |ẽ| = E/D_wrong, and as far as is known x_asked is off by D_asked times that."""
     assembly = springs([asked])
     x = np.ones(2) + E * (np.arange(2) == wrong)
-    found = certified(assembly, assembly.multiply_K(np.ones(2)), 10.0, x, np.zeros(2))
+    found = certified(assembly, assembly.K.multiply(np.ones(2)), 10.0, x, np.zeros(2))
     assert found.bound_mm == pytest.approx(E * UNITS[asked] / UNITS[wrong], rel=1e-3)
     if asked == wrong:
         assert found.bound_mm >= E
@@ -55,7 +52,7 @@ def test_an_error_counts_in_the_unit_of_its_unknown(asked: int, wrong: int) -> N
 def test_slack_times_force_is_an_energy_in_any_unit(asked: int) -> None:
     """x* = g and λ* = 0; at x = g − E, λ = kE, nothing is out of balance and sᵀλ = kE²."""
     assembly, wrong = springs([asked]), np.arange(2) == asked
-    k = assembly.diagonal_K()
+    k = assembly.K.diagonal
     found = certified(assembly, k, 1.0, np.ones(2) - E * wrong, k * E * wrong)
     assert E <= found.bound_mm <= 1.001 * E
 
@@ -64,7 +61,7 @@ def test_slack_times_force_is_an_energy_in_any_unit(asked: int) -> None:
 def test_the_low_part_of_an_answer_counts_in_mm(asked: int) -> None:
     """x* = hi + lo exactly: nothing but leaving out lo is wrong."""
     assembly = springs([asked])
-    load = LoadCase(assembly.multiply_K(np.full(2, 1 + E)), np.full(2, 10.0))
+    load = LoadCase(assembly.K.multiply(np.full(2, 1 + E)), np.full(2, 10.0))
     x, none = doubled(np.ones(2), np.full(2, E)), doubled(np.zeros(2))
     found = certify(assembly, load, x, none, np.zeros(2, dtype=bool), 1.0, UNITS)
     assert E <= found.bound_mm <= 1.001 * E
@@ -93,7 +90,7 @@ def test_a_gap_is_proven_open_by_the_error_in_the_unit_of_its_unknown(contact: i
     x = array(1.0 + E, 1.0)
     least = E * UNITS[contact] / UNITS[0]
     for gap, proven in ((1.02 * least, True), (0.98 * least, False)):
-        found = certified(assembly, assembly.multiply_K(np.ones(2)), x[contact] + gap, x, np.zeros(1))
+        found = certified(assembly, assembly.K.multiply(np.ones(2)), x[contact] + gap, x, np.zeros(1))
         assert found.open[0] == proven
 
 
@@ -102,7 +99,7 @@ def test_a_force_is_proven_by_the_stiffness_in_the_units_of_all(contact: int) ->
     """|λ* − λ| ≤ √(K_ii · trace DKD) ‖ẽ‖ + |r_i|: √2/D_i · ‖ẽ‖, with ‖ẽ‖ = |D_j r_j| at the other spring."""
     A = np.eye(2)[:, [contact]].tolist()
     assembly, other = springs([0, 1], A), 1 - contact
-    k = assembly.diagonal_K()
+    k = assembly.K.diagonal
     r = E * (np.arange(2) == other)
     uncertainty = np.sqrt(2.0) / UNITS[contact] * UNITS[other] * E
     for lam, proven in ((1.03 * uncertainty, True), (0.99 * uncertainty, False)):
@@ -113,87 +110,34 @@ def test_a_force_is_proven_by_the_stiffness_in_the_units_of_all(contact: int) ->
         assert found.closed[0] == proven
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 40])
-@pytest.mark.parametrize("c", [1e-10, 1e-6])
-def test_the_margin_of_a_band_is_that_of_the_theorem(n: int, c: float) -> None:
-    """K = 11ᵀ + cI, as wide as a band can be, in one block and in three: sums of n terms at most."""
-    for blocks in (1, 3):
-        K = sp.csc_array(sp.block_diag([np.ones((n, n)) + c * np.eye(n)] * blocks))
-        s = Fraction(sparse_definite.SHARES[0] * c)
-        margin = s - Fraction(_of_band(K, c))
-        theorem = Fraction(gamma(2 * (n + 1))) * n + Fraction(U)
-        assert Fraction(1009, 1000) <= margin / theorem <= Fraction(1013, 1000)
-
-
-def test_a_band_that_completes_by_rounding_is_not_taken_for_definite() -> None:
-    """λmin = c exactly, s just above it, and the factorisation of the indefinite K − sI completes."""
-    completed = 0
-    for seed in range(60):
-        v = np.random.default_rng(seed).integers(2**19, 2**20, 2).astype(float)
-        c = 2.0**-13
-        K = np.outer(v, v) + c * np.eye(2)
-        s = 1.01 * c
-        try:
-            np.linalg.cholesky(K - s * np.eye(2))
-        except np.linalg.LinAlgError:
-            continue
-        completed += 1
-        assert _of_band(sp.csc_array(K), s / sparse_definite.SHARES[0]) <= c
-    assert completed > 5
-
-
-@pytest.mark.parametrize(("K", "norm"), [([[1.0, -0.9], [-0.9, 1.0]], 1.9), ([[1.0, 0.0], [0.0, 0.01]], 1.0)])
-def test_the_norm_of_a_band_is_the_largest_and_of_sizes(K: list[list[float]], norm: float) -> None:
-    s = Fraction(sparse_definite.SHARES[0] * 1e-3)
-    band = lower_band(sp.csc_array(np.array(K)))
-    theorem = Fraction(gamma(2 * (len(band) + 1))) * Fraction(norm) + Fraction(U) * Fraction(1.0 - float(s))
-    assert s - Fraction(_of_band(sp.csc_array(np.array(K)), 1e-3)) >= Fraction(1005, 1000) * theorem
-
-
-def test_the_rounding_of_the_difference_counts() -> None:
-    """n = 1: the theorem's margin is 5u (1 − s), and s − margin is rounded by up to us/2."""
-    for k in range(100):
-        K = 1 + k / 128
-        s = sparse_definite.SHARES[0] * K
-        margin = Fraction(s) - Fraction(_of_band(sp.csc_array(np.full((1, 1), K)), K))
-        largest = Fraction(K) - Fraction(s)
-        assert margin >= (Fraction(gamma(4)) + Fraction(U)) * largest
-
-
-def test_a_band_whose_factorisation_stops_proves_nothing() -> None:
-    for estimate in (2.0**9, 2.0**12):
-        assert _of_band(sp.csc_array(np.array([[4.0, 1.0], [1.0, 4.0]])), estimate) == 0.0
-    assert _of_band(sp.csc_array(2.0**-1010 * np.eye(2)), 2.0**-1010) == 0.0
-
-
 def test_lambda_min_is_in_the_units_given() -> None:
     """diag(4, 2⁻¹⁰, 9) in units that are not balanced: the eigenvalues of DKD are known."""
     K = sp.csc_array(sp.diags_array([4.0, 2.0**-10, 9.0]))
-    prepared = SparsePrepared(Assembly((K,), sp.csc_array((3, 0))))
+    prepared = Prepared(Assembly(Stiffness.of(K), sp.csc_array((3, 0))))
     for D, least in ((np.ones(3), 2.0**-10), (array(1.0, 64.0, 0.25), 0.5625), (array(0.5, 32.0, 0.5), 1.0)):
-        share = smallest_eigenvalue(prepared, D) / least
+        share = proven_in_units(prepared.assembly.K, D) / least
         assert 0.4 <= share <= 1.0
-    np.testing.assert_array_equal(balanced_units(prepared.assembly), array(0.5, 32.0, 0.25))
+    np.testing.assert_array_equal(prepared.assembly.K.units, array(0.5, 32.0, 0.25))
 
 
 def test_the_reference_bounds_in_balanced_units() -> None:
     """A soft slope beside a stiff deflection: in mm and N alone, κ would be 2⁻⁴⁰ and the bound 2²⁰ wider."""
     K = sp.csc_array(sp.diags_array([1.0, 2.0**-40]))
-    assembly = Assembly((K,), sp.csc_array(array(1.0, 0.0)[:, None]), junction=np.array([0]))
+    assembly = Assembly(Stiffness.of(K), sp.csc_array(array(1.0, 0.0)[:, None]), junction=np.array([0]))
     load = LoadCase(array(1.0 / 3.0, 2.0**-30 / 3.0), array(10.0))
-    found = refined_active_set(SparsePrepared(assembly), load)
+    found = refined_active_set(Prepared(assembly), load)
     assert abs(found.x[0] - 1.0 / 3.0) <= found.bound_mm <= 2.0**-50
 
 
 def test_augmented_the_forces_converge_to_those_of_the_set() -> None:
     """Two springs pressed onto a tool: λ = f − kg, whatever ρ is."""
     assembly = springs([0, 1])
-    k, g = assembly.diagonal_K(), array(0.5, -0.25)
+    k, g = assembly.K.diagonal, array(0.5, -0.25)
     load = LoadCase(array(100.0, 3.0), g)
-    lam, y, _, _ = augmented.solution(SparsePrepared(_sparse(assembly)), load, np.ones(2, dtype=bool))
+    lam, y, _, _ = augmented.solution(Prepared(_sparse(assembly)), load, np.ones(2, dtype=bool))
     np.testing.assert_allclose(lam, load.f - k * g, rtol=1e-11)
     assert not y.any()
 
 
 def _sparse(assembly: Assembly) -> Assembly:
-    return replace(assembly, blocks=tuple(sp.csc_array(K) for K in assembly.blocks))
+    return replace(assembly, K=assembly.K.as_sparse())

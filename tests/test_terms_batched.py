@@ -23,12 +23,13 @@ from harness.verification.exact_residual import (
 )
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 
 def batched(made: Assembly, kappa: float, compliance: float, sigma2: float = 1.0) -> Bound:
     """A bound with the exact constants, so that nothing but its formula is tested."""
     prepared = Prepared(made)
-    stiffest = float(abs(made.blocks[0]).sum(axis=0).max())
+    stiffest = float(abs(made.K.matrices[0]).sum(axis=0).max())
     return Bound(prepared, kappa, stiffest, sigma2, compliance, np.linalg.cholesky(prepared.Q).T)
 
 
@@ -101,7 +102,7 @@ def test_block_what_the_translation_misses_counts(sigma2: float) -> None:
 def test_block_the_roundings_of_the_translation_count() -> None:
     """zᵀKz in float64 is off by γ_2n ‖K‖ ‖z‖², and δ − Aᵀz by γ(|δ| + |A|ᵀ|z|)."""
     K, n = 2.0**20, 3
-    made = Assembly((np.asfortranarray(np.eye(n) * K),), sp.csc_array(np.eye(n)))
+    made = Assembly(Stiffness.of(np.asfortranarray(np.eye(n) * K)), sp.csc_array(np.eye(n)))
     bound, delta = batched(made, K, 1 / K), np.ones((n, 1))
     z = 1.0  # of each
     stiffer = replace(bound, stiffest=2.0**60 * K)  # so that the rounding dominates
@@ -181,7 +182,7 @@ def test_block_the_products_of_a_residual_count() -> None:
     n, rng = 20, np.random.default_rng(0)
     B = rng.standard_normal((n, n))
     K = np.asfortranarray(B @ B.T + np.eye(n))
-    made = Assembly((K,), sp.csc_array(np.eye(n)))
+    made = Assembly(Stiffness.of(K), sp.csc_array(np.eye(n)))
     f, lam = 1e6 * rng.standard_normal((n, 1)), 1e6 * rng.random((n, 1))
     zero = split(made, np.zeros((n, 1)))
     _, error = residual(made, f, zero, lam)
@@ -220,7 +221,7 @@ def test_block_products_that_underflow_count() -> None:
 def test_compliance_the_backward_error_of_the_factor_counts() -> None:
     """(K⁻¹)_ii ≤ (1 + c/κ) (UᵀU)⁻¹_ii, c/κ one hundredth here and then one."""
     K = np.diag(array(1.0, 2.0**40))
-    prepared = Prepared(Assembly((np.asfortranarray(K),), sp.csc_array(np.eye(2))))
+    prepared = Prepared(Assembly(Stiffness.of(np.asfortranarray(K)), sp.csc_array(np.eye(2))))
     trace, each = float(np.trace(K)), gamma(6)
     for share in (0.01, 1.0, 100.0):
         kappa = each * trace / share
@@ -231,10 +232,10 @@ def test_compliance_the_backward_error_of_the_factor_counts() -> None:
 def test_compliance_the_error_of_the_inverse_counts() -> None:
     """ε ‖X‖_F is what any row of X may be off by: 9 % of 1 here."""
     K = np.diag(array(1.0, 2.0**94))
-    prepared = Prepared(Assembly((np.asfortranarray(K),), sp.csc_array(np.eye(2))))
+    prepared = Prepared(Assembly(Stiffness.of(np.asfortranarray(K)), sp.csc_array(np.eye(2))))
     epsilon = gamma(6) * 2.0**47
     assert 1.0099 * (1 + epsilon) ** 2 <= largest_compliance(prepared, 1e30) <= 1.05 * (1 + epsilon) ** 2
-    hopeless = Prepared(Assembly((np.diag(array(1.0, 2.0**110)),), sp.csc_array(np.eye(2))))
+    hopeless = Prepared(Assembly(Stiffness.of(np.diag(array(1.0, 2.0**110))), sp.csc_array(np.eye(2))))
     assert largest_compliance(hopeless, 1e30) == np.inf
 
 
@@ -253,17 +254,17 @@ def test_block_many_products_that_underflow_count() -> None:
 def test_independence_counts_the_rounding_of_its_products() -> None:
     a = np.array([[0.1, 0.3], [0.7, 0.9], [0.2, 0.4]])
     G = [[sum(Fraction(p) * Fraction(q) for p, q in zip(u, v, strict=True)) for v in a.T] for u in a.T]
-    found = independence(Assembly((np.eye(3),), sp.csc_array(a)))
+    found = independence(Assembly(Stiffness.of(np.eye(3)), sp.csc_array(a)))
     sigma2 = Fraction(found)
     assert (G[0][0] - sigma2) * (G[1][1] - sigma2) >= G[0][1] ** 2
     for k in range(1, 100):
-        single = independence(Assembly((np.eye(1),), sp.csc_array([[k / 7]])))
+        single = independence(Assembly(Stiffness.of(np.eye(1)), sp.csc_array([[k / 7]])))
         assert Fraction(single) <= Fraction(k / 7) ** 2 <= Fraction(single) * (1 + Fraction(1, 10**15))
 
 
 def test_block_many_products_with_K_that_underflow_count() -> None:
     n = 12
-    made = Assembly((np.full((n, n), 2.0**-537),), sp.csc_array((n, 0)))
+    made = Assembly(Stiffness.of(np.full((n, n), 2.0**-537)), sp.csc_array((n, 0)))
     x = Split(np.full((n, 1), 0.98 * 2.0**-538), np.zeros((n, 1)))
     exact = n * Fraction(2.0**-537) * Fraction(0.98 * 2.0**-538)
     _, error = residual(made, np.zeros((n, 1)), x, np.zeros((0, 1)))

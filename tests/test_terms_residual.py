@@ -10,9 +10,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from lambda_min import proven
 from springs import array, bound_of, diagonal, doubled
 
-from harness.verification.definite import smallest_eigenvalue
 from harness.verification.exact_residual import (
     ETA,
     DoubleDouble,
@@ -25,6 +25,7 @@ from harness.verification.exact_residual import (
 )
 from harness.verification.length import length
 from problems.forms.assembly import Assembly
+from problems.stiffness.operator import Stiffness
 
 
 def test_residual_the_rounding_of_the_sum_counts() -> None:
@@ -63,7 +64,7 @@ def test_residual_the_terms_of_a_sparse_product_are_counted() -> None:
     sign = (-1.0) ** np.arange(n)
     K = sp.csc_array(np.outer(sign, sign))
     A = sp.csc_array(np.ones((2 * n, 2)) * [1.0, -1.0])
-    made = Assembly((K, K), A)
+    made = Assembly(Stiffness.of(K, K), A)
     for low, parts in ((0.0, 1), (2.0**-60, 2)):
         at = DoubleDouble(np.ones(2 * n), np.full(2 * n, low))
         found = forces(made, np.zeros(2 * n), at, doubled(np.ones(2)))
@@ -73,7 +74,7 @@ def test_residual_the_terms_of_a_sparse_product_are_counted() -> None:
 
 
 def exactly(made: Assembly, f: np.ndarray, x: DoubleDouble, lam: np.ndarray) -> list[Fraction]:
-    K, A = made.blocks[0], made.A.toarray()
+    K, A = made.K.matrices[0], made.A.toarray()
     whole = [Fraction(float(a)) + Fraction(float(b)) for a, b in zip(x.hi, x.lo, strict=True)]
     return [
         Fraction(float(f[i]))
@@ -100,11 +101,11 @@ def test_residual_a_plain_product_is_in_doubt_by_the_size_of_its_terms(seed: int
         + np.outer(x, S @ x) / (x @ x)
         - (x @ S @ x) / (x @ x) ** 2 * np.outer(x, x)
     )
-    made = Assembly((np.asfortranarray((S + S.T) / 2),), sp.csc_array((n, 1)))
+    made = Assembly(Stiffness.of(np.asfortranarray((S + S.T) / 2)), sp.csc_array((n, 1)))
     at = DoubleDouble(np.zeros(n), x)
     found = forces(made, np.zeros(n), at, doubled(np.zeros(1)))
     assert violations(found, exactly(made, np.zeros(n), at, np.zeros(1))) == 0
-    least = gamma(n) * abs(made.blocks[0]).max(axis=1) * abs(x).sum()
+    least = gamma(n) * abs(made.K.matrices[0]).max(axis=1) * abs(x).sum()
     assert (found.error >= least).all()
     assert abs(found.value).max() < 1e-14
 
@@ -119,7 +120,7 @@ def test_residual_what_the_slices_of_K_leave_is_in_doubt(seed: int) -> None:
     x = np.round(rng.standard_normal(n) * 2**20)
     x[0] = 0.0
     x[-1] = -(r[1:-1] @ x[1:-1]) / r[-1]
-    made = Assembly((K,), sp.csc_array((n, 1)))
+    made = Assembly(Stiffness.of(K), sp.csc_array((n, 1)))
     found = forces(made, np.zeros(n), doubled(x), doubled(np.zeros(1)))
     exact = exactly(made, np.zeros(n), doubled(x), np.zeros(1))
     assert violations(found, exact) == 0
@@ -148,7 +149,7 @@ def test_residual_a_bound_does_not_underflow_before_it_is_multiplied(seed: int) 
     """K near 2⁻¹⁰⁶⁰: u times it is no number, but u times it times x of 2⁴⁵⁰ is."""
     rng, n = np.random.default_rng(seed), 24
     B = rng.standard_normal((n, n))
-    made = Assembly((np.asfortranarray(np.ldexp(B + B.T, -1060)),), sp.csc_array((n, 1)))
+    made = Assembly(Stiffness.of(np.asfortranarray(np.ldexp(B + B.T, -1060))), sp.csc_array((n, 1)))
     at = DoubleDouble(np.zeros(n), np.ldexp(rng.standard_normal(n), 450))
     found = forces(made, np.zeros(n), at, doubled(np.zeros(1)))
     assert violations(found, exactly(made, np.zeros(n), at, np.zeros(1))) == 0
@@ -159,7 +160,7 @@ def test_residual_of_the_smallest_numbers_is_enclosed(scale: float) -> None:
     rng = np.random.default_rng(1)
     for _ in range(20):
         B = rng.standard_normal((5, 5))
-        made = Assembly((np.asfortranarray((B + B.T) * scale),), sp.csc_array(np.eye(5) * 0.7))
+        made = Assembly(Stiffness.of(np.asfortranarray((B + B.T) * scale)), sp.csc_array(np.eye(5) * 0.7))
         x = DoubleDouble(rng.standard_normal(5), 1e-17 * rng.standard_normal(5))
         lam, f = scale * rng.random(5), scale * rng.standard_normal(5)
         found = forces(made, f, x, doubled(lam))
@@ -173,7 +174,7 @@ def test_a_stiffness_near_the_end_of_the_numbers_is_bounded_or_refused(scale: fl
     made = diagonal(K)
     bound = bound_of(made, K, 10.0, doubled(array(1 + e)), doubled(array(0.0)), 1.5 * scale)
     assert bound >= e
-    kappa = smallest_eigenvalue(made.blocks[0], K)
+    kappa = proven(made.K.matrices[0], 0.9 * K)
     assert kappa == 0.0 if scale < 1e-305 else 0.8 * K <= kappa <= K
     found = bound_of(made, K, 10.0, doubled(array(1.0)), doubled(array(0.0)), kappa)
     assert found == np.inf if kappa == 0 else found < 1e-10

@@ -8,25 +8,25 @@ import scipy.sparse as sp
 
 from harness.verification.exact_residual import DoubleDouble, Enclosure, forces, gaps
 from harness.verification.sparse_bound import SparseBound, _State
-from problems.forms.assembly import Assembly, LoadCase
-from problems.forms.problem import stacked
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.assembly import Assembly, LoadCase, stacked
+from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 
 
-def prepared(*diagonal: float) -> SparsePrepared:
+def prepared(*diagonal: float) -> Prepared:
     """Unknowns without any coupling; the only contact is on the first."""
     n = len(diagonal)
-    return SparsePrepared(Assembly((sp.csc_array(np.diag(diagonal)),), sp.csc_array(np.eye(n, 1))))
+    return Prepared(Assembly(Stiffness.of(sp.csc_array(np.diag(diagonal))), sp.csc_array(np.eye(n, 1))))
 
 
-def bound_of(data: SparsePrepared) -> SparseBound:
+def bound_of(data: Prepared) -> SparseBound:
     bound = SparseBound.of(data, 1.0)  # DKD is the identity: λmin is 1
     assert bound is not None
     return bound
 
 
 def state(
-    data: SparsePrepared, load: LoadCase, x: list[float], lam: float, lo: list[float] | None = None
+    data: Prepared, load: LoadCase, x: list[float], lam: float, lo: list[float] | None = None
 ) -> _State:
     """x and λ as they are, without a refinement."""
     made = _State(bound_of(data), stacked([load]), np.array([[lam]]))
@@ -61,7 +61,7 @@ def test_an_overlap_of_an_open_contact_counts_and_a_gap_does_not() -> None:
 def test_a_force_out_of_balance_moves_the_answer_in_units_of_its_own_unknown() -> None:
     found = bound_of(DATA)._bound(state(DATA, LOAD, [1.0, 2.001], 6.0))
     assert 1e-3 <= found <= 2.05e-3  # the first unknown is twice as soft, so that it might be that one
-    only_second = SparsePrepared(Assembly(DATA.assembly.blocks, DATA.assembly.A, junction=np.array([1])))
+    only_second = Prepared(Assembly(DATA.assembly.K, DATA.assembly.A, junction=np.array([1])))
     found = bound_of(only_second)._bound(state(only_second, LOAD, [1.0, 2.001], 6.0))
     assert 1e-3 <= found <= 1.03e-3
 
@@ -115,9 +115,9 @@ def missed(made: _State) -> np.ndarray:
 def test_a_step_counts_what_cancels_in_K_dx_and_in_A_dlam() -> None:
     """r stays small, and the rounding is that of large terms: once of K dx alone, once of A dλ."""
     K = np.array([[0.9, 0.9 - 1e-9], [0.9 - 1e-9, 0.9]])
-    stiff = SparsePrepared(Assembly((sp.csc_array(K),), sp.csc_array(np.eye(2, 1))))
+    stiff = Prepared(Assembly(Stiffness.of(sp.csc_array(K)), sp.csc_array(np.eye(2, 1))))
     A = sp.csc_array(np.array([[0.3, 0.7], [0.0, 1e-9]]))
-    held = SparsePrepared(Assembly((sp.csc_array(np.eye(2)),), A))
+    held = Prepared(Assembly(Stiffness.of(sp.csc_array(np.eye(2))), A))
     random = np.random.default_rng(0)
     for data, of_x in ((stiff, True), (held, False)):
         m = data.assembly.m
@@ -133,7 +133,7 @@ def test_a_step_counts_what_cancels_in_K_dx_and_in_A_dlam() -> None:
         assert large > 1e-10  # so that no multiple of |r| would have been enough
 
 
-def state_at_rest(data: SparsePrepared) -> _State:
+def state_at_rest(data: Prepared) -> _State:
     """x, λ and r are zero; the units are 1, and of the bound only what rounding needs is right."""
     n, m = data.assembly.A.shape
     (K,) = data.assembly.sparse_blocks

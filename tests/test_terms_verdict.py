@@ -14,6 +14,7 @@ from harness.verification.judge import REFERENCE_SHARE, judge
 from harness.verification.reference import Reference, proven_lambda_min
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
 from solvers.kkt import EPS, kkt_status
 
 
@@ -56,7 +57,7 @@ def test_reference_takes_the_least_proven_eigenvalue_of_the_parts() -> None:
         facts = {"lambda_min": 3.0}  # noqa: RUF012
 
     blocks = (np.full((1, 1), 4.0), np.full((1, 1), 1.0))
-    assembly = Assembly(blocks, sp.csc_array(np.eye(2)))
+    assembly = Assembly(Stiffness.of(*blocks), sp.csc_array(np.eye(2)))
     assert 0.8 <= proven_lambda_min(Prepared(assembly)) < 1.0
     assert 0.2 <= proven_lambda_min(Overestimated(assembly)) < 1.0
 
@@ -69,5 +70,5 @@ def test_reference_proves_each_part_by_its_own_eigenvalue(known: bool) -> None:
         facts = {"lambda_min": 1.0, "cond_blocks": [100.0, 100.0]}  # noqa: RUF012
 
     soft = np.diag([1.0, 10.0, 100.0])
-    assembly = Assembly((soft, 1e16 * soft), sp.csc_array(np.eye(6)))
+    assembly = Assembly(Stiffness.of(soft, 1e16 * soft), sp.csc_array(np.eye(6)))
     assert 0.8 <= proven_lambda_min((Factored if known else Prepared)(assembly)) < 1.0

@@ -27,9 +27,9 @@ def test_one_fastener_draws_two_equal_parts_together(stiffness: float) -> None:
     """Each part has the compliance c at the node: x_a = −x_b = c k d / (1 + 2 c k)."""
     scene = make_scene(TWO, fastener((200.0, 40.0), stiffness=stiffness, approach=0.6))
     made = prepared(scene)
-    x = made.solve_K(load_case(scene).f)
+    x = made.assembly.K.solve(load_case(scene).f)
     node = 7  # (200, 40) on the 5 × 4 grid
-    c = np.linalg.inv(prepared(untied(scene)).assembly.blocks[0])[node, node]
+    c = np.linalg.inv(prepared(untied(scene)).assembly.K.matrices[0])[node, node]
     u = c * stiffness * 0.6 / (1 + 2 * c * stiffness)
     assert x[node] == pytest.approx(u, rel=1e-9)
     np.testing.assert_allclose(x[:20], -x[20:], atol=1e-12)
@@ -39,7 +39,7 @@ def test_fasteners_without_approach_let_equal_parts_move_as_one() -> None:
     """The same load on both: no spring is stretched, and the parts do what they do without them."""
     loads = [Pressure(kind="pressure", part=name, value=1e-3) for name in "ab"]
     bare, tied = make_scene(TWO, *loads), make_scene(TWO, *loads, fastener((100.0, 0.0), (300.0, 80.0)))
-    x = [made.solve_K(load_case(s).f) for s in (bare, tied) for made in [prepared(s)]]
+    x = [made.assembly.K.solve(load_case(s).f) for s in (bare, tied) for made in [prepared(s)]]
     np.testing.assert_allclose(x[0], x[1], rtol=1e-8)
 
 
@@ -57,7 +57,7 @@ def test_blocks_are_those_of_the_dense_sum() -> None:
         scene = make_scene(FOUR, *effects)
         made, base = prepared(scene), prepared(untied(scene))
         assert list(made.assembly.parts) == names
-        K = sla.block_diag(*base.assembly.blocks)
+        K = sla.block_diag(*base.assembly.K.matrices)
         for effect in effects:
             for point in effect.points:
                 node = int(np.hypot(*(FOUR.nodes - point).T).argmin())
@@ -65,13 +65,13 @@ def test_blocks_are_those_of_the_dense_sum() -> None:
                     t = np.zeros(80)
                     t[FOUR.unknowns(one).start + node], t[FOUR.unknowns(two).start + node] = 1, -1
                     K += 1e5 * np.outer(t, t)
-        np.testing.assert_allclose(sla.block_diag(*made.assembly.blocks), K, rtol=1e-14)
+        np.testing.assert_allclose(sla.block_diag(*made.assembly.K.matrices), K, rtol=1e-14)
         A = made.assembly.A.toarray()
         np.testing.assert_allclose(made.Q, A.T @ np.linalg.solve(K, A), rtol=1e-7, atol=1e-12)
         values = np.linalg.eigvalsh(K)
         assert made.facts["cond_K"] == pytest.approx(values[-1] / values[0], rel=1e-5)
         b = np.random.default_rng(1).normal(size=80)
-        np.testing.assert_allclose(K @ made.solve_K(b), b, atol=1e-7)
+        np.testing.assert_allclose(K @ made.assembly.K.solve(b), b, atol=1e-7)
 
 
 def test_installing_a_fastener_condenses_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:

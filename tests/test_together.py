@@ -20,6 +20,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
 from solvers.active_set.batched import BatchedSweeps
 from solvers.active_set.bordered_factor import Set
 from solvers.active_set.contact_sets import TrialSolution
@@ -164,7 +165,7 @@ def test_what_sweeps_do_not_settle_is_solved_alone_and_soon_at_once() -> None:
     rng = np.random.default_rng(5)
     W, _ = np.linalg.qr(rng.standard_normal((120, 120)))
     K = (W * np.geomspace(1.0, 1e4, 120)) @ W.T
-    data = Prepared(Assembly((np.asfortranarray((K + K.T) / 2),), contact_rows(0, 120)))
+    data = Prepared(Assembly(Stiffness.of(np.asfortranarray((K + K.T) / 2)), contact_rows(0, 120)))
     pairs = [make_load(seed, data) for seed in range(6)]
     solver = ActiveSetNewton()
     batch = solver.batched(solver.prepare(in_form(data, "dual")))
@@ -263,7 +264,7 @@ def test_few_closed_contacts_are_solved_one_case_after_another(tmp_path: Path) -
 
 def test_newton_has_no_such_way_without_a_factor() -> None:
     data = make_prepared(1, 5)
-    broken = type(data)(data.assembly, data.factors, -data.Q)
+    broken = type(data)(data.assembly, data.assembly.K.factors, -data.Q)
     solver = ActiveSetNewton()
     assert solver.batched(solver.prepare(in_form(broken, "dual"))) is None
 
@@ -273,12 +274,12 @@ def test_what_sweeps_settle_is_solved() -> None:
     D = np.eye(8) - 2 * np.eye(8, k=-1) + np.eye(8, k=-2)
     A = np.eye(8)
     A[range(0, 8, 2), range(1, 8, 2)] = 512.0, 2048.0, 8.0, 64.0
-    data = Prepared(Assembly((1024 * D.T @ D,), sp.csc_array(A)))
+    data = Prepared(Assembly(Stiffness.of(1024 * D.T @ D), sp.csc_array(A)))
     x = np.array([[-1, -2, -2, -2, -2, -2, -2, -2], [-61, 14, 49, -36, -47, 61, -13, -7]]) / 4096
     lam = np.array([[0.25, 0, 0, 0, 0, 0, 0, 0], [0, 11.25, 0, 0, 0, 0, 0, 0]])
     y = np.array([[0, 1, 1, 1, 1, 1, 1, 1], [0, 0, 14, 60, 0, 27, 97, 0]]) / 4096
     cases = [
-        LoadCase(data.assembly.multiply_K(u) + A @ v, A.T @ u + w) for u, v, w in zip(x, lam, y, strict=True)
+        LoadCase(data.assembly.K.multiply(u) + A @ v, A.T @ u + w) for u, v, w in zip(x, lam, y, strict=True)
     ]
     session = SolverSession(make_solver("newton", {}), in_form(data, "dual"), TOLERANCE)
     session.open(batched=True)

@@ -73,7 +73,7 @@ def test_springs_and_contacts_balance_what_the_parts_without_them_resist(tmp_pat
         x, lam = saved["x"], saved["lam"]
     scene = read_scene(str(bare))
     data, load = prepared(scene), load_case(scene)
-    pull = data.assembly.multiply_K(x) + data.assembly.A @ lam - load.f
+    pull = data.assembly.K.multiply(x) + data.assembly.A @ lam - load.f
     found = fastener_forces(read_scene(str(tied)), x)
     springs = [entry for entry in found if entry["kind"] == "installed_fasteners"]
     assert [(entry["x"], entry["y"]) for entry in springs] == [(80.0, 40.0), (120.0, 20.0)]

@@ -18,8 +18,10 @@ from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.alteration import ALTERED
 from problems.forms.assembly import Assembly
-from problems.forms.stages import Stored
+from problems.forms.prepared import Prepared
+from problems.forms.stages import CachedStages
 from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
 from report.results.series import FIGURES, Series
 from report.writers.series import _summary
 
@@ -72,10 +74,10 @@ def test_a_stiffness_whose_inverse_overflows_is_refused(tmp_path: Path, scale: f
     """1e-311 N/mm was "within 0.0 mm, proven", 1.7e-13 mm off."""
     with pytest.raises(InputError, match=r"max\|K\|.*choose other units"):
         prepared(read_scene(write(tmp_path, K * scale, scale)))
-    assembly = Assembly((K * scale,), sp.eye_array(3, format="csc"), None, ("a",))
-    in_memory = Stored(assembly, f"{scale}", {}, lambda name: name, False, lambda text, fraction: None)
+    assembly = Assembly(Stiffness.of(K * scale), sp.eye_array(3, format="csc"), None, ("a",))
+    stages = CachedStages(assembly, f"{scale}", {}, lambda name: name, False, lambda text, fraction: None)
     with pytest.raises(InputError, match="smallest eigenvalue of K"):
-        _ = in_memory.factors
+        _ = Prepared(assembly, stages).assembly.K.factors
 
 
 def test_a_series_says_how_many_bounds_are_missing() -> None:

@@ -8,9 +8,12 @@ import scipy.sparse as sp
 from sparse_matrices import band_matrix, graph_matrix, renumbered
 
 from problems.forms.assembly import Assembly
-from problems.forms.sparse_factor import BandFactor, GeneralFactor, Renumbered, factored
-from problems.forms.sparse_prepared import SparsePrepared
-from problems.forms.whole_compliance import whole_compliance
+from problems.forms.prepared import Prepared
+from problems.stiffness.banded import BandedBlock
+from problems.stiffness.dense import DenseBlock
+from problems.stiffness.general import GeneralBlock
+from problems.stiffness.operator import Stiffness
+from problems.stiffness.sparse import sparse_block
 
 
 @pytest.mark.parametrize(
@@ -25,29 +28,31 @@ def test_it_is_that_of_the_dense_matrices(n: int, half: int, m: int, seed: int) 
     )
     Q = A.T @ np.linalg.solve(K.toarray(), A.toarray())
     order = random.permutation(n)
-    for factor, columns in (
-        (factored(K), A),
-        (GeneralFactor(K), A),
-        (factored(renumbered(K, order)), sp.csc_array(A[order])),
+    for block, columns in (
+        (DenseBlock(K.toarray(order="F")), A),
+        (sparse_block(K), A),
+        (GeneralBlock(K, n), A),
+        (sparse_block(renumbered(K, order)), sp.csc_array(A[order])),
     ):
-        found = whole_compliance(factor, columns)
+        found = block.compliance(columns)
         np.testing.assert_allclose(found, Q, rtol=0, atol=1e-13 * abs(Q).max(initial=1.0))
 
 
-@pytest.mark.parametrize("kind", [BandFactor, Renumbered, GeneralFactor])
-def test_of_few_contacts_without_coordinates_the_approximate_inverse_is_exact(kind: type) -> None:
+@pytest.mark.parametrize("kind", ["band", "renumbered", "general"])
+def test_of_few_contacts_without_coordinates_the_approximate_inverse_is_exact(kind: str) -> None:
     """Contacts between two unconnected bodies in one K, whatever the numbering: M Q = I."""
     random, m = np.random.default_rng(5), 40
-    parts = [graph_matrix(random, 800) if kind is GeneralFactor else band_matrix(random, 300, 4)] * 2
+    parts = [graph_matrix(random, 800) if kind == "general" else band_matrix(random, 300, 4)] * 2
     K = sp.csc_array(sp.block_diag(parts))
     n = K.shape[0]
     unit = sp.eye_array(n, format="csc")
     A = sp.csc_array(unit[:, :m] - unit[:, n // 2 : n // 2 + m])
-    if kind is Renumbered:
+    if kind == "renumbered":
         order = random.permutation(n)
         K, A = renumbered(K, order), sp.csc_array(A[order])
-    prepared = SparsePrepared(Assembly((K,), A))
-    assert [type(factor) for factor in prepared.sparse_factors] == [kind]
+    prepared = Prepared(Assembly(Stiffness.of(K), A))
+    (block,) = prepared.assembly.K.blocks
+    assert isinstance(block, GeneralBlock if kind == "general" else BandedBlock)
     approximate = prepared.approximate_inverse
     assert approximate is not None
     Q = A.T @ np.linalg.solve(K.toarray(), A.toarray())

@@ -12,11 +12,10 @@ from harness.solving.session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
-from problems.forms.sparse_prepared import SparsePrepared
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 
 from .inspection import TOLERANCE, Finding, distance, inspect
-from .known_problems import KnownCase, KnownProblem, known_problems
+from .known_problems import KnownCase, KnownProblem, arrays_of, known_problems
 
 LOOSE = 1e-1  # a tolerance at which an iterative solver stops earlier than at TOLERANCE
 
@@ -196,11 +195,8 @@ def _differ(one: Answer, two: Answer, known: KnownProblem, case: KnownCase) -> b
 
 
 def _fingerprint(known: KnownProblem) -> list[bytes]:
-    assembly = known.prepared.assembly
     loads = [array for case in known.cases for array in (case.load.f, case.load.g, case.load.p)]
-    dense = not isinstance(known.prepared, SparsePrepared)
-    stages = [*known.prepared.factors, known.prepared.Q] if dense else []
-    return [a.tobytes() for a in (*assembly.stored, *stages, assembly.A.data, assembly.A.indices, *loads)]
+    return [array.tobytes() for array in (*arrays_of(known.prepared), *loads)]
 
 
 def first_of_each(found: Iterable[Finding]) -> list[Finding]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.stiffness.operator import Stiffness
 
 DOMINANT = 2e5  # N/mm, added to the diagonal of a banded K, which makes it positive definite
 
@@ -67,7 +67,7 @@ def known_case(random: Random, prepared: Prepared, closed: float, name: str) -> 
     lam = np.where(shut, random.uniform(1, 100, m), 0.0)
     opening = np.where(shut, 0.0, random.uniform(0.05, 1, m))
     x = random.normal(0, 0.3, n)
-    f = prepared.assembly.multiply_K(x) + A @ lam
+    f = prepared.assembly.K.multiply(x) + A @ lam
     g = A.T @ x + opening
     p = prepared.dual_load(LoadCase(f, g))
     for array in (f, g, p):
@@ -80,22 +80,20 @@ def known_problems(form: Form = "dual") -> list[KnownProblem]:
     random = np.random.default_rng(0)
     made = []
     for name, pairs, tools in (("one contact", 1, 0), ("two parts", 12, 0), ("two parts and a tool", 30, 10)):
-        blocks = (stiffness(random, pairs + tools), stiffness(random, pairs))
-        prepared = Prepared(Assembly(blocks, contact_rows(pairs, tools)))
+        blocks = [stiffness(random, pairs + tools), stiffness(random, pairs)]
         if form == "sparse":
-            banded = tuple(
-                sp.csc_array(np.triu(np.tril(K, 3), -3) + DOMINANT * np.eye(len(K))) for K in blocks
-            )
-            prepared = SparsePrepared(Assembly(banded, contact_rows(pairs, tools)))
-        for array in _arrays(prepared):
+            near = (np.triu(np.tril(K, 3), -3) + DOMINANT * np.eye(len(K)) for K in blocks)
+            blocks = [sp.csc_array(K) for K in near]
+        prepared = Prepared(Assembly(Stiffness.of(*blocks), contact_rows(pairs, tools)))
+        for array in arrays_of(prepared):
             array.flags.writeable = False
         cases = tuple(known_case(random, prepared, closed, title) for title, closed in CLOSED.items())
         made.append(KnownProblem(name, prepared, cases))
     return made
 
 
-def _arrays(prepared: Prepared) -> list[NDArray[Any]]:
-    assembly = prepared.assembly
-    if isinstance(prepared, SparsePrepared):
-        return [assembly.A.data, *assembly.stored]
-    return [*assembly.stored, *prepared.factors, prepared.Q, assembly.A.data]
+def arrays_of(prepared: Prepared) -> list[NDArray[Any]]:
+    """Those that a solver is given, but for the loads."""
+    K, A = prepared.assembly.K, prepared.assembly.A
+    stages = [*K.factors, prepared.Q] if K.dense else []
+    return [*K.arrays, *stages, A.data, A.indices]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from harness.results.machine import physical_memory_mib
 from problems.errors import InputError
 from problems.forms.names import DENSE_FORMS, Form
-from problems.forms.sparse_factor import expected_numbers
 from problems.input.stored_matrices import SMALL, holds_sparse, stored_matrices
 from problems.model.scene import MadeScene, MatricesScene
+from problems.stiffness.operator import dense_slices
 
 MIB = 2**20
 BYTES_PER_ENTRY = 200  # of K and its copies in sparse storage
@@ -43,20 +43,18 @@ def own_size(scene: MatricesScene | MadeScene) -> OwnSize | None:
         if not holds_sparse(files):
             return None
         assembly = stored_matrices(files, scene.assembly_key, sparse=True)[0]
-    sizes, m = [K.shape[0] for K in assembly.blocks], assembly.m
+    K, m = assembly.K.matrix, assembly.m
+    sizes = [rows.stop - rows.start for rows in dense_slices(K)]
     dense = 8 * (2 * sum(size**2 for size in sizes) + max(sizes) ** 2 + 2 * m**2)
-    numbers = [expected_numbers(K) for K in assembly.sparse_blocks]
-    entries = sum(K.nnz for K in assembly.sparse_blocks)
-    sparse = 8 * FACTORS * sum(numbers) + BYTES_PER_ENTRY * entries
-    factoring = sum(float(count) ** 2 / size for count, size in zip(numbers, sizes, strict=True))
+    sparse = 8 * FACTORS * assembly.K.numbers + BYTES_PER_ENTRY * K.nnz
     return OwnSize(
         assembly.n,
         m,
-        entries,
+        K.nnz,
         150 + dense / MIB,
         150 + sparse / MIB,
-        float(sum(size**3 for size in sizes)),
-        2.0 * factoring,
+        float(sum(size**3 for size in sizes)) + m**3 / 3,
+        2.0 * assembly.K.work,
     )
 
 

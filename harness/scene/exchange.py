@@ -20,17 +20,13 @@ from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.input.digits import DOUBLE
 from problems.input.user_matrices import checked
 from problems.model.scene import MatricesScene
 from problems.scene import read_scene
 
-from .answer import answer_of
 from .few_digits import digits_of, digits_sentence
 from .into_place import into_place
-
-TOLERANCE = 1e-11  # of newton, mm
 
 
 def places(sources: list[str], out: Path, format: str) -> list[tuple[str, Path]]:
@@ -64,8 +60,7 @@ def export(source: str, format: str, out: Path, console: Console) -> None:
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:
     """K, A, f, g of a problem, and its nodes if they are known."""
     assembly = data.assembly
-    K = sp.block_diag(assembly.blocks, format="csr")
-    found = {"K": sp.csr_array(K), "A": sp.csc_array(assembly.A), "f": load.f, "g": load.g}
+    found = {"K": sp.csr_array(assembly.K.matrix), "A": sp.csc_array(assembly.A), "f": load.f, "g": load.g}
     return found | ({} if assembly.nodes is None else {"nodes": np.array(assembly.nodes)})
 
 
@@ -138,9 +133,8 @@ def _refuse_unusable(path: Path, origin: dict[str, Path]) -> tuple[Form, Prepare
         scene = read_scene(str(path))
         form = cheaper(scene, FORMS).form
         data = prepared(scene, form=form)
-        if not isinstance(data, SparsePrepared):
-            _ = data.Q
-        elif data.sparse_factors and data.assembly.m and not independence(data.assembly.A) > 0:
+        _ = data.Q if data.assembly.K.dense else data.assembly.K.factors
+        if form == "sparse" and data.assembly.m and not independence(data.assembly.A) > 0:
             allowed = "no column may depend on the others"
             raise InputError.one(scene.source_of("A"), "A", "dependent columns", allowed)
         return form, data, load_case(scene, form)
@@ -154,22 +148,15 @@ def _refuse_unusable(path: Path, origin: dict[str, Path]) -> tuple[Form, Prepare
 def _print_facts(out: Path, used: tuple[Form, Prepared, LoadCase], console: Console) -> None:
     """Print size, definiteness, condition and digits of what was read."""
     form, data, load = used
-    blocks = " + ".join(str(K.shape[0]) for K in data.assembly.blocks)
+    blocks = " + ".join(str(K.shape[0]) for K in data.assembly.K.matrices)
     console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
-    if isinstance(data, SparsePrepared):
-        condition = f"about {data.condition:.1e} in balanced units"
-    else:
-        condition = f"{data.facts['cond_K']:.2e}"
+    about = ("about ", " in balanced units") if form == "sparse" else ("", "")
+    condition = f"{data.condition:.1e}".join(about)
     console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
     if data.assembly.altered:
         console.print(f"{ALTERED}.", style="yellow")
     if digits_of(data.assembly) == DOUBLE:
         x, lam = np.zeros(data.assembly.n), np.zeros(data.assembly.m)  # which the sentence does not need
-    elif isinstance(data, SparsePrepared):
-        from solvers.registry import make_solver  # slow to import
-
-        answer = answer_of("newton", make_solver("newton", {}), data, form, load, TOLERANCE)
-        x, lam = np.asarray(answer.x), np.asarray(answer.lam)
     else:
         known = reference(data, load)
         x, lam = known.x, known.lam

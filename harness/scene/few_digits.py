@@ -15,7 +15,7 @@ from problems.input.digits import DOUBLE, apparent_digits, expected_error
 
 def digits_of(assembly: Assembly) -> int:
     """The fewest digits that the entries of a block of K seem to have, at most 16."""
-    return min(apparent_digits(_entries(K)) for K in assembly.blocks)
+    return min(apparent_digits(_entries(K)) for K in assembly.K.matrices)
 
 
 def _entries(K: Any) -> Vector:

@@ -14,7 +14,7 @@ from problems.model.scene import JointScene, Scene
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
     """The ranges of parts in x and of pairs in λ, and what a picture marks."""
     if not isinstance(scene, JointScene):
-        spans = zip(assembly.parts, assembly.slices, strict=True)
+        spans = zip(assembly.parts, assembly.K.slices, strict=True)
         nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
         bare: dict[str, Any] = {"clamped": [], "supports": []}
         parts = [

@@ -32,7 +32,6 @@ from problems.forms.alteration import ALTERED
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene, Scene
@@ -106,7 +105,7 @@ def solve(
         threadpoolctl.threadpool_limits(1)  # a second thread gains nothing on narrow bands, and spins
     with steps.step("matrices"):
         data = prepared(scene, steps.building, road.form)
-        _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.factors
+        _ = data.assembly.K.factors
     if data.assembly.altered:
         console.print(f"{ALTERED}.", style="yellow")
     with steps.step("the effects, each alone"):

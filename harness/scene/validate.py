@@ -22,7 +22,6 @@ from harness.results.machine import physical_memory_mib
 from problems.build import prepared
 from problems.condensation.build import built
 from problems.forms.names import FORMS
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, Scene
@@ -86,10 +85,10 @@ def _matrices(scene: Scene, console: Console) -> None:
     """Print the sizes and digits of given matrices. Raises InputError if K is not positive definite."""
     road = cheaper(scene, FORMS)
     data = prepared(scene, form=road.form)
-    _ = data.sparse_factors if isinstance(data, SparsePrepared) else data.Q
+    _ = data.Q if data.assembly.K.dense else data.assembly.K.factors
     assembly = data.assembly
-    blocks = ", ".join(str(K.shape[0]) for K in assembly.blocks)
-    if isinstance(data, SparsePrepared):
+    blocks = ", ".join(str(K.shape[0]) for K in assembly.K.matrices)
+    if road.form == "sparse":
         console.print(f"Sparse form by default: {road.why}.")
     console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
     digits = digits_of(assembly)

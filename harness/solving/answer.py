@@ -9,7 +9,7 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form, default_form
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
+from problems.forms.problem import Problem, in_form
 from solvers.base import Answer, Solver
 
 from .answers import Refused
@@ -33,15 +33,29 @@ def answer_of(
 
     lam is None if the solver gives no forces. Raises InputError if there are no displacements.
     """
-    session = SolverSession(solver, in_form(data, form), tolerance)
+    problem = in_form(data, form)
+    answer = forces_of(name, solver, problem, case, tolerance)
+    (x,) = problem.recover([answer.lam], [answer.x], [case])
+    if x is None:
+        raise no_answer(name, answer)
+    return replace(answer, x=x)
+
+
+def forces_of(name: str, solver: Solver, problem: Problem, case: LoadCase, tolerance: float) -> Answer:
+    """The solver's own answer. Raises InputError if it is invalid, or neither forces nor displacements."""
+    session = SolverSession(solver, problem, tolerance)
     session.open()
-    (load,) = session.problem.loads([case])
+    (load,) = problem.loads([case])
     try:
         answer = session.next(load, None)
     except Refused as error:
         raise InputError.one(f"solver {name}", "answer", str(error), NO_ANSWER) from error
-    (x,) = session.problem.recover([answer.lam], [answer.x], [load])
-    if x is None:
-        said = f"{answer.status}: {answer.details['cause']}" if "cause" in answer.details else answer.status
-        raise InputError.one(f"solver {name}", "status", said, NO_ANSWER)
-    return replace(answer, x=x)
+    if answer.lam is None and answer.x is None:
+        raise no_answer(name, answer)
+    return answer
+
+
+def no_answer(name: str, answer: Answer) -> InputError:
+    """The error of a solver that gives neither forces nor displacements."""
+    said = f"{answer.status}: {answer.details['cause']}" if "cause" in answer.details else answer.status
+    return InputError.one(f"solver {name}", "status", said, NO_ANSWER)

@@ -10,9 +10,9 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.problem import in_form
 
-from .answer import answer_of
+from .answer import forces_of
 
 DENSE = ("newton", "ipm-fast", "ipm", "gi", "lemke")
 SPARSE = ("newton", "mprgp")
@@ -27,10 +27,10 @@ def candidates(prepared: Prepared, load: LoadCase) -> Iterator[tuple[str, Vector
         return
     from solvers.registry import make_solver  # slow to import
 
-    form: Form = "sparse" if isinstance(prepared, SparsePrepared) else "dual"
+    form: Form = "dual" if prepared.assembly.K.dense else "sparse"
     for name in SPARSE if form == "sparse" else DENSE:
         try:
-            answer = answer_of(name, make_solver(name, {}), prepared, form, load, TOLERANCE_MM)
+            answer = forces_of(name, make_solver(name, {}), in_form(prepared, form), load, TOLERANCE_MM)
         except (InputError, ArithmeticError, np.linalg.LinAlgError, RuntimeError):
             continue  # it gave no answer
         if answer.lam is not None:

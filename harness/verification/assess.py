@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.forms.assembly import LoadCase, Vector
-from problems.forms.problem import stacked
+from problems.forms.assembly import LoadCase, Vector, stacked
+from problems.stiffness.rounding import U
 
-from .enclosure import SAFE, U
+from .enclosure import SAFE
 from .proof import Proof
 
 
@@ -47,12 +47,12 @@ def assess(
 
     In the dual form the answer is x = K⁻¹(f − Aλ). enough_mm : a proven answer that is near enough.
     """
-    prepared, assembly, load = proof.balanced.prepared, proof.balanced.assembly, stacked(loads)
+    assembly, load = proof.balanced.assembly, stacked(loads)
     lam, given = np.column_stack(lams), [x for x in xs if x is not None]
-    x = np.column_stack(given) if given else prepared.solve_K(load.f - assembly.A @ lam)
+    x = np.column_stack(given) if given else assembly.K.solve(load.f - assembly.A @ lam)
     proven = proof.proven(loads, lams, x.T, enough_mm)
     known = np.column_stack([each.x.hi for each in proven])
-    gap, r = load.g - assembly.A.T @ x, load.f - assembly.multiply_K(x) - assembly.A @ lam
+    gap, r = load.g - assembly.A.T @ x, load.f - assembly.K.multiply(x) - assembly.A @ lam
     near = np.array([each.bound_mm for each in proven])
     away, size = (abs(assembly.at_junction(v)).max(axis=0, initial=0.0) for v in (x - known, known))
     bounds = SAFE * near + (1 + 4 * U) * away + 2 * U * size * (away > 0)

@@ -17,13 +17,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix
-from problems.forms.balance import balanced_units
+from problems.forms.assembly import Assembly, LoadCase, Matrix, stacked
 from problems.forms.prepared import Prepared
-from problems.forms.problem import stacked
 
 from .definite import independence
-from .enclosure import SAFE, DoubleDouble, Enclosure, Residual, row_panels
+from .enclosure import SAFE, DoubleDouble, Enclosure, Panel, Residual, row_panels
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ class Balanced:
     @classmethod
     def of(cls, prepared: Prepared) -> Balanced:
         assembly = prepared.assembly
-        D = balanced_units(assembly)
+        D = assembly.K.units
         A = sp.csc_array(sp.diags_array(D) @ assembly.A)
         size = abs(A).max(axis=0).toarray().ravel() if A.shape[1] else np.zeros(0)
         R = np.exp2(-np.round(np.log2(np.where(size > 0, size, 1.0))))
@@ -57,14 +55,13 @@ class Balanced:
 
     def solve(self, b: Matrix) -> Matrix:
         """K'⁻¹b."""
-        return self.prepared.solve_K(b / self.D) / self.D
+        return self.assembly.K.solve(b / self.D) / self.D
 
     def forces(self, f: Matrix, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
         """r = f − Kx − Aλ, (n, k)."""
         total = Residual(np.broadcast_to(f, x.hi.shape))
         total.subtract_product(row_panels(self.A), _longest(self.A), lam)
-        for K, rows in zip(self.assembly.blocks, self.assembly.slices, strict=True):
-            total.subtract_product(self._panels(K, rows), _longest(K), x[rows])
+        total.subtract_product(self._panels(), max(map(_longest, self.assembly.K.matrices)), x)
         return total.enclosed()
 
     def gaps(self, g: Matrix, x: DoubleDouble) -> Enclosure:
@@ -76,31 +73,25 @@ class Balanced:
     @cached_property
     def stiffest(self) -> float:
         """‖K'‖_∞ or more."""
-        sizes = (abs(panel).sum(axis=1).max() for K, s in self._blocks for _, panel in self._panels(K, s))
-        return SAFE * float(max(sizes, default=0.0))
+        D = self.D[:, 0]
+        return SAFE * float((self.assembly.K.absolute_sums(D) * D).max(initial=0.0))
 
     @cached_property
     def sigma2(self) -> float:
         """σ² ≤ λmin(A'ᵀA'), proven; 0 if the contacts are dependent."""
         return independence(sp.csc_array(self.A))
 
-    @property
-    def _blocks(self) -> list[tuple[Any, slice]]:
-        return list(zip(self.assembly.blocks, self.assembly.slices, strict=True))
-
-    def _panels(self, K: Any, block: slice) -> Iterator[tuple[slice, Any]]:
-        """Rows of K' in a block. K is symmetric and stored by columns, so that these are its rows."""
-        D = self.D[block, 0]
-        K = sp.csr_array((K.data, K.indices, K.indptr), shape=K.shape) if sp.issparse(K) else K.T
-        for rows, panel in row_panels(K):
+    def _panels(self) -> Iterator[Panel]:
+        """Rows of K'."""
+        D = self.D[:, 0]
+        for rows, columns, panel in self.assembly.K.panels():
             if sp.issparse(panel):
-                data = panel.data * D[panel.indices] * np.repeat(D[rows], np.diff(panel.indptr))
-                panel = sp.csr_array((data, panel.indices, panel.indptr), shape=panel.shape)
+                data = panel.data * D[columns][panel.indices] * np.repeat(D[rows], np.diff(panel.indptr))
+                yield rows, columns, sp.csr_array((data, panel.indices, panel.indptr), shape=panel.shape)
             else:
-                panel = panel * D * D[rows, None]
-            yield slice(block.start + rows.start, block.start + rows.stop), panel
+                yield rows, columns, panel * D[columns] * D[rows, None]
 
 
 def _longest(M: Any) -> int:
     """The most entries in a row of a symmetric or CSR matrix."""
-    return int(np.diff(M.indptr).max(initial=1)) if sp.issparse(M) else M.shape[1]
+    return int(np.diff(M.indptr).max(initial=1)) if sp.issparse(M) else int(M.shape[1])

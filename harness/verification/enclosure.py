@@ -16,7 +16,7 @@ infinity or NaN, which bounds nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,13 +24,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
+from problems.stiffness.rounding import U, gamma
 
-U = 2.0**-53
 ETA = 2.0**-1074  # the smallest positive number
 SAFE = 1.01  # for the rounding of the bounds themselves
 TERMS = 9  # of a row of a residual, or fewer: four for each product, and one
-ENTRIES_AT_A_TIME = 2**16  # of M: they and what is computed from them stay in the processor's cache
-FEWEST_ROWS = 16
+ENTRIES_AT_A_TIME = 2**15  # of M: they and what is computed from them stay in the processor's cache
+
+#: (rows, columns, M[rows, columns]), dense or CSR; M is zero beside.
+Panel = tuple[slice, slice, Any]
 
 
 @dataclass(frozen=True)
@@ -63,11 +65,6 @@ def two_sum(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
     return s, (a - (s - t)) + (b - t)
 
 
-def gamma(k: int) -> float:
-    """γ_k = ku/(1 − ku)."""
-    return k * U / (1 - k * U)
-
-
 def exponent(size: Matrix | float) -> Any:
     """The least e with |size| < 2^e."""
     return np.frexp(size)[1].astype(float)
@@ -97,8 +94,8 @@ class Residual:
         self.hi, self.lo = np.array(value), np.zeros(value.shape)
         self.error = gamma(TERMS) ** 2 * abs(value) + ETA * (value != 0)
 
-    def subtract_product(self, panels: Iterable[tuple[slice, Any]], longest: int, x: DoubleDouble) -> None:
-        """Mx, x (columns of M, k). panels : (rows, M[rows]), dense or CSR, no row with more entries."""
+    def subtract_product(self, panels: Iterable[Panel], longest: int, x: DoubleDouble) -> None:
+        """Mx, x (columns of M, k). panels : of M, no row with more entries."""
         bits = (53 - int(np.ceil(np.log2(max(longest, 2))))) // 2 + 1
         unit = _units(x.hi)  # M diag(unit) and x / unit have no rounding
         hi, lo = x.hi / unit[:, None], x.lo / unit[:, None]
@@ -118,12 +115,13 @@ class Residual:
             rounding * most + most_lo,
         )
         of_each = SAFE * np.stack([of_M1, of_M2, of_M3, 8 * ETA * (1 + most) * (most > 0)])
-        for rows, panel in panels:
-            entries, count, above, of_row = _scaled(panel, unit)
+        for rows, columns, panel in panels:
+            entries, count, above, of_row = _scaled(panel, unit[columns])
             M1, rest = cut(entries, of_row(above), bits)
             M2, M3 = cut(rest, of_row(above - bits), bits)
             first, second, third = (_with(panel, part) for part in (M1, M2, M3))
-            for term in (first @ x1, first @ x2, second @ x1, first @ x3 + (second @ after + third @ hi)):
+            rest = first @ x3[columns] + (second @ after[columns] + third @ hi[columns])
+            for term in (first @ x1[columns], first @ x2[columns], second @ x1[columns], rest):
                 self.hi[rows], error = two_sum(self.hi[rows], -term)
                 self.lo[rows] += error
             of_M2 = count * np.exp2(above - bits)
@@ -142,13 +140,12 @@ def _units(x: Matrix) -> Vector:
     return np.where(size > 0, unit, unit[size > 0].min(initial=1.0))
 
 
-def row_panels(M: Any) -> Iterable[tuple[slice, Any]]:
-    """Some rows of M at a time, M dense or CSR."""
-    size = M.nnz / max(M.shape[0], 1) if sp.issparse(M) else M.shape[1]
-    height = max(int(ENTRIES_AT_A_TIME / max(size, 1)), FEWEST_ROWS)
+def row_panels(M: sp.csr_array) -> Iterator[Panel]:
+    """Some rows of M at a time."""
+    height = max(ENTRIES_AT_A_TIME * M.shape[0] // max(M.nnz, 1), 1)
     for start in range(0, M.shape[0], height):
         rows = slice(start, min(start + height, M.shape[0]))
-        yield rows, M[rows]
+        yield rows, slice(None), M[rows]
 
 
 def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[[Matrix], Matrix]]:

@@ -91,7 +91,7 @@ def judge(
     wrongly_open = reference.active & (gap > limit_mm)
     wrongly_closed = ~reference.active & (reference_gap > 2 * limit_mm) & (gap <= limit_mm)
     dual_residual = duality_gap = backward_error = None
-    Kx = prepared.assembly.multiply_K(x)
+    Kx = prepared.assembly.K.multiply(x)
     if lam.shape == (A.shape[1],) and np.isfinite(lam).all():
         force = Kx - load.f + A @ lam
         dual_residual = _or_overflow(float(max(np.max(np.abs(force)), np.max(-lam, initial=0.0))))
@@ -124,7 +124,7 @@ def _backward_error(
     prepared: Prepared, load: LoadCase, x: Vector, lam: Vector, force: Vector, y: Vector
 ) -> float:
     A = prepared.assembly.A
-    K_norm = prepared.assembly.norm_K()
+    K_norm = prepared.assembly.K.norm
     A_norm, At_norm = (float(abs(A).sum(axis=axis).max()) for axis in (1, 0))
     x_size = float(np.abs(x).max())
     F = K_norm * x_size + float(np.abs(load.f).max()) + A_norm * float(np.abs(lam).max())

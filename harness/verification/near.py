@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.forms.assembly import Vector
-from problems.forms.banded_inverse import BandedInverse, BandFactor, Windows, banded_inverse, of_windows
+from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
-from problems.forms.sparse_prepared import SparsePrepared
 
 MAX_SETS = 10  # tried with M for one load case
 
@@ -28,17 +27,8 @@ class Near:
 
     @classmethod
     def of(cls, prepared: Prepared, R: Vector) -> Near:
-        """In full, M = Q⁻¹, for a dense Q without coordinates."""
-        if isinstance(prepared, SparsePrepared):
-            found = prepared.approximate_inverse
-            return cls(found.M, found.diagonal * R**2, R) if found else cls(None, np.ones(len(R)), R)
-        nodes, Q, M = prepared.assembly.contact_nodes, prepared.Q, None
-        with suppress(np.linalg.LinAlgError):
-            if nodes is None:
-                M = of_windows(Windows(np.arange(len(Q)), len(Q)), lambda window: np.array(Q, order="F"))
-            else:
-                M = banded_inverse(Q, nodes)
-        return cls(M, np.diag(Q) * R**2, R)
+        found = prepared.approximate_inverse
+        return cls(found.M, found.diagonal * R**2, R) if found else cls(None, np.ones(len(R)), R)
 
     def product(self, v: Vector) -> Vector:
         """M v."""

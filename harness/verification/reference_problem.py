@@ -18,7 +18,6 @@ from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
-from problems.forms.sparse_prepared import SparsePrepared
 from problems.input.bounded import regular_file
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene, Scene
@@ -49,9 +48,8 @@ class ReferenceProblem:
         if not self.scene.on_ladder:
             return asked
         data = self.prepared
-        cond_K: Any = data.condition if isinstance(data, SparsePrepared) else data.facts["cond_K"]
         largest = float(np.max(np.abs(self.reference.x) * self.reference.unit_mm))
-        return conditioned_limit(asked, cond_K, largest)
+        return conditioned_limit(asked, data.condition, largest)
 
     def of_case(self, series: dict[str, Any] | None, case: int | None) -> ReferenceProblem:
         """The same for a load case of a series, with its own reference."""

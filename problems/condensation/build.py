@@ -14,34 +14,43 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Vector
-from problems.forms.stages import Progress, Stored, indefinite
+from problems.forms.prepared import Prepared
+from problems.forms.problem import Progress
+from problems.forms.stages import CachedStages, indefinite
 from problems.model.effect import TieEffect
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
+from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
-from .condense import NotPositiveDefinite
 from .condensed_part import condensed_part, part_key
 
 
-def prepared(scene: Scene, progress: Progress) -> Stored:
+def prepared(scene: Scene, progress: Progress) -> Prepared:
     """K and A of a scene, memory-mapped from the cache or computed now; factors and Q when first needed.
 
     Raises InputError if a part can move freely, or if a user's matrices are invalid.
     """
+    stages = _stages(scene, progress)
+    return Prepared(stages.assembly, stages)
+
+
+def _stages(scene: Scene, progress: Progress) -> CachedStages:
     match scene:
         case JointScene():
             return _condensed(scene, progress)
         case MatricesScene():
             assembly, _, seconds, key = _own(scene)
-            return Stored(assembly, key, {"condensation": seconds}, scene.source_of, True, progress)
+            return CachedStages(assembly, key, {"condensation": seconds}, scene.source_of, True, progress)
         case MadeScene():
-            no_time = {"condensation": 0.0}
             made = scene.made.assembly
-            if scene.sparse:
-                made = replace(made, blocks=tuple(K.toarray(order="F") for K in made.sparse_blocks))
-            return Stored(made, scene.assembly_key, no_time, scene.source_of, True, progress)
+            K = made.K.as_dense()
+            names = made.parts if K is made.K else tuple(f"part {k + 1}" for k in range(len(K.blocks)))
+            assembly = replace(made, K=K, parts=names)
+            no_time = {"condensation": 0.0}
+            return CachedStages(assembly, scene.assembly_key, no_time, scene.source_of, True, progress)
     raise TypeError(type(scene).__name__)
 
 
@@ -49,7 +58,7 @@ def built(scene: JointScene) -> bool:
     """Whether every matrix of a scene is in the cache; computes nothing."""
     parts = [part_key(scene.joint, part, scene.stiffness_effects) for part in scene.joint.part]
     tied = [_springs(scene, cache.digest(parts))[2]] if any(scene.effects_of(TieEffect)) else []
-    return None not in map(cache.load, [*parts, *tied]) and prepared(scene, lambda text, fraction: None).built
+    return None not in map(cache.load, [*parts, *tied]) and _stages(scene, lambda text, fraction: None).built
 
 
 def load_case(scene: Scene) -> LoadCase:
@@ -64,7 +73,7 @@ def load_case(scene: Scene) -> LoadCase:
     raise TypeError(type(scene).__name__)
 
 
-def _condensed(scene: JointScene, progress: Progress) -> Stored:
+def _condensed(scene: JointScene, progress: Progress) -> CachedStages:
     joint, effects = scene.joint, scene.stiffness_effects
     keys = [part_key(joint, part, effects) for part in joint.part]
     blocks, seconds = [], {}
@@ -75,11 +84,12 @@ def _condensed(scene: JointScene, progress: Progress) -> Stored:
             raise indefinite(scene.source_of("K"), f"part.{part.name}", str(error)) from error
         blocks.append(K)
     nodes = np.tile(joint.nodes, (len(joint.part), 1))
-    assembly = Assembly(tuple(blocks), joint.contact_matrix(), nodes, tuple(part.name for part in joint.part))
+    names = tuple(part.name for part in joint.part)
+    assembly = Assembly(Stiffness.of(*blocks), joint.contact_matrix(), nodes, names)
     key, steps = cache.digest(keys), {"condensation": sum(seconds.values())}
     if any(scene.effects_of(TieEffect)):
         assembly, key, steps["ties"] = _tied(scene, assembly, key, progress)
-    return Stored(assembly, key, steps, scene.source_of, False, progress)
+    return CachedStages(assembly, key, steps, scene.source_of, False, progress)
 
 
 def _tied(
@@ -93,14 +103,14 @@ def _tied(
     def made() -> cache.Entry:
         progress("springs between the parts", 0.0)
         start = time.perf_counter()
-        blocks, names = springs.with_springs(untied.blocks, untied.parts, T, k)
+        blocks, names = springs.with_springs(untied.K, untied.parts, T, k)
         facts = {"parts": names, "seconds": time.perf_counter() - start}
         return {f"K{i}": K for i, K in enumerate(blocks)}, facts
 
     arrays, facts = cache.load_or_make(key, made)
     names = tuple(facts["parts"])
-    blocks = tuple(arrays[f"K{i}"] for i in range(len(names)))
-    return Assembly(blocks, untied.A, untied.nodes, names), key, facts["seconds"]
+    K = Stiffness.of(*(arrays[f"K{i}"] for i in range(len(names))))
+    return Assembly(K, untied.A, untied.nodes, names), key, facts["seconds"]
 
 
 def _springs(scene: JointScene, untied_key: str) -> tuple[sp.csc_array, Vector, str]:

@@ -13,12 +13,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.linalg as sla
 import scipy.sparse as sp
+from scipy.linalg import lapack
 
 from problems.forms.assembly import Matrix
-
-
-class NotPositiveDefinite(ValueError):
-    """A stiffness is not positive definite: a part that can move without strain."""
+from problems.stiffness.block import NotPositiveDefinite
 
 
 def condense(
@@ -59,7 +57,9 @@ def condense(
         S[kept:stop, kept:stop] = C[np.ix_(j, j)]
 
         # W = L⁻¹ K_i·, for the kept unknowns and for the next line; then K_·· −= WᵀW
-        L = _cholesky(C[np.ix_(i, i)])
+        L, info = lapack.dpotrf(C[np.ix_(i, i)], lower=1)
+        if info:
+            raise NotPositiveDefinite(int(line[i[info - 1]]))
         rows = np.hstack([B[:, i].T, C[np.ix_(i, j)], ahead[i]])
         W = sla.solve_triangular(L, rows, lower=True, check_finite=False)
         W_kept, W_ahead = W[:, :stop], W[:, stop:]
@@ -69,10 +69,3 @@ def condense(
         kept = stop
         progress((step + 1) / len(lines))
     return S
-
-
-def _cholesky(K_ii: Matrix) -> Matrix:
-    try:
-        return sla.cholesky(K_ii, lower=True, check_finite=False)
-    except np.linalg.LinAlgError as error:
-        raise NotPositiveDefinite(str(error)) from error

@@ -6,20 +6,19 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
-
-Blocks = tuple[Matrix, ...]
+from problems.stiffness.operator import Stiffness
 
 
 def with_springs(
-    blocks: Blocks, names: tuple[str, ...], T: sp.csc_array, k: Vector
-) -> tuple[Blocks, tuple[str, ...]]:
+    K: Stiffness, names: tuple[str, ...], T: sp.csc_array, k: Vector
+) -> tuple[list[Matrix], tuple[str, ...]]:
     """The blocks and names of K + T diag(k) Tᵀ.
 
     T : (n, r), one column per spring, its direction. k : (r,) stiffnesses, N/mm.
     A block extends from the first to the last part that a spring joins.
     """
-    ends = np.cumsum([len(K) for K in blocks])
-    starts = ends - [len(K) for K in blocks]
+    starts = np.array([rows.start for rows in K.slices])
+    ends = np.array([rows.stop for rows in K.slices])
     block_of = np.searchsorted(ends, T.indices, side="right")
     joined = np.zeros(len(ends), dtype=bool)  # with the block before
     for column in range(T.shape[1]):
@@ -29,10 +28,10 @@ def with_springs(
     merged, merged_names = [], []
     for group in np.split(np.arange(len(ends)), np.flatnonzero(~joined)[1:]):
         first, last = starts[group[0]], ends[group[-1]]
-        K = added[first:last, first:last].toarray(order="F")
+        whole = added[first:last, first:last].toarray(order="F")
         for i in group:
             inside = slice(starts[i] - first, ends[i] - first)
-            K[inside, inside] += blocks[i]
-        merged.append(K)
+            whole[inside, inside] += K.blocks[i].matrix
+        merged.append(whole)
         merged_names.append(" + ".join(names[i] for i in group))
-    return tuple(merged), tuple(merged_names)
+    return merged, tuple(merged_names)

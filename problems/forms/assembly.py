@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .alteration import Alteration
+from problems.stiffness.block import Matrix as Matrix
+from problems.stiffness.block import Vector as Vector
+from problems.stiffness.operator import Stiffness
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from .alteration import Alteration
 
 
 @dataclass(frozen=True)
@@ -22,18 +22,17 @@ class Assembly:
 
     Parameters
     ----------
-    blocks : K_1 … K_p, each (n_i, n_i), N/mm, symmetric positive definite, dense or sparse.
-        K = blockdiag(K_1, …, K_p), n = Σ n_i.
+    K : (n, n), N/mm, symmetric positive definite.
     A : (n, m) sparse. Column j is the normal of contact j: +1 and −1 for two parts,
         a single 1 for a part against a rigid tool.
     nodes : (n, 2) coordinates of the unknowns in mm, or None if they are unknown.
-    parts : a name for each block.
+    parts : a name for each block of K.
     altered : how far these, and a user's f and g, may be from what was given; None if nothing was altered.
     junction : the unknowns that are asked for, displacements in mm; None if all are. The others, of a model
         without condensation, are inner displacements, slopes and twists.
     """
 
-    blocks: tuple[Matrix, ...]
+    K: Stiffness
     A: sp.csc_array
     nodes: Matrix | None = None
     parts: tuple[str, ...] = ()
@@ -68,43 +67,11 @@ class Assembly:
         return None if self.nodes is None else self.at_junction(self.nodes)
 
     @property
-    def slices(self) -> list[slice]:
-        """The unknowns of each block."""
-        ends = np.cumsum([0, *(K.shape[0] for K in self.blocks)])
-        return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
-
-    @property
     def contact_nodes(self) -> Matrix | None:
         """(m, 2) coordinates of the contacts in mm: those of the first unknown of each."""
         if self.nodes is None:
             return None
         return self.nodes[self.A.indices[self.A.indptr[:-1]]]
-
-    @property
-    def stored(self) -> list[NDArray[Any]]:
-        """The arrays that hold K's blocks."""
-        found: list[NDArray[Any]] = []
-        for K in self.blocks:
-            sparse: Any = K
-            found += [sparse.data, sparse.indices, sparse.indptr] if sp.issparse(K) else [K]
-        return found
-
-    @property
-    def sparse_blocks(self) -> tuple[sp.csc_array, ...]:
-        """K's blocks as sparse matrices; not copied if they are."""
-        return tuple(sp.csc_array(K) for K in self.blocks)
-
-    def multiply_K(self, x: Matrix) -> Matrix:
-        """K x, block by block."""
-        return np.concatenate([K @ x[s] for K, s in zip(self.blocks, self.slices, strict=True)])
-
-    def diagonal_K(self) -> Vector:
-        """The diagonal of K, (n,) N/mm."""
-        return np.concatenate([K.diagonal() for K in self.blocks])
-
-    def norm_K(self) -> float:
-        """‖K‖_∞ = max_i Σ_j |K_ij|, N/mm, but for rounding."""
-        return max(float(abs(K).sum(axis=1).max()) for K in self.blocks)
 
 
 @dataclass(frozen=True)
@@ -118,3 +85,11 @@ class LoadCase:
     f: Vector
     g: Vector
     p: Vector = field(default_factory=lambda: np.zeros(0))
+
+
+def stacked(cases: Sequence[LoadCase]) -> LoadCase:
+    """Load cases as columns: f (n, k), or (n, 1) if all share it, and g (m, k)."""
+    first = cases[0].f
+    shared = all(case.f is first or np.array_equal(case.f, first) for case in cases)
+    f = first[:, None] if shared else np.column_stack([case.f for case in cases])
+    return LoadCase(f, np.column_stack([case.g for case in cases]))

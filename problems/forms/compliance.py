@@ -1,49 +1,96 @@
-"""Q = AᵀK⁻¹A without the matrix: products and principal submatrices, by solutions with K."""
+"""Q = AᵀK⁻¹A, as a matrix or without it, by solutions with K: products, diagonal, principal submatrices."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .assembly import Matrix
+from problems.stiffness.operator import Stiffness
+
+from .assembly import Matrix, Vector
 
 Rows = NDArray[np.intp]
+#: A window of contacts → its principal submatrix of Q, stored by columns, which may be overwritten.
+Local = Callable[[Rows], Matrix]
+
+
+class Compliance(ABC):
+    """Q (m, m), mm/N, or a principal submatrix."""
+
+    @abstractmethod
+    def __matmul__(self, lam: Matrix) -> Matrix:
+        """Q λ, λ (m,) or (m, k)."""
+
+    @abstractmethod
+    def diagonal(self) -> Vector:
+        """(m,) mm/N."""
+
+    @abstractmethod
+    def submatrix(self, rows: Rows) -> Compliance:
+        """The principal submatrix of some contacts."""
+
+    @abstractmethod
+    def toarray(self) -> Matrix:
+        """The matrix, by columns."""
+
+    @abstractmethod
+    def local(self, windows: Sequence[Rows], single: bool) -> Local | None:
+        """Principal submatrices of windows of contacts near each other, in single precision to about four
+        digits; None where they cost too much.
+        """
 
 
 @dataclass(frozen=True)
-class Compliance:
-    """Q, or the principal submatrix of Q that belongs to the columns of A.
+class DenseCompliance(Compliance):
+    """Q : by columns, perhaps memory-mapped."""
 
-    solve_K : b (n,) or (n, k) → K⁻¹ b. A : (n, m) sparse.
-    """
+    Q: Matrix
 
-    solve_K: Callable[[Matrix], Matrix]
+    def __matmul__(self, lam: Matrix) -> Matrix:
+        return self.Q @ lam
+
+    def diagonal(self) -> Vector:
+        return np.diag(self.Q).copy()
+
+    def submatrix(self, rows: Rows) -> DenseCompliance:
+        return DenseCompliance(self.Q[np.ix_(rows, rows)].T)
+
+    def toarray(self) -> Matrix:
+        return self.Q
+
+    def local(self, windows: Sequence[Rows], single: bool) -> Local:
+        rows = np.asarray(self.Q).T  # no memory map, whose views cost more than their copies
+        return lambda window: rows[np.ix_(window, window)].T
+
+
+@dataclass(frozen=True)
+class ComplianceProducts(Compliance):
+    """By solutions with K."""
+
+    K: Stiffness
     A: sp.csc_array
 
     def __matmul__(self, lam: Matrix) -> Matrix:
-        return self.A.T @ self.solve_K(self.A @ lam)
+        product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
+        return product
 
-    def submatrix(self, rows: Rows) -> Compliance:
-        return Compliance(self.solve_K, self.A[:, rows])
+    def diagonal(self) -> Vector:
+        return self.toarray().diagonal().copy()
+
+    def submatrix(self, rows: Rows) -> ComplianceProducts:
+        return ComplianceProducts(self.K, self.A[:, rows])
 
     def toarray(self) -> Matrix:
-        Q = self @ np.eye(self.A.shape[1])
-        return np.asfortranarray((Q + Q.T) / 2)
+        return self.K.compliance(self.A)
+
+    def local(self, windows: Sequence[Rows], single: bool) -> Local | None:
+        return self.K.local_compliance(self.A, windows, single)
 
 
-#: A dense Q, or its products.
+#: A dense Q, or one with the same operations.
 AnyQ = Matrix | Compliance
-
-
-def submatrix(Q: AnyQ, rows: Rows) -> AnyQ:
-    """The principal submatrix for some contacts; a copy if Q is dense."""
-    return Q.submatrix(rows) if isinstance(Q, Compliance) else np.ascontiguousarray(Q[np.ix_(rows, rows)])
-
-
-def dense_submatrix(Q: AnyQ, rows: Rows) -> Matrix:
-    """The same as a new array, stored by columns as LAPACK takes it."""
-    return Q.submatrix(rows).toarray() if isinstance(Q, Compliance) else Q[np.ix_(rows, rows)].T

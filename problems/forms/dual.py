@@ -10,9 +10,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from .assembly import LoadCase, Matrix, Vector
+from .assembly import LoadCase, Matrix, Vector, stacked
 from .names import Form
-from .problem import Problem, read_only, stacked
+from .problem import Problem, read_only
 
 
 class Dual(Problem):
@@ -55,4 +55,5 @@ class Dual(Problem):
 
     @property
     def arrays(self) -> list[Matrix]:
-        return [*self.assembly.blocks, *self.prepared.factors, self.Q]
+        K = self.assembly.K
+        return [*K.arrays, *K.factors, self.Q]

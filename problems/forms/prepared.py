@@ -2,19 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg as sla
-from scipy.linalg import blas
+import scipy.sparse as sp
 
-from .assembly import Assembly, LoadCase, Matrix, Vector
-from .compliance import AnyQ
-from .factorisation import factor, schur
+from problems.stiffness.operator import Stiffness
+
+from .approximate_inverse import ApproximateInverse, of_dense, of_products
+from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
+from .compliance import Compliance, ComplianceProducts, DenseCompliance
 
 MIB = 2**20
 EPS = float(np.finfo(float).eps)
 RESIDUAL_ROUNDING = 32  # of ε: five are usual, whatever the size
+
+
+class Stages:
+    """How the factors of K and Q are made, and what is known of them: here anew, and nothing."""
+
+    #: The key of the matrices in the cache; None if they are in memory only.
+    key: str | None = None
+
+    def factor(self, assembly: Assembly) -> None:
+        """Make the factors of K's blocks."""
+        assembly.K.factor_blocks()
+
+    def Q(self, assembly: Assembly) -> Matrix:
+        return assembly.K.compliance(assembly.A)
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Of each step, as far as they are known."""
+        return {}
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """cond_K, λmin, λmax, …"""
+        return {}
 
 
 class Prepared:
@@ -23,82 +50,121 @@ class Prepared:
     Parameters
     ----------
     assembly : K and A.
-    factors : U_i upper triangular with K_i = U_iᵀU_i, each (n_i, n_i); computed unless given.
-    Q : (m, m), mm/N, Q = AᵀK⁻¹A; computed unless given.
-
-    A subclass with another K⁻¹ (a sparse or a banded factor) overrides `solve_K` and `compliance`: judging an
-    answer needs only these and products with K and A.
+    stages : how the factors of K and Q are made; by default in memory.
+    Q : makes Q (m, m), mm/N, in place of the stages.
+    coarser : makes an assembly of similar Q whose factors are cheaper, for M; None if there is none.
     """
 
     def __init__(
-        self, assembly: Assembly, factors: tuple[Matrix, ...] | None = None, Q: Matrix | None = None
+        self,
+        assembly: Assembly,
+        stages: Stages | None = None,
+        Q: Callable[[], Matrix] | None = None,
+        coarser: Callable[[], Assembly] | None = None,
     ) -> None:
-        self.assembly = assembly
-        if factors is not None:
-            self.__dict__["factors"] = factors  # overrides the cached property
-        if Q is not None:
-            self.__dict__["Q"] = Q
+        self.stages, self.assembly, self.coarser = stages or Stages(), assembly, coarser
+        if stages is not None:
+            K = Stiffness(assembly.K.blocks, lambda _: stages.factor(assembly))
+            self.assembly = replace(assembly, K=K)
+        self._make_Q = Q or (lambda: self.stages.Q(self.assembly))
 
-    @cached_property
+    @property
     def key(self) -> str | None:
         """The key of the matrices in the cache; None if they are in memory only."""
-        return None
+        return self.stages.key
 
     @property
     def facts(self) -> dict[str, object]:
         """Facts recorded with the stages: cond_K, λmin, λmax, seconds of each step, …"""
-        return {}
+        assembly = self.assembly
+        size: dict[str, object] = {"n": assembly.asked, "m": assembly.m, "parts": assembly.parts}
+        if not assembly.K.dense:
+            size["unknowns"] = assembly.n
+        return size | self.stages.facts | {"seconds": self.stages.seconds}
+
+    @property
+    def condition(self) -> float:
+        """cond(K) if the stages know it, else about that in balanced units."""
+        known = self.stages.facts.get("cond_K")
+        return float(known) if isinstance(known, float) else self.assembly.K.condition(self.assembly.K.units)
 
     @property
     def stored_mib(self) -> dict[str, float]:
-        """MiB of K, its factors and Q, made or not."""
-        K = sum(block.nbytes for block in self.assembly.blocks) / MIB
-        return {"K": K, "factors": K, "Q": 8 * self.assembly.m**2 / MIB}
+        """MiB of K, of its factors and of Q; those of a dense K made or not."""
+        K = self.assembly.K
+        sizes = {"K": sum(array.nbytes for array in K.arrays) / MIB}
+        if K.dense or K.factored:
+            sizes["factors"] = 8 * K.numbers / MIB
+        return sizes | ({"Q": 8 * self.assembly.m**2 / MIB} if K.dense else {})
 
     @property
     def opened(self) -> tuple[str, ...]:
-        """K, and of the dense `factors` and `Q` those that were asked for."""
-        return ("K", *(stage for stage in ("factors", "Q") if stage in vars(self)))
-
-    @cached_property
-    def factors(self) -> tuple[Matrix, ...]:
-        return tuple(factor(K) for K in self.assembly.blocks)
+        """K, and of the dense factors and Q those that were asked for."""
+        K = self.assembly.K
+        asked = {"factors": K.dense and K.factored, "Q": "Q" in vars(self)}
+        return ("K", *(stage for stage, made in asked.items() if made))
 
     @cached_property
     def Q(self) -> Matrix:
-        return schur(self.assembly, self.factors)
-
-    def solve_K(self, b: Matrix) -> Matrix:
-        """K⁻¹ b through the Cholesky factors."""
-        return np.concatenate(
-            [_solve(U, b[s]) for U, s in zip(self.factors, self.assembly.slices, strict=True)]
-        )
+        """Q = AᵀK⁻¹A, (m, m), mm/N; no code of the sparse form asks for it."""
+        return self._make_Q()
 
     @property
-    def compliance(self) -> AnyQ:
-        """Q, as a matrix or by its products."""
-        return self.Q
+    def compliance(self) -> Compliance:
+        """Q: the matrix for a dense K, else its products."""
+        K, A = self.assembly.K, self.assembly.A
+        return DenseCompliance(self.Q) if K.dense else ComplianceProducts(K, A)
+
+    @cached_property
+    def approximate_inverse(self) -> ApproximateInverse | None:
+        """M ≈ Q⁻¹ and about the diagonal of Q; None where there is none, or it is not worth having."""
+        Q = self.compliance
+        if isinstance(Q, DenseCompliance):
+            return of_dense(Q, self.assembly.contact_nodes)
+        like = Prepared(self.coarser()).compliance if self.coarser else Q
+        return of_products(self.assembly, Q, like)
+
+    def in_contact_units(self, c: Vector) -> Prepared:
+        """With the columns of A divided by c (m,); K, and its factors, are the same."""
+        A = sp.csc_array(self.assembly.A @ sp.diags_array(1 / c))
+        return Prepared(replace(self.assembly, A=A), Q=lambda: np.asfortranarray(self.Q / c / c[:, None]))
 
     def dual_load(self, load: LoadCase) -> Vector:
         """p = AᵀK⁻¹f − g, (m,), mm: the overlap of the parts if contact is ignored."""
-        return self.assembly.A.T @ self.solve_K(load.f) - load.g
+        return self.assembly.A.T @ self.assembly.K.solve(load.f) - load.g
+
+    def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
+        """y = g − Aᵀx of x = K⁻¹(f − Aλ), (m, k) mm for λ (m, k); loads : with p where K is dense.
+
+        Qλ − p with a matrix Q; else by one solution with K, as Qλ and p can be large, and cancel.
+        """
+        if self.assembly.K.dense:
+            return self.Q @ lam - np.column_stack([load.p for load in loads])
+        A, cases = self.assembly.A, stacked(loads)
+        y: Matrix = cases.g - A.T @ self.assembly.K.solve(cases.f - A @ lam)
+        return y
 
     def recover(self, lam: Vector, load: LoadCase) -> Vector:
         """x = K⁻¹(f − Aλ), (n,) mm, refined once if the residual r = f − Aλ − Kx is beyond rounding.
 
         With s_i = √k_ii, |k_ij| ≤ s_i s_j, rounding leaves max |r_i| / s_i at a few ε max s_j |x_j|.
         """
-        b = load.f - self.assembly.A @ lam
-        x = self.solve_K(b)
-        r = b - self.assembly.multiply_K(x)
-        s = np.sqrt(self.assembly.diagonal_K())
+        K, b = self.assembly.K, load.f - self.assembly.A @ lam
+        x = K.solve(b)
+        r = b - K.multiply(x)
+        s = np.sqrt(K.diagonal)
         if (abs(r.T) / s).max() <= RESIDUAL_ROUNDING * EPS * (abs(x.T) * s).max():
             return x
-        return x + self.solve_K(r)
+        return x + K.solve(r)
 
 
-def _solve(U: Matrix, b: Matrix) -> Matrix:
-    """(UᵀU)⁻¹b; for a single column without LAPACK's blocked solution, which takes twice the time."""
-    if b.size > len(U):
-        return sla.cho_solve((U, False), b, check_finite=False)
-    return blas.dtrsv(U, blas.dtrsv(U, b.ravel(), trans=1)).reshape(b.shape)
+def dual_alone(Q: Matrix) -> Prepared:
+    """Q (m, m) mm/N without a joint: the dual program of K = Q⁻¹ and A = I, for p = −g (see `load_of`)."""
+    from problems.stiffness.dense import InverseBlock  # of this only
+
+    return Prepared(Assembly(Stiffness([InverseBlock(Q)]), sp.eye_array(len(Q), format="csc")), Q=lambda: Q)
+
+
+def load_of(p: Vector) -> LoadCase:
+    """The load case with AᵀK⁻¹f − g = p, (m,) mm."""
+    return LoadCase(np.zeros(len(p)), -p)

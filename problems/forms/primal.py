@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,8 +19,8 @@ class Primal(Problem):
     needs: ClassVar[tuple[str, ...]] = ("lam", "x")
 
     @property
-    def blocks(self) -> tuple[Matrix, ...]:
-        return self.assembly.blocks
+    def blocks(self) -> tuple[Any, ...]:
+        return self.assembly.K.matrices
 
     @property
     def G(self) -> sp.csr_array:
@@ -52,4 +52,4 @@ class Primal(Problem):
 
     @property
     def arrays(self) -> list[Matrix]:
-        return self.assembly.stored
+        return self.assembly.K.arrays

@@ -11,12 +11,12 @@ from __future__ import annotations
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
 
-from .assembly import Assembly, LoadCase, Matrix, Vector
+from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
 from .names import Form
 from .prepared import Prepared
 
@@ -47,8 +47,8 @@ class Problem(ABC):
 
     @property
     @abstractmethod
-    def blocks(self) -> tuple[Matrix, ...]:
-        """The diagonal blocks of P."""
+    def blocks(self) -> tuple[Any, ...]:
+        """The diagonal blocks of P, dense or sparse."""
 
     @property
     @abstractmethod
@@ -119,14 +119,6 @@ def in_form(prepared: Prepared, form: Form) -> Problem:
     module = importlib.import_module(f"problems.forms.{form}")
     problem: Problem = getattr(module, form.title())(prepared)
     return problem
-
-
-def stacked(cases: Sequence[LoadCase]) -> LoadCase:
-    """Load cases as columns: f (n, k), or (n, 1) if all share it, and g (m, k)."""
-    first = cases[0].f
-    shared = all(case.f is first or np.array_equal(case.f, first) for case in cases)
-    f = first[:, None] if shared else np.column_stack([case.f for case in cases])
-    return LoadCase(f, np.column_stack([case.g for case in cases]))
 
 
 def read_only(load: LoadCase) -> LoadCase:

@@ -1,4 +1,6 @@
-"""Cached data preparation: factors of K, then Q, each computed when first needed."""
+"""Data preparation of a scene: dense factors of K and Q from the cache, sparse factors in memory; each when
+first needed, with errors that name the scene.
+"""
 
 from __future__ import annotations
 
@@ -8,31 +10,65 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import lapack
 
 from problems.errors import InputError
+from problems.stiffness import dense, operator
+from problems.stiffness.block import NotPositiveDefinite
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
-from . import factorisation
 from .assembly import Assembly, Matrix
-from .prepared import Prepared
+from .prepared import Stages
 from .problem import Progress
 
 LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 SMALLEST_EIGENVALUE = 1e-300  # N/mm: below it K⁻¹ overflows
 
+SourceOf = Callable[[str], object]
 
-class Stored(Prepared):
-    """A prepared assembly whose stages are memory-mapped from the cache, or computed and stored there.
+
+class SparseStages(Stages):
+    """Factors of a sparse K, in memory.
+
+    Parameters
+    ----------
+    key : of K in the cache, where what is proven about it is kept. model_s : seconds in which K was made.
+    source_of : the origin of "K" or "A", for error messages. own : a user's K, refused if nearly singular.
+    """
+
+    def __init__(self, key: str, model_s: float, source_of: SourceOf, own: bool) -> None:
+        self.key, self.source_of, self.own = key, source_of, own
+        self.model_s = model_s
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        return {"model": self.model_s}
+
+    def factor(self, assembly: Assembly) -> None:
+        """Raises InputError if K is not positive definite."""
+        K, nodes = assembly.K, assembly.nodes
+        try:
+            K.factor_blocks()
+        except NotPositiveDefinite as error:
+            where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[error.unknown])
+            key, moves = f"x[{error.unknown}]{where}", "moves without a force"
+            raise indefinite(self.source_of("K"), key, moves) from error
+        if self.own and (condition := K.condition(K.units)) > LARGEST_CONDITION:
+            raise indefinite(self.source_of("K"), "cond(K), in balanced units", condition)
+
+
+class CachedStages(Stages):
+    """Stages of a dense K, memory-mapped from the cache, or computed and stored there.
 
     Parameters
     ----------
     assembly : K and A. key : of K in the cache.
-    seconds : of the stages before.
+    before : seconds of the steps before.
     source_of : the origin of "K" or "A", for error messages.
     check_A : whether to raise an error if the columns of A are dependent.
 
-    `factors` raises InputError if K is not positive definite or its condition number exceeds 1e14, `Q` if the
+    Factors raise InputError if K is not positive definite or its condition number exceeds 1e14, Q if the
     columns of A are dependent.
     """
 
@@ -40,45 +76,44 @@ class Stored(Prepared):
         self,
         assembly: Assembly,
         key: str,
-        seconds: dict[str, float],
-        source_of: Callable[[str], object],
+        before: dict[str, float],
+        source_of: SourceOf,
         check_A: bool,
         progress: Progress,
     ) -> None:
-        super().__init__(assembly)
-        A, code = assembly.A, fingerprint([Path(__file__), Path(factorisation.__file__)])
+        self.assembly, A = assembly, assembly.A
+        code = fingerprint([Path(__file__), Path(dense.__file__), Path(operator.__file__)])
         self.factors_key = cache.digest("factors", key, code)
         parts = (A.data, A.indices, A.indptr)
-        self.Q_key = cache.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
-        self.seconds = seconds
+        self.key = cache.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
+        self.before = before
         self.source_of, self.check_A, self.progress = source_of, check_A, progress
-
-    @cached_property
-    def key(self) -> str:
-        return self.Q_key
 
     @property
     def built(self) -> bool:
         """Whether every stage is in the cache."""
-        return None not in (cache.load(self.factors_key), cache.load(self.Q_key))
+        return None not in (cache.load(self.factors_key), cache.load(str(self.key)))
 
     @property
     def facts(self) -> dict[str, object]:
-        known = self._factored[1]
-        Q = self._Q if "_Q" in vars(self) else cache.load(self.Q_key)
-        of_Q = {"Q": Q[1]["seconds"]} if Q else {}
-        seconds = self.seconds | known["seconds"] | of_Q
-        size = {"n": self.assembly.n, "m": self.assembly.m, "parts": self.assembly.parts}
-        return size | known | {"seconds": seconds}
+        return {name: fact for name, fact in self._factored[1].items() if name != "seconds"}
 
-    @cached_property
-    def factors(self) -> tuple[Matrix, ...]:
+    @property
+    def seconds(self) -> dict[str, float]:
+        Q = self._Q if "_Q" in vars(self) else cache.load(str(self.key))
+        return self.before | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
+
+    def factor(self, assembly: Assembly) -> None:
         arrays, _ = self._factored
-        return tuple(arrays[f"U{k}"] for k in range(len(self.assembly.blocks)))
+        for k, block in enumerate(self._blocks):
+            block.U = arrays[f"U{k}"]
 
-    @cached_property
-    def Q(self) -> Matrix:
+    def Q(self, assembly: Assembly) -> Matrix:
         return self._Q[0]["Q"]
+
+    @property
+    def _blocks(self) -> list[dense.DenseBlock]:
+        return [block for block in self.assembly.K.blocks if isinstance(block, dense.DenseBlock)]
 
     @cached_property
     def _factored(self) -> cache.Entry:
@@ -86,21 +121,19 @@ class Stored(Prepared):
 
     @cached_property
     def _Q(self) -> cache.Entry:
-        return cache.load_or_make(self.Q_key, self._schur)
+        return cache.load_or_make(str(self.key), self._schur)
 
     def _factor(self) -> cache.Entry:
-        blocks = self.assembly.blocks
         self.progress("Cholesky factors of K", 0.0)
         start = time.perf_counter()
-        factors = []
-        for K, name in zip(blocks, self.assembly.parts, strict=True):
+        for block, name in zip(self._blocks, self.assembly.parts, strict=True):
             try:
-                factors.append(factorisation.factor(K))
-            except np.linalg.LinAlgError as error:
+                block.factor()
+            except NotPositiveDefinite as error:
                 raise indefinite(self.source_of("K"), f"K of {name}", str(error)) from error
         factored = time.perf_counter()
         self.progress("condition number", 0.0)
-        spectrum = [factorisation.extreme_eigenvalues(K, U) for K, U in zip(blocks, factors, strict=True)]
+        spectrum = [block.extreme_eigenvalues() for block in self._blocks]
         least, largest = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
         if largest > LARGEST_CONDITION * least:
             raise indefinite(self.source_of("K"), "cond(K)", largest / least if least > 0 else np.inf)
@@ -114,15 +147,15 @@ class Stored(Prepared):
             "cond_blocks": [s[1] / s[0] for s in spectrum],
             "seconds": {"cholesky": factored - start, "condition": time.perf_counter() - factored},
         }
-        return {f"U{k}": U for k, U in enumerate(factors)}, facts
+        return {f"U{k}": block.U for k, block in enumerate(self._blocks)}, facts
 
     def _schur(self) -> cache.Entry:
-        factors = self.factors
+        self.factor(self.assembly)
         self.progress("Q = AᵀK⁻¹A", 0.0)
         start = time.perf_counter()
-        Q = factorisation.schur(self.assembly, factors)
+        Q = self.assembly.K.compliance(self.assembly.A)
         if self.check_A and self.assembly.m:
-            column = factorisation.dependent_column(Q)
+            column = dependent_column(Q)
             if column is not None:
                 allowed = "must not depend on the columns before it"
                 raise InputError.one(self.source_of("A"), f"A[:, {column}]", "dependent", allowed)
@@ -133,3 +166,16 @@ def indefinite(where: object, key: str, value: object) -> InputError:
     """The error for a K that is not positive definite."""
     allowed = "K must be positive definite: is a part held against every rigid motion?"
     return InputError.one(where, key, value, allowed)
+
+
+def dependent_column(Q: Matrix) -> int | None:
+    """The first column of A that depends on those before it; None if A has full rank.
+
+    The pivot of Q relative to its diagonal entry measures the independence of a column.
+    """
+    U, info = lapack.dpotrf(Q)
+    if info:
+        return int(info - 1)
+    independence = np.diag(U) ** 2 / np.diag(Q)
+    worst = int(independence.argmin())
+    return worst if independence[worst] < len(Q) * np.finfo(float).eps else None

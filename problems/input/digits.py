@@ -6,7 +6,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
-from problems.forms.compliance import dense_submatrix
 from problems.forms.prepared import Prepared
 
 SAMPLE_SIZE = 20_000
@@ -48,17 +47,19 @@ def expected_error(prepared: Prepared, x: Vector, lam: Vector, digits: int) -> f
     assembly = prepared.assembly
     random = np.random.default_rng(0)
     closed = np.flatnonzero(lam > 0)
-    A_C, Q_CC = assembly.A[:, closed], dense_submatrix(prepared.compliance, closed)
+    A_C, Q_CC = assembly.A[:, closed], prepared.compliance.submatrix(closed).toarray()
     worst = 0.0
     for _ in range(DRAWS):
         force = np.zeros(assembly.n)
-        for K, own in zip(assembly.blocks, assembly.slices, strict=True):
-            upper = sp.coo_array(sp.triu(sp.coo_array(K)))
+        for block, own in zip(assembly.K.blocks, assembly.K.slices, strict=True):
+            upper = sp.coo_array(sp.triu(sp.coo_array(block.matrix)))
             size = 0.5 * 10.0 ** (np.floor(np.log10(abs(upper.data))) + 1 - digits)
-            drawn = sp.csr_array((random.uniform(-1, 1, size.shape) * size, upper.coords), shape=K.shape)
+            drawn = sp.csr_array(
+                (random.uniform(-1, 1, size.shape) * size, upper.coords), shape=block.matrix.shape
+            )
             force[own] = (drawn + sp.triu(drawn, 1).T) @ x[own]
-        dx = prepared.solve_K(force)
+        dx = assembly.K.solve(force)
         if closed.size:
-            dx -= prepared.solve_K(A_C @ np.linalg.solve(Q_CC, A_C.T @ dx))
+            dx -= assembly.K.solve(A_C @ np.linalg.solve(Q_CC, A_C.T @ dx))
         worst = max(worst, float(abs(dx).max(initial=0.0)))
     return worst

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase
+from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
@@ -41,11 +42,11 @@ def stored_matrices(
         return arrays, facts | {"seconds": time.perf_counter() - start}
 
     arrays, facts = cache.load_or_make(key, made)
-    count = range(len(facts["parts"]))
-    blocks = tuple(_matrix(arrays, f"K{k}") if sparse else arrays[f"K{k}"] for k in count)
+    nodes = arrays.get("nodes")
+    blocks = [_matrix(arrays, "K")] if sparse else [arrays[f"K{k}"] for k in range(len(facts["parts"]))]
     altered = Alteration(*(arrays[f"altered_{name}"] for name in ALTERED)) if facts["altered"] else None
     A = _matrix(arrays, "A", facts["shape"])
-    assembly = Assembly(blocks, A, arrays.get("nodes"), tuple(facts["parts"]), altered)
+    assembly = Assembly(Stiffness.of(*blocks, nodes=nodes), A, nodes, tuple(facts["parts"]), altered)
     return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
 
 
@@ -66,9 +67,10 @@ def _packed(assembly: Assembly, load: LoadCase, sparse: bool) -> cache.Entry:
     arrays |= {"f": load.f, "g": load.g}
     if assembly.nodes is not None:
         arrays["nodes"] = assembly.nodes
-    for k, K in enumerate(assembly.blocks):
-        of_K: Any = K
-        arrays |= {f"K{k}_{part}": getattr(of_K, part) for part in PARTS} if sparse else {f"K{k}": K}
+    if sparse:
+        arrays |= {f"K_{part}": getattr(assembly.K.matrix, part) for part in PARTS}
+    else:
+        arrays |= {f"K{k}": block.matrix for k, block in enumerate(assembly.K.blocks)}
     if assembly.altered:
         arrays |= {f"altered_{name}": getattr(assembly.altered, name) for name in ALTERED}
     return arrays, {"parts": assembly.parts, "shape": assembly.A.shape, "altered": bool(assembly.altered)}

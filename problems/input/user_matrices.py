@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from problems.errors import Fault, InputError
 from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase
+from problems.stiffness.operator import Stiffness, dense_blocks
 
 from . import sparse_npz
 from .bounded import LARGEST
@@ -31,7 +30,7 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
 
     files : {"problem": x.npz} with arrays K (n, n), A (n, m), f (n,), g (m,) and optionally
         nodes (n, 2); or {"K": …, "A": …, "f": …, "g": …} Matrix Market files (.mtx).
-    K is split into its diagonal blocks, dense unless they are to be `sparse`. What does not fit into float64
+    K is one `sparse` block, or a few dense ones, of bodies. What does not fit into float64
     is rounded, and K that is not quite symmetric is replaced by (K + Kᵀ)/2; `Assembly.altered` bounds the
     differences. Raises InputError with all faults.
     """
@@ -106,9 +105,8 @@ def checked(
     sums = (off_K.sum(1), off_A.sum(1), off_A.sum(0), off_f.sum(1), off_g.sum(1))
     above = 1 + 2 * max(n, m, 4) * U  # for rounding in these sums themselves
     altered = Alteration(*(above * np.asarray(each, dtype=float).ravel() for each in sums))
-    blocks = tuple(K[a:b, a:b] for a, b in _ends_of_blocks(K))
-    names = tuple(f"part {k + 1}" for k in range(len(blocks)))
-    made = tuple(sp.csc_array(block) if sparse else block.toarray(order="F") for block in blocks)
+    made = Stiffness.of(*([sp.csc_array(K)] if sparse else dense_blocks(K)), nodes=nodes)
+    names = tuple(f"part {k + 1}" for k in range(len(made.blocks)))
     return Assembly(made, sp.csc_array(A), nodes, names, altered if altered else None), LoadCase(f, g)
 
 
@@ -137,15 +135,6 @@ def _rounding(given: Any, read: Any) -> sp.csr_array:
     off = sp.csr_array(off + 2 * U * count.multiply(size))
     off.eliminate_zeros()
     return off
-
-
-def _ends_of_blocks(K: sp.csr_array) -> Iterator[tuple[int, int]]:
-    """The unknowns of each diagonal block of K, which must be contiguous in x."""
-    count, label = connected_components(K, directed=False)
-    starts = np.flatnonzero(np.diff(label, prepend=-1))
-    if len(starts) != count:  # interleaved blocks: a single dense block is always valid
-        starts = np.array([0])
-    yield from itertools.pairwise([*starts.tolist(), K.shape[0]])
 
 
 def _read_npz(path: Path) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 from problems.forms.assembly import Assembly, LoadCase
 from problems.manufactured.exact import exact_model, manufacture, spectrum
 from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
+from problems.stiffness.operator import Stiffness
 
 N = 64  # unknowns per part
 CONDITION = 1e4
@@ -26,11 +27,11 @@ def _tied(made: ManufacturedProblem, spring: float) -> ManufacturedProblem:
     assert made.x is not None
     b = np.zeros(N)
     b[:2] = 1.0, -1.0
-    first, *others = made.assembly.blocks
+    first, *others = (block.matrix for block in made.assembly.K.blocks)
     blocks = (np.asfortranarray(first + spring * np.outer(b, b)), *others)
     f = made.load.f.copy()
     f[:N] += spring * b * (b @ made.x[:N])
-    assembly = Assembly(blocks, made.assembly.A, None, made.assembly.parts)
+    assembly = Assembly(Stiffness.of(*blocks), made.assembly.A, None, made.assembly.parts)
     return ManufacturedProblem(assembly, LoadCase(f, made.load.g), made.x, made.lam)
 
 

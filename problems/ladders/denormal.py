@@ -14,6 +14,7 @@ import numpy as np
 from problems.forms.assembly import Assembly, LoadCase
 from problems.manufactured.exact import exact_model, manufacture, spectrum
 from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
+from problems.stiffness.operator import Stiffness
 
 N = 64  # unknowns per part
 CONDITION = 1e4
@@ -31,9 +32,9 @@ def _scaled(made: ManufacturedProblem, stiffness: float, length: float) -> Manuf
     assert made.x is not None
     assert made.lam is not None
     given = made.assembly
-    blocks = tuple(np.asfortranarray(K * stiffness) for K in given.blocks)
+    blocks = [np.asfortranarray(block.matrix * stiffness) for block in given.K.blocks]
     load = LoadCase(made.load.f * stiffness * length, made.load.g * length)
-    assembly = Assembly(blocks, given.A, None, given.parts)
+    assembly = Assembly(Stiffness.of(*blocks), given.A, None, given.parts)
     return ManufacturedProblem(assembly, load, made.x * length, made.lam * stiffness * length)
 
 

@@ -25,6 +25,7 @@ import scipy.sparse as sp
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
 from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
+from problems.stiffness.operator import Stiffness
 
 GRID = 2.0**24  # the chain's gaps are multiples of 1/GRID
 
@@ -59,7 +60,9 @@ def _chain(m: int) -> Rung:
 
 def _one_to_one(K: Matrix, f: Vector, g: Vector, x: Vector, lam: Vector) -> ManufacturedProblem:
     """One part, with a contact at each unknown."""
-    assembly = Assembly((np.asfortranarray(K),), sp.eye_array(len(K), format="csc"), None, ("part 1",))
+    assembly = Assembly(
+        Stiffness.of(np.asfortranarray(K)), sp.eye_array(len(K), format="csc"), None, ("part 1",)
+    )
     return ManufacturedProblem(assembly, LoadCase(f, g), x, lam)
 
 

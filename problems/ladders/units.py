@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.manufactured.exact import exact_model, manufacture, spectrum
 from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
+from problems.stiffness.operator import Stiffness
 
 N = 64  # unknowns per part
 CONDITION = 1e6
@@ -43,11 +44,12 @@ def rescaled(
     assert made.lam is not None
     n, m = made.assembly.n, made.assembly.m
     S, C = np.broadcast_to(S, n), np.broadcast_to(C, m)
-    parts = zip(made.assembly.blocks, made.assembly.slices, strict=True)
-    blocks = tuple(np.asfortranarray(S[rows, None] * K * S[rows] / v) for K, rows in parts)
+    K = made.assembly.K
+    parts = zip(K.blocks, K.slices, strict=True)
+    blocks = [np.asfortranarray(S[rows, None] * block.matrix * S[rows] / v) for block, rows in parts]
     A = sp.csc_array(sp.diags_array(S) @ made.assembly.A @ sp.diags_array(C))
     load = LoadCase(S * made.load.f / v, C * made.load.g)
-    assembly = Assembly(blocks, A, None, made.assembly.parts)
+    assembly = Assembly(Stiffness.of(*blocks), A, None, made.assembly.parts)
     return ManufacturedProblem(assembly, load, made.x / S, made.lam / (C * v), S.copy(), 1 / C)
 
 

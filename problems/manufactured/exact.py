@@ -20,6 +20,7 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.stiffness.operator import Stiffness
 
 from .ladder import ManufacturedProblem
 
@@ -55,7 +56,8 @@ class ExactModel:
     def assembly(self) -> Assembly:
         """K in N/mm; its smallest eigenvalue is force/length times that of d."""
         blocks = tuple(_stiffness(d) * (self.force / self.length) for d in self.d)
-        return Assembly(blocks, self.A, None, tuple(f"part {k + 1}" for k in range(len(blocks))))
+        names = tuple(f"part {k + 1}" for k in range(len(blocks)))
+        return Assembly(Stiffness.of(*blocks), self.A, None, names)
 
 
 def spectrum(n: int, condition: float) -> Vector:

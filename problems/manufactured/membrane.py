@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
+from problems.stiffness.operator import Stiffness
 
 
 def second_difference(size: int, edge: float = 1.0) -> sp.csc_array:
@@ -56,7 +57,7 @@ def _bounded(
     size = K.shape[0]
     rows = np.arange(size) if held is None else held
     A = sp.csc_array((np.full(rows.size, sign), (rows, np.arange(rows.size))), shape=(size, rows.size))
-    return ManufacturedProblem(Assembly((K,), A, at, ("membrane",)), LoadCase(f, g))
+    return ManufacturedProblem(Assembly(Stiffness.of(K, nodes=at), A, at, ("membrane",)), LoadCase(f, g))
 
 
 def deferred(size: int, make: Callable[[], ManufacturedProblem], m: int | None = None) -> DeferredProblem:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem, made
@@ -153,20 +152,20 @@ class MadeScene(Scene):
         """Whether K's blocks are, without making it."""
         if isinstance(self.problem, DeferredProblem):
             return self.problem.sparse
-        return any(map(sp.issparse, self.problem.assembly.blocks))
+        return not self.problem.assembly.K.dense
 
     @property
     def block_sizes(self) -> tuple[int, ...]:
         """The unknowns of each block of K, without making it."""
         if isinstance(self.problem, DeferredProblem):
             return self.problem.sizes
-        return tuple(K.shape[0] for K in self.problem.assembly.blocks)
+        return tuple(block.size for block in self.problem.assembly.K.blocks)
 
     @cached_property
     def assembly_key(self) -> str:
         assembly = self.made.assembly
         A = assembly.A
-        arrays = (*assembly.stored, A.data, A.indices, A.indptr)
+        arrays = (*assembly.K.arrays, A.data, A.indices, A.indptr)
         return digest([assembly.n, assembly.m], *(array.tobytes() for array in arrays))
 
     @property

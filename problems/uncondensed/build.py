@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase
-from problems.forms.sparse_factor import Factor, NotPositiveDefinite
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.forms.stages import SparseStages
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 from problems.storage.cache import digest
 from problems.storage.fingerprint import fingerprint
@@ -25,11 +22,10 @@ from .whole_model import WholeModel
 
 WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
 DENSEST = 0.25  # of a block's entries: a denser K gains nothing from this form
-LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 SMALL = 200  # unknowns up to which any K is taken
 
 
-def prepared(scene: Scene) -> SparsePrepared:
+def prepared(scene: Scene) -> Prepared:
     """K̂ and B of a scene. Raises InputError if K is dense or cannot be read, and where factors are first
     needed if it is not positive definite.
     """
@@ -50,43 +46,10 @@ def prepared(scene: Scene) -> SparsePrepared:
             assembly = _sparse(scene.made.assembly, scene)
         case _:
             raise TypeError(type(scene).__name__)
-    seconds = {"model": time.perf_counter() - start}
-    return _OfScene(scene, folders, assembly, seconds, coarser)
-
-
-class _OfScene(SparsePrepared):
-    """Says of a mechanism where it moves, as an error of the scene, and refuses a nearly singular own K.
-
-    folders : of the code that made K.
-    """
-
-    def __init__(self, scene: Scene, folders: tuple[str, ...], *given: Any) -> None:
-        super().__init__(*given)
-        self.scene, self.folders = scene, folders
-
-    @cached_property
-    def key(self) -> str:
-        code = fingerprint([Path(__file__)], within=self.folders)
-        return digest("uncondensed", self.scene.assembly_key, code)
-
-    @cached_property
-    def sparse_factors(self) -> tuple[Factor, ...]:
-        try:
-            found = super().sparse_factors
-        except NotPositiveDefinite as error:
-            from problems.forms.stages import indefinite  # which imports the code of dense factors
-
-            nodes, unknown = self.assembly.nodes, error.unknown
-            where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[unknown])
-            key, moves = f"x[{unknown}]{where}", "moves without a force"
-            raise indefinite(self.scene.source_of("K"), key, moves) from error
-        if isinstance(self.scene, MatricesScene):
-            self.__dict__["sparse_factors"] = found  # which the condition number needs
-            if self.condition > LARGEST_CONDITION:
-                from problems.forms.stages import indefinite
-
-                raise indefinite(self.scene.source_of("K"), "cond(K), in balanced units", self.condition)
-        return found
+    key = digest("uncondensed", scene.assembly_key, fingerprint([Path(__file__)], within=folders))
+    own = isinstance(scene, MatricesScene)
+    stages = SparseStages(key, time.perf_counter() - start, scene.source_of, own)
+    return Prepared(assembly, stages, coarser=coarser)
 
 
 def load_case(scene: Scene) -> LoadCase:
@@ -109,10 +72,10 @@ def _own(scene: MatricesScene) -> tuple[Assembly, LoadCase]:
 
 
 def _sparse(assembly: Assembly, scene: Scene) -> Assembly:
-    blocks = tuple(sp.csc_array(K) for K in assembly.blocks)
-    for K in blocks:
-        share = K.nnz / K.shape[0] ** 2
-        if K.shape[0] > SMALL and share > DENSEST:
+    K = assembly.K.as_sparse(assembly.nodes)
+    for block in K.blocks:
+        share = block.matrix.nnz / block.size**2
+        if block.size > SMALL and share > DENSEST:
             allowed = f"at most {DENSEST:.0%} of a block's entries; K is dense: use --form dual or primal"
             raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
-    return Assembly(blocks, assembly.A, assembly.nodes, assembly.parts, assembly.altered)
+    return replace(assembly, K=K)

@@ -20,6 +20,7 @@ from problems.model.joint import Joint
 from problems.model.part import PartModel
 from problems.model.part_load import PartLoadEffect
 from problems.model.scene import JointScene
+from problems.stiffness.operator import Stiffness
 
 from .graded import graded
 from .numbering import Numbering, Unknowns
@@ -69,7 +70,8 @@ class WholeModel:
             blocks.append(sp.csc_array(K))
             names.append(" + ".join(self.scene.joint.part[part].name for part in parts))
         B = self._at_junction(self.scene.joint.contact_matrix())
-        return Assembly(tuple(blocks), B, self._nodes(), tuple(names), junction=self.junction)
+        nodes = self._nodes()
+        return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, tuple(names), junction=self.junction)
 
     def _block(self, parts: tuple[int, ...], start: int, size: int) -> sp.csc_array:
         """The stiffness of some parts, (size, size), on the unknowns from `start` on."""

@@ -19,8 +19,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase
-from problems.forms.sparse_factor import factored
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.stiffness.sparse import sparse_block
 
 from .augmented_sets import stiffest_contact
 from .bordered_factor import Set
@@ -28,19 +28,19 @@ from .bordered_factor import Set
 GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
 
 
-def approached_set(prepared: SparsePrepared, load: LoadCase) -> Set:
+def approached_set(prepared: Prepared, load: LoadCase) -> Set:
     """(m,) the contacts that overlap with springs as stiff as K. load : with p."""
     assembly = prepared.assembly
     overlap = np.maximum(load.p, 0.0)
     if not overlap.any():
         return overlap > 0
-    K = sp.csc_array(sp.block_diag(assembly.blocks, format="csc"))
+    K = assembly.K.matrix
     rho = float(overlap @ overlap / (overlap @ (prepared.compliance @ overlap)))
     stiffest = stiffest_contact(assembly)
     C = load.p > 0
     while rho < stiffest and C.any():
         A_C = assembly.A[:, np.flatnonzero(C)]
-        factor = factored(sp.csc_array(K + rho * (A_C @ A_C.T)), assembly.nodes)
+        factor = sparse_block(sp.csc_array(K + rho * (A_C @ A_C.T)), assembly.nodes)
         C = assembly.A.T @ factor.solve(load.f + rho * (A_C @ load.g[C])) > load.g
         rho *= GROWTH
     return C

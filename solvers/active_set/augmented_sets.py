@@ -20,8 +20,9 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
 from problems.forms.assembly import Assembly, Vector
-from problems.forms.sparse_factor import Factor, factored
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.stiffness.block import Block
+from problems.stiffness.sparse import sparse_block
 
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
@@ -36,21 +37,21 @@ Gap = Callable[[Vector], Vector]
 
 def stiffest_contact(assembly: Assembly) -> float:
     """That of the stiffest unknown at a contact, for a spring at that contact."""
-    stiffest = float(assembly.diagonal_K()[assembly.A.indices].max(initial=0.0))
+    stiffest = float(assembly.K.diagonal[assembly.A.indices].max(initial=0.0))
     return stiffest / (float((assembly.A.data**2).max(initial=0.0)) or 1.0)
 
 
 class AugmentedSets:
     """As ContactSets, for an assembly with sparse blocks. p : (m,) mm. diagonal : of Q, mm/N."""
 
-    def __init__(self, prepared: SparsePrepared, p: Vector, diagonal: Vector, gap: Gap) -> None:
+    def __init__(self, prepared: Prepared, p: Vector, diagonal: Vector, gap: Gap) -> None:
         self.prepared, self.p, self.compliance, self.gap = prepared, p, diagonal, gap
         self.Q, self.factorisations = prepared.compliance, 0
-        self.factor: Factor | None = None
+        self.factor: Block | None = None
 
     @cached_property
     def _K(self) -> sp.csc_array:
-        return sp.csc_array(sp.block_diag(self.prepared.assembly.blocks, format="csc"))
+        return self.prepared.assembly.K.matrix
 
     @cached_property
     def _rho(self) -> float:
@@ -62,14 +63,14 @@ class AugmentedSets:
         self.A_C, self.factor = assembly.A[:, np.flatnonzero(C)], None
         if C.any():
             augmented = sp.csc_array(self._K + self._rho * (self.A_C @ self.A_C.T))
-            self.factor = factored(augmented, assembly.nodes)
+            self.factor = sparse_block(augmented, assembly.nodes)
             self.factorisations += 1
         open_everywhere = TrialSolution(
             np.zeros_like(self.p), -self.p, float(abs(self.p[C]).max(initial=0.0))
         )
         return self.refined(C, open_everywhere, 0.0)
 
-    def _almost_inverse(self, factor: Factor, r: Vector) -> Vector:
+    def _almost_inverse(self, factor: Block, r: Vector) -> Vector:
         """(Q_CC + I/ρ)⁻¹ r."""
         return self._rho * (r - self.A_C.T @ factor.solve(self.A_C @ (self._rho * r)))
 

@@ -15,12 +15,13 @@ from math import inf
 
 import numpy as np
 
+from problems.forms.approximate_inverse import FEW
 from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem
-from problems.forms.sparse_factor import NotPositiveDefinite
-from problems.forms.sparse_prepared import FEW, SparsePrepared
+from problems.stiffness.block import NotPositiveDefinite
 from solvers.base import Answer, Batch, WarmStart, failed
-from solvers.sparse_dual import gaps, with_p, with_x
+from solvers.sparse_dual import with_p, with_x
 
 from .approached_set import approached_set
 from .augmented_sets import AugmentedSets
@@ -38,7 +39,7 @@ STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve |y_C|, at an |y_C| tha
 class SparseState:
     """A K in the sparse form, and what its load cases share. diagonal : of Q, mm/N."""
 
-    prepared: SparsePrepared
+    prepared: Prepared
     diagonal: Vector
     sweeps: BatchedSweeps | None
     max_sets: int
@@ -48,10 +49,9 @@ class SparseState:
     def of(cls, problem: Problem, max_sets: int) -> SparseState | Answer:
         """M and the factors of K; a failed answer if K is not positive definite."""
         prepared = problem.prepared
-        assert isinstance(prepared, SparsePrepared)
         assembly = prepared.assembly
         try:
-            _ = prepared.sparse_factors
+            _ = prepared.assembly.K.factors
         except NotPositiveDefinite as error:
             return failed(f"K is not positive definite: {error}")
         approximate = prepared.approximate_inverse
@@ -69,7 +69,7 @@ class SparseState:
         """Block pivoting from C, or from all contacts that overlap. load : with p."""
 
         def gap(lam: Vector) -> Vector:
-            return gaps(self.prepared, lam[:, None], [load])[:, 0]
+            return self.prepared.gaps(lam[:, None], [load])[:, 0]
 
         sets = AugmentedSets(self.prepared, load.p, self.diagonal, gap)
         return solve_from(load.p > 0 if C is None else C, sets, tolerance, self.max_sets)
@@ -111,10 +111,10 @@ class SparseSweeps(BatchedSweeps):
     nearly the same λ, and stalls nothing.
     """
 
-    prepared: SparsePrepared
+    prepared: Prepared
 
     def gaps(self, lam: Matrix, loads: Sequence[LoadCase]) -> Matrix:
-        return gaps(self.prepared, lam, loads)
+        return self.prepared.gaps(lam, loads)
 
     def gaps_at(self, cases: Sequence[Case], forces: Sequence[Vector]) -> list[Vector]:
         return list(self.gaps(self.numbered(forces), [case.load for case in cases])[self.M.order].T)

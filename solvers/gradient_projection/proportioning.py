@@ -21,11 +21,10 @@ import numpy as np
 
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.compliance import AnyQ
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
 from solvers.active_set.bordered_factor import Set
 from solvers.kkt import kkt_residual, rounding_of
 from solvers.linear_algebra.product import product
-from solvers.sparse_dual import gaps
 
 from .metric import Metric
 
@@ -133,9 +132,9 @@ class Proportioning:
 class SparseProportioning(Proportioning):
     """A load case of the sparse form. load : with p."""
 
-    prepared: SparsePrepared
+    prepared: Prepared
     load: LoadCase
 
     def _gap(self) -> Vector:
         self.products += 1
-        return gaps(self.prepared, self.lam[:, None], [self.load])[:, 0]
+        return self.prepared.gaps(self.lam[:, None], [self.load])[:, 0]

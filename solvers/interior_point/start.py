@@ -46,10 +46,10 @@ def algorithm_4(prepared: Prepared, load: LoadCase) -> Start:
     A = prepared.assembly.A
 
     def response(lam: Vector) -> Vector:
-        return A.T @ prepared.solve_K(A @ lam)
+        return A.T @ prepared.assembly.K.solve(A @ lam)
 
     def column(i: int) -> Vector:
-        return A.T @ prepared.solve_K(A[:, [i]].toarray()[:, 0])
+        return A.T @ prepared.assembly.K.solve(A[:, [i]].toarray()[:, 0])
 
     return _opened(response, column, prepared.dual_load(load))
 

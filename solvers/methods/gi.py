@@ -157,8 +157,8 @@ def _primal_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
         δ, the rounding error of the first solution, estimates that of the refined one.
         """
         b = load.f - A @ u
-        x = prepared.solve_K(b)
-        delta = prepared.solve_K(b - prepared.assembly.multiply_K(x))
+        x = prepared.assembly.K.solve(b)
+        delta = prepared.assembly.K.solve(b - prepared.assembly.K.multiply(x))
         x = x + delta
         return load.g - A.T @ x, abs(load.g) + abs(A).T @ (abs(x) + abs(delta).max() / EPS)
 

@@ -20,10 +20,10 @@ import numpy as np
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Vector
-from problems.forms.banded_inverse import BandedInverse, banded_inverse
+from problems.forms.banded_inverse import BandedInverse
 from problems.forms.compliance import AnyQ
-from problems.forms.sparse_factor import NotPositiveDefinite
-from problems.forms.sparse_prepared import SparsePrepared
+from problems.forms.prepared import Prepared
+from problems.stiffness.block import NotPositiveDefinite
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
 from solvers.dense_dual import first_point
 from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
@@ -31,6 +31,7 @@ from solvers.gradient_projection.proportioning import Proportioning, SparsePropo
 from solvers.kkt import kkt_status
 from solvers.sparse_dual import with_p, with_x
 
+NO_BAND = "no banded M ≈ Q⁻¹: K has no band, or its contacts lie all over an area"
 PRECONDITIONERS = ("band", "face", "none")
 
 
@@ -41,7 +42,7 @@ class _Ready:
     Q: AnyQ
     diagonal: Vector
     metric: Callable[[], Metric]
-    prepared: SparsePrepared | None = None
+    prepared: Prepared | None = None
     start: WarmStart | None = None
 
     def proportioning(self, load: LoadCase, metric: Metric) -> Proportioning:
@@ -93,28 +94,17 @@ class Mprgp(Solver):
 
         A failed answer if M finds Q indefinite, and in the sparse form if K is, or has no M.
         """
-        if data.form == "sparse":
-            return self._sparse(data)
-        Q, nodes = data.Q, data.assembly.contact_nodes
-        diagonal = np.diag(Q).copy()
-        if self.preconditioner == "none":
+        prepared = data.prepared if data.form == "sparse" else None
+        Q: AnyQ = data.prepared.compliance if prepared else data.Q
+        if not prepared and self.preconditioner == "none":
+            diagonal = np.diag(data.Q).copy()
             return _Ready(Q, diagonal, self._metric(Q, diagonal, None))
         try:
-            M = banded_inverse(Q, nodes)
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
-        return _Ready(Q, diagonal, self._metric(Q, diagonal, M))
-
-    def _sparse(self, data: Problem) -> _Ready | Answer:
-        prepared = data.prepared
-        assert isinstance(prepared, SparsePrepared)
-        try:
-            near = prepared.approximate_inverse
+            near = data.prepared.approximate_inverse
         except NotPositiveDefinite as error:
             return failed(f"K is not positive definite: {error}")
         if near is None:
-            return failed("no banded M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
-        Q = prepared.compliance
+            return failed(NO_BAND if prepared else "Q is not positive definite")
         return _Ready(Q, near.diagonal, self._metric(Q, near.diagonal, near.M), prepared)
 
     def _metric(self, Q: AnyQ, diagonal: Vector, M: BandedInverse | None) -> Callable[[], Metric]:

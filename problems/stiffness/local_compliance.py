@@ -1,4 +1,4 @@
-"""Q = AᵀK⁻¹A for contacts near each other, from the band factors of K's blocks, without the others."""
+"""Q = AᵀK⁻¹A for contacts near each other, from the selected inverse of K's blocks, without the others."""
 
 from __future__ import annotations
 
@@ -7,24 +7,42 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
-from .assembly import Assembly, Matrix
-from .near_inverse import NearInverse, Rows, near_inverse
-from .sparse_factor import BandFactor, Renumbered
+from .selected_inverse import SelectedInverse, selected_inverse
 
 FURTHEST = 20  # half-bandwidths between the contacts of a window
 SMALL = 2000  # unknowns between them that are never too many
 
+Rows = NDArray[np.intp]
+Matrix = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
-class _OfBlock:
+class BlockPart:
     """A block's part of Q. places, values : (s, m) the entries of each contact in A, as indices into
     `inverse.rows` and zero-padded values.
     """
 
-    inverse: NearInverse
+    inverse: SelectedInverse
     places: Rows
     values: Matrix
+
+    @classmethod
+    def of(cls, L: Matrix, A: sp.csc_array, windows: Sequence[Rows], single: bool) -> BlockPart | None:
+        """From the band factor K = LLᵀ, for the contacts in each window; in single or double precision.
+
+        None if those of a window are too far apart in the numbering of the band.
+        """
+        places, values = _padded(A)
+        reach = 0
+        for contacts in windows:
+            used = places[:, contacts][values[:, contacts] != 0]
+            reach = max(reach, int(np.ptp(used)) if used.size else 0)
+        if reach > max(FURTHEST * len(L), SMALL):
+            return None
+        rows = np.unique(A.indices).astype(np.intp)
+        return cls(selected_inverse(L, rows, reach, single), np.searchsorted(rows, places), values)
 
     def add_to(self, Q: Matrix, contacts: Rows) -> None:
         places, values = self.places[:, contacts], self.values[:, contacts]
@@ -40,45 +58,17 @@ class _OfBlock:
 
 
 @dataclass(frozen=True)
-class NearCompliance:
+class LocalCompliance:
     """Q_WW for the windows W that it was made for."""
 
-    blocks: tuple[_OfBlock, ...]
+    parts: tuple[BlockPart, ...]
 
-    def submatrix(self, contacts: Rows) -> Matrix:
+    def __call__(self, contacts: Rows) -> Matrix:
         """(k, k), mm/N, stored by columns."""
         Q = np.zeros((len(contacts), len(contacts)), order="F")
-        for block in self.blocks:
-            block.add_to(Q, contacts)
+        for part in self.parts:
+            part.add_to(Q, contacts)
         return Q
-
-
-def near_compliance(
-    assembly: Assembly,
-    factors: Sequence[BandFactor | Renumbered],
-    windows: Sequence[Rows],
-    single: bool = True,
-) -> NearCompliance | None:
-    """Of the contacts in each window, in single or double precision.
-
-    None if those of a window are too far apart in the numbering of a band.
-    """
-    made = []
-    for found, unknowns in zip(factors, assembly.slices, strict=True):
-        A, factor = sp.csc_array(assembly.A[unknowns]), found
-        if isinstance(factor, Renumbered):
-            A, factor = sp.csc_array(A[factor.order]), factor.band
-        places, values = _padded(A)
-        reach = 0
-        for contacts in windows:
-            used = places[:, contacts][values[:, contacts] != 0]
-            reach = max(reach, int(np.ptp(used)) if used.size else 0)
-        if reach > max(FURTHEST * len(factor.L), SMALL):
-            return None
-        rows = np.unique(A.indices).astype(np.intp)
-        inverse = near_inverse(factor, rows, reach, single)
-        made.append(_OfBlock(inverse, np.searchsorted(rows, places), values))
-    return NearCompliance(tuple(made))
 
 
 def _padded(A: sp.csc_array) -> tuple[Rows, Matrix]:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import blas, lapack
 
-from .assembly import Matrix
+from .block import Matrix
 
 PANEL = 64  # rows; a narrower band is solved by dpbtrs
 FEW = 2  # right-hand sides, for which dpbtrs is as fast

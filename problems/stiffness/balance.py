@@ -1,4 +1,4 @@
-"""Units in which the unknowns of a model weigh alike, and the condition number of K in them."""
+"""Units in which the unknowns of a model weigh alike, and the least eigenvalue of K in them."""
 
 from __future__ import annotations
 
@@ -6,17 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .assembly import Assembly, Vector
+from .block import Vector
 
 POWER_STEPS = 5
 
 
-def balanced_units(assembly: Assembly) -> Vector:
+def balanced_units(diagonal: Vector) -> Vector:
     """D (n,), powers of two, D_i √K_ii between 1/√2 and √2; 1 where K_ii is not positive.
 
     The unknowns of a finite-element model have mixed units (mm, 1, 1/mm); DKD has the digits of K.
     """
-    diagonal = assembly.diagonal_K()
     positive = diagonal > 0
     return np.exp2(np.where(positive, -np.round(np.log2(np.where(positive, diagonal, 1.0)) / 2), 0.0))
 

@@ -20,8 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
-from .sparse_factor import BandFactor
-
 UNBLOCKED = 64  # LAPACK's inverse of a triangle is slower than products beyond that
 
 Rows = NDArray[np.intp]
@@ -29,7 +27,7 @@ Entries = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)
-class NearInverse:
+class SelectedInverse:
     """K⁻¹ at rows that are at most some distance apart.
 
     rows : the unknowns asked for, ascending. starts : (blocks + 1,) where each block's begin among them.
@@ -55,9 +53,9 @@ class NearInverse:
         return Z
 
 
-def near_inverse(factor: BandFactor, rows: Rows, reach: int, single: bool = True) -> NearInverse:
+def selected_inverse(L: NDArray[np.float64], rows: Rows, reach: int, single: bool = True) -> SelectedInverse:
     """K⁻¹ at pairs of `rows`, ascending, that are at most `reach` unknowns apart. single : the precision."""
-    L, dtype = factor.L, np.dtype(np.float32 if single else np.float64)
+    dtype = np.dtype(np.float32 if single else np.float64)
     trmm = blas.strmm if single else blas.dtrmm
     size = L.shape[1]
     width = max(L.shape[0] - 1, 1)
@@ -83,7 +81,7 @@ def near_inverse(factor: BandFactor, rows: Rows, reach: int, single: bool = True
         own = rows[starts[i] : starts[i + 1]] - edges[i]
         columns = np.asfortranarray(np.hstack([Z[:, own], after]))
         panels[i] = columns[own]
-    return NearInverse(rows, starts, tuple(panels))
+    return SelectedInverse(rows, starts, tuple(panels))
 
 
 def band_blocks(

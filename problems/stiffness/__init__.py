@@ -1,0 +1,1 @@
+"""The stiffness matrix K as an operator: dense, banded or general sparse diagonal blocks."""

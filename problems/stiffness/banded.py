@@ -1,0 +1,136 @@
+"""A sparse block with a narrow band, in some numbering: K = LLᵀ in (b + 1) N numbers, LAPACK's dpbtrf."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.linalg import blas, lapack
+
+from .band_solve import band_solve
+from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector
+from .local_compliance import BlockPart, Rows
+from .rounding import U, gamma
+from .selected_inverse import band_blocks
+
+COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
+LOST = 2.0**-50  # of an unknown's stiffness: a smaller pivot is but the rounding of a zero
+
+
+class BandedBlock(SparseBlock):
+    """order : the unknowns in the order of the band; None as they are. width : the half-bandwidth b then."""
+
+    def __init__(self, matrix: sp.csc_array, width: int, order: Rows | None = None) -> None:
+        super().__init__(matrix)
+        self.width, self.order = width, order
+
+    @cached_property
+    def L(self) -> Matrix:
+        """(b + 1, N), column-major: L[j + d, j] in row d. Raises NotPositiveDefinite."""
+        band = lower_band(self._ordered(self.matrix))
+        smallest = LOST * band[0]
+        L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
+        lost = [int(info) - 1] if info else np.flatnonzero(L[0] ** 2 <= smallest)
+        if len(lost):
+            raise NotPositiveDefinite(int(lost[0] if self.order is None else self.order[lost[0]]))
+        return L
+
+    def _ordered(self, M: sp.csc_array) -> sp.csc_array:
+        return M if self.order is None else sp.csc_array(M[self.order][:, self.order])
+
+    def factor(self) -> list[NDArray[Any]]:
+        return [self.L]
+
+    @property
+    def numbers(self) -> int:
+        return self.size * (self.width + 1)
+
+    def solve(self, b: Matrix) -> Matrix:
+        if self.order is None:
+            return band_solve(self.L, b)
+        x = np.empty_like(b)
+        x[self.order] = band_solve(self.L, b[self.order])
+        return x
+
+    def shifted(self, D: Vector, s: float) -> float | None:
+        """As for a dense block, but no sum has more than b + 1 terms (Higham 2002, theorem 10.3)."""
+        band = lower_band(self._ordered(self.balanced(D)))
+        band[0] -= s
+        largest = float(abs(band[0]).max())
+        L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
+        return None if info else gamma(2 * (len(L) + 1)) * _norm(L) + U * (largest + abs(s))
+
+    def compliance(self, A: sp.csc_array) -> Matrix:
+        """With Y = L⁻¹A it is YᵀY. In blocks of unknowns as wide as the band, each block of Y needs only the
+        one before,
+
+            L_ii Y_i = A_i − L_{i,i−1} Y_{i−1},        Q = Σ_i Y_iᵀ Y_i,
+
+        in matrix–matrix operations, where K⁻¹A by `solve` would read the band once for each contact.
+        """
+        A = self._rows(A)
+        size, width, m = self.size, max(len(self.L) - 1, 1), A.shape[1]
+        # A contact is zero in Y before its first unknown: with these ascending, the first columns are enough.
+        first, some = np.full(m, size), np.diff(A.indptr) > 0
+        if some.any():
+            first[some] = np.minimum.reduceat(A.indices, A.indptr[:-1][some])
+        order = np.argsort(first, kind="stable")
+        begun = np.searchsorted(first[order], np.arange(width, size + width, width))
+        rows = sp.csr_array(A[:, order])
+        found, Y, below = (np.zeros(shape, order="F") for shape in ((m, m), (0, 0), (0, 0)))
+        for start, count in zip(range(0, size, width), begun, strict=True):
+            if count == 0:
+                continue
+            stop = min(start + width, size)
+            right = rows[start:stop, :count].toarray(order="F")
+            if Y.size:
+                right[:, : Y.shape[1]] -= below @ Y
+            diagonal, below = band_blocks(self.L, start, stop, width, np.dtype(float))
+            Y = blas.dtrsm(1.0, diagonal, right, lower=1, overwrite_b=1)
+            found[:count, :count] += Y.T @ Y
+        Q = np.empty_like(found)
+        Q[np.ix_(order, order)] = found
+        return Q
+
+    def local_compliance(self, A: sp.csc_array, windows: Sequence[Rows], single: bool) -> BlockPart | None:
+        return BlockPart.of(self.L, self._rows(A), windows, single)
+
+    def _rows(self, A: sp.csc_array) -> sp.csc_array:
+        return A if self.order is None else sp.csc_array(A[self.order])
+
+
+def half_bandwidth(K: sp.csc_array) -> int:
+    """max |i − j| over the entries of K."""
+    columns = np.repeat(np.arange(K.shape[1], dtype=K.indices.dtype), np.diff(K.indptr))
+    return int((K.indices - columns).max(initial=0))
+
+
+def lower_band(K: sp.csc_array) -> Matrix:
+    """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth."""
+    if not K.has_canonical_format:
+        K = K.copy()
+        K.sum_duplicates()
+    size, width = K.shape[0], half_bandwidth(K)
+    band = np.empty((width + 1, size), order="F")  # in large pages, where zeros() would be given small ones
+    entries = band.ravel(order="K")
+    for start in range(0, size, COLUMNS_AT_A_TIME):
+        stop = min(start + COLUMNS_AT_A_TIME, size)
+        band[:, start:stop] = 0.0
+        stored = slice(K.indptr[start], K.indptr[stop])
+        columns = np.repeat(np.arange(start, stop), np.diff(K.indptr[start : stop + 1]))
+        rows, values = K.indices[stored], K.data[stored]
+        lower = rows >= columns
+        # row − column + column (width + 1)
+        entries[columns[lower] * width + rows[lower]] = values[lower]
+    return band
+
+
+def _norm(L: Matrix) -> float:
+    """‖|L||L|ᵀ‖_∞ ≥ ‖|L||L|ᵀ‖₂, but for a relative rounding of 4bu."""
+    np.abs(L, out=L)
+    width, v = len(L) - 1, np.ones(L.shape[1])
+    return float(blas.dtbmv(width, L, blas.dtbmv(width, L, v, lower=1, trans=1), lower=1).max())

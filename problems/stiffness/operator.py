@@ -1,0 +1,216 @@
+"""K = blockdiag(K_1, …, K_p) as an operator: products, solutions, rows, bounds, whatever its blocks are."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from .balance import balanced_units, least_eigenvalue
+from .block import Block, Matrix, NotPositiveDefinite, Vector
+from .dense import DenseBlock
+from .local_compliance import LocalCompliance, Rows
+from .sparse import sparse_block
+
+DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
+
+
+class Stiffness:
+    """K (n, n), N/mm, symmetric positive definite.
+
+    Parameters
+    ----------
+    blocks : its diagonal blocks.
+    factor : makes their factors, once, when K⁻¹ is first needed, in place of `factor_blocks`: it may take
+        them from a cache, or say in an error whose K it is.
+    """
+
+    def __init__(self, blocks: Sequence[Block], factor: Callable[[Stiffness], None] | None = None) -> None:
+        self.blocks = tuple(blocks)
+        self._make = factor or Stiffness.factor_blocks
+        ends = np.cumsum([0, *(block.size for block in self.blocks)])
+        self.slices = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        self.size = int(ends[-1])
+
+    @classmethod
+    def of(cls, *matrices: Any, nodes: Matrix | None = None) -> Stiffness:
+        """With these diagonal blocks, dense or sparse, not copied. nodes : (n, 2) of the unknowns."""
+        ends = np.cumsum([0, *(K.shape[0] for K in matrices)])
+        return cls(
+            [
+                sparse_block(sp.csc_array(K), None if nodes is None else nodes[start : start + K.shape[0]])
+                if sp.issparse(K)
+                else DenseBlock(K)
+                for K, start in zip(matrices, ends, strict=False)
+            ]
+        )
+
+    @property
+    def dense(self) -> bool:
+        """Whether every block is stored as a dense matrix."""
+        return all(isinstance(block, DenseBlock) for block in self.blocks)
+
+    def as_sparse(self, nodes: Matrix | None = None) -> Stiffness:
+        """The same K with sparse blocks; itself, if they are."""
+        if not any(isinstance(block, DenseBlock) for block in self.blocks):
+            return self
+        return Stiffness.of(*map(sp.csc_array, self.matrices), nodes=nodes)
+
+    def as_dense(self) -> Stiffness:
+        """The same K with dense blocks; itself, if they are."""
+        return self if self.dense else Stiffness.of(*dense_blocks(sp.csr_array(self.matrix)))
+
+    @property
+    def matrix(self) -> sp.csc_array:
+        """K as one sparse matrix; not copied, if it is a single one."""
+        if len(self.blocks) == 1:
+            return sp.csc_array(self.matrices[0])
+        return sp.csc_array(sp.block_diag(self.matrices, format="csc"))
+
+    @property
+    def matrices(self) -> tuple[Any, ...]:
+        """The matrix of each block."""
+        return tuple(block.matrix for block in self.blocks)
+
+    @property
+    def arrays(self) -> list[NDArray[Any]]:
+        """The arrays that hold K."""
+        return [array for block in self.blocks for array in block.arrays]
+
+    def multiply(self, x: Matrix) -> Matrix:
+        """K x, x (n,) or (n, k)."""
+        return np.concatenate([block.multiply(x[rows]) for block, rows in self._own_rows()])
+
+    def solve(self, b: Matrix) -> Matrix:
+        """K⁻¹ b, b (n,) or (n, k). Raises NotPositiveDefinite, or what `factor` raises."""
+        _ = self.factors
+        return np.concatenate([block.solve(b[rows]) for block, rows in self._own_rows()])
+
+    def _own_rows(self) -> Iterator[tuple[Block, slice]]:
+        return zip(self.blocks, self.slices, strict=True)
+
+    @cached_property
+    def factors(self) -> list[NDArray[Any]]:
+        """The arrays of the factors, made now if they were not."""
+        self._make(self)
+        return [array for block in self.blocks for array in block.factor()]
+
+    @property
+    def factored(self) -> bool:
+        """Whether the factors were made."""
+        return "factors" in vars(self)
+
+    @property
+    def numbers(self) -> int:
+        """The float64 that the factors hold."""
+        return sum(block.numbers for block in self.blocks)
+
+    @property
+    def work(self) -> float:
+        """Operations of a factorisation: about the entries of each column of a factor, squared."""
+        return sum(block.numbers**2 / block.size for block in self.blocks)
+
+    def factor_blocks(self) -> None:
+        """Raises NotPositiveDefinite, with the number of an unknown that moves."""
+        for block, rows in self._own_rows():
+            try:
+                block.factor()
+            except NotPositiveDefinite as error:
+                raise NotPositiveDefinite(rows.start + error.unknown) from error
+
+    @cached_property
+    def diagonal(self) -> Vector:
+        """(n,) N/mm."""
+        return np.concatenate([block.diagonal() for block in self.blocks])
+
+    @cached_property
+    def units(self) -> Vector:
+        """D (n,), the units in which the unknowns weigh alike (see `balanced_units`)."""
+        return balanced_units(self.diagonal)
+
+    def panels(self) -> Iterator[tuple[slice, slice, Any]]:
+        """(rows, columns, K[rows, columns]) of all rows, some at a time, dense or csr; K is zero beside."""
+        for block, own in self._own_rows():
+            for rows, panel in block.panels():
+                yield slice(own.start + rows.start, own.start + rows.stop), own, panel
+
+    def absolute_sums(self, D: Vector) -> Vector:
+        """|K|D, (n,), but for rounding."""
+        sums = np.empty(self.size)
+        for rows, columns, panel in self.panels():
+            sums[rows] = abs(panel) @ D[columns]
+        return sums
+
+    @cached_property
+    def norm(self) -> float:
+        """‖K‖_∞ = max_i Σ_j |K_ij|, N/mm, but for rounding."""
+        return float(self.absolute_sums(np.ones(self.size)).max(initial=0.0))
+
+    def least_eigenvalues(self, D: Vector) -> list[float]:
+        """About λmin of each block of DKD, no smaller."""
+        _ = self.factors
+        return [least_eigenvalue(block.solve, D[rows]) for block, rows in self._own_rows()]
+
+    def condition(self, D: Vector) -> float:
+        """About the condition number of DKD, whose largest eigenvalue is at most ‖DKD‖_∞."""
+        least = min(self.least_eigenvalues(D))
+        return float((self.absolute_sums(D) * D).max()) / least if least > 0 else np.inf
+
+    def scaled(self, D: Vector) -> Stiffness:
+        """DKD, sparse."""
+        pairs = zip(self.as_sparse().blocks, self.slices, strict=True)
+        return Stiffness.of(*(block.balanced(D[rows]) for block, rows in pairs))  # type: ignore[attr-defined]
+
+    def compliance(self, A: sp.csc_array) -> Matrix:
+        """Q = AᵀK⁻¹A, (m, m), mm/N, by columns."""
+        m = A.shape[1]
+        Q = np.zeros((m, m))
+        _ = self.factors
+        for block, rows in self._own_rows():
+            if m:
+                Q += block.compliance(sp.csc_array(A[rows]))
+        return np.asfortranarray((Q + Q.T) / 2)
+
+    def local_compliance(
+        self, A: sp.csc_array, windows: Sequence[Rows], single: bool = True
+    ) -> LocalCompliance | None:
+        """Q_WW of windows of contacts, in single precision to four digits, for a preconditioner; None unless
+        every block has a band along which the contacts of a window are near each other.
+        """
+        _ = self.factors
+        parts = []
+        for block, rows in self._own_rows():
+            part = block.local_compliance(sp.csc_array(A[rows]), windows, single)
+            if part is None:
+                return None
+            parts.append(part)
+        return LocalCompliance(tuple(parts))
+
+
+def dense_blocks(K: sp.csr_array) -> list[Matrix]:
+    """The diagonal blocks of a sparse K, by columns."""
+    return [K[rows, rows].toarray(order="F") for rows in dense_slices(K)]
+
+
+def dense_slices(K: sp.csr_array) -> list[slice]:
+    """The unknowns of each dense block of a sparse K: bodies, neighbours put together while they have no more
+    unknowns than the largest, or `DENSE_BLOCK`. One block, where the bodies' unknowns are interleaved.
+    """
+    count, label = connected_components(K, directed=False)
+    starts = np.flatnonzero(np.diff(label, prepend=-1))
+    if len(starts) != count:
+        starts = starts[:1]
+    ends = np.append(starts[1:], K.shape[0])
+    most = max(int((ends - starts).max()), DENSE_BLOCK)
+    found, begin = [], 0
+    for end, following in itertools.pairwise([*ends.tolist(), K.shape[0] + most + 1]):
+        if following - begin > most:
+            found.append(slice(begin, end))
+            begin = end
+    return found
