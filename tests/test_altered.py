@@ -20,7 +20,7 @@ from harness.verification.batched.bound import gaps as batched_gaps
 from harness.verification.batched.residual import refined, residual, split
 from harness.verification.certificate import certify
 from harness.verification.exact_residual import DoubleDouble, forces, gaps
-from harness.verification.reference import UNPROVEN, refined_active_set
+from harness.verification.reference import UNPROVEN, best_of_candidates
 from problems.build import load_case, prepared
 from problems.forms.alteration import Alteration
 from problems.forms.assembly import Assembly, LoadCase
@@ -124,7 +124,7 @@ def test_the_bounds_hold_for_what_was_given(tmp_path: Path, make: Make, conditio
         np.savez(path, **data)
         made, load = prepared(read_scene(str(path))), load_case(read_scene(str(path)))
         assert made.assembly.altered
-        known = refined_active_set(made, load)
+        known = best_of_candidates(made, load)
         load = LoadCase(load.f, load.g, made.dual_load(load))
         (vouched,) = assess(Bound.of(made), [load], [known.lam], [None])
         K, A, f, g = (rational(data[key]) for key in "KAfg")
@@ -323,6 +323,6 @@ def test_block_each_alteration_of_the_constants_counts() -> None:
 def test_a_load_that_overflows_is_not_called_proven(f: float) -> None:
     K = np.array([[2.0, -1.0], [-1.0, 2.0]])
     made = Prepared(Assembly(Stiffness.of(np.asfortranarray(K)), sp.csc_array(np.eye(2))))
-    found = refined_active_set(made, LoadCase(np.full(2, f), np.zeros(2)))
+    found = best_of_candidates(made, LoadCase(np.full(2, f), np.zeros(2)))
     assert found.bound_mm == np.inf
     assert found.route == UNPROVEN

@@ -11,7 +11,7 @@ import pytest
 import scipy.sparse as sp
 
 from harness.verification.judge import Judgement, conditioned_limit, judge
-from harness.verification.reference import Reference
+from harness.verification.judge import Reference
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness

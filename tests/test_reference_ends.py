@@ -19,7 +19,7 @@ from harness.verification import principal_pivoting
 from harness.verification.interior_point import interior_contact_set
 from harness.verification.judge import Judgement
 from harness.verification.principal_pivoting import contact_set
-from harness.verification.reference import STOPPED, reference, refined_active_set
+from harness.verification.reference import STOPPED, reference, best_of_candidates
 from harness.verification.reference_problem import reference_problem
 from problems.forms.prepared import Prepared
 from problems.manufactured.ladder import make_rung
@@ -65,7 +65,7 @@ def test_the_interior_point_finds_the_set_of_the_refined_answer(seed: int, pairs
     """Where every contact is clearly closed or open; in any units of force and length."""
     prepared = make_prepared(seed, pairs, tools)
     case, load = make_load(seed + 1, prepared)
-    known = refined_active_set(prepared, case)
+    known = best_of_candidates(prepared, case)
     y = prepared.Q @ known.lam - load.p
     clear = np.maximum(known.lam * np.diag(prepared.Q), y) > 1e-9 * abs(load.p).max()
     for scale in (1.0, 2.0**60, 2.0**-60):

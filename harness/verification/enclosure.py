@@ -92,7 +92,7 @@ class Residual:
 
     def __init__(self, value: Matrix) -> None:
         self.hi, self.lo = np.array(value), np.zeros(value.shape)
-        self.error = gamma(TERMS) ** 2 * abs(value) + ETA * (value != 0)
+        self.error = ETA * (value != 0)  # a value in other units may be rounded to a multiple of η
 
     def subtract_product(self, panels: Iterable[Panel], longest: int, x: DoubleDouble) -> None:
         """Mx, x (columns of M, k). panels : of M, no row with more entries."""
@@ -108,6 +108,7 @@ class Residual:
         )
         # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one; by the second half
         # of x M₃ is left out.
+        # Σ|terms| ≤ |Σ| + 2 Σ|products|, of which |Σ| is within the rounding of the sum.
         rounding, again = gamma(longest + 8), 4 * gamma(TERMS) ** 2
         of_M1, of_M2, of_M3 = (
             rounding * most3 + again * most,
