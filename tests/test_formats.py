@@ -33,6 +33,7 @@ from problems.forms.prepared import Prepared
 from problems.input.digits import apparent_digits, expected_error
 from problems.model.scene import JointScene
 from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
 
 ROOT = Path(__file__).parents[1]
 QUIET = Console(file=StringIO())
@@ -195,8 +196,6 @@ from pathlib import Path
 import numpy as np
 
 from problems.formats import Data
-from problems.stiffness.operator import Stiffness
-from problems.stiffness.operator import Stiffness
 
 DESCRIPTION = "a file .plain of f"
 SUFFIXES = (".plain",)

@@ -80,7 +80,7 @@ def test_the_free_boundary_is_found_by_another_code() -> None:
     """SciPy's bounded least squares: with K = LLᵀ the problem is min ‖Lᵀx − L⁻¹f‖ with bounds on x."""
     scene = read_scene("outside/obstacle/20")
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
-    K = data.assembly.sparse_blocks[0].toarray()
+    K = data.assembly.K.matrix.toarray()
     L = np.linalg.cholesky(K)
     found = scipy.optimize.lsq_linear(L.T, np.linalg.solve(L, load.f), (-load.g, np.inf), tol=1e-14)
     known, _ = solved("outside/obstacle/20")

@@ -137,7 +137,7 @@ def protect(problem: Problem) -> None:
     """Make the arrays that the solver is given read-only."""
     assembly, stages = problem.assembly, vars(problem.prepared)
     factors = assembly.K.factors if assembly.K.factored else ()
-    made = [*assembly.K.matrices, *factors, stages.get("Q"), assembly.A, assembly.nodes]
+    made = [*assembly.K.arrays, *factors, stages.get("Q"), assembly.A, assembly.nodes]
     for matrix in made:
         if sp.issparse(matrix) and matrix.data.flags.writeable:
             matrix.sum_duplicates()  # as scipy would in place, when it is first asked for |A|

@@ -20,11 +20,12 @@ def balanced_units(diagonal: Vector) -> Vector:
     return np.exp2(np.where(positive, -np.round(np.log2(np.where(positive, diagonal, 1.0)) / 2), 0.0))
 
 
-def least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector) -> float:
+def least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector, steps: int = POWER_STEPS) -> float:
     """About λmin(DKD), no smaller, by the power method on its inverse. solve : b → K⁻¹b."""
     v = np.random.default_rng(0).standard_normal(len(D))
     largest = 0.0
-    for _ in range(POWER_STEPS):
+    for _ in range(steps):
+        v = v / abs(v).max()  # whose square does not overflow
         v = v / np.linalg.norm(v)
         w = solve(v / D) / D
         largest, v = float(v @ w), w

@@ -110,10 +110,7 @@ def half_bandwidth(K: sp.csc_array) -> int:
 
 
 def lower_band(K: sp.csc_array) -> Matrix:
-    """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth."""
-    if not K.has_canonical_format:
-        K = K.copy()
-        K.sum_duplicates()
+    """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth. K : without duplicates."""
     size, width = K.shape[0], half_bandwidth(K)
     band = np.empty((width + 1, size), order="F")  # in large pages, where zeros() would be given small ones
     entries = band.ravel(order="K")

@@ -85,9 +85,12 @@ class Block(ABC):
 
 
 class SparseBlock(Block):
-    """matrix : csc_array, sorted, without duplicates."""
+    """matrix : csc_array; copied only to be sorted and to add up what is given several times."""
 
     def __init__(self, matrix: sp.csc_array) -> None:
+        if not matrix.has_canonical_format:
+            matrix = matrix.copy()
+            matrix.sum_duplicates()
         self.matrix = matrix
 
     @property

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from .balance import balanced_units, least_eigenvalue
+from .balance import POWER_STEPS, balanced_units, least_eigenvalue
 from .block import Block, Matrix, NotPositiveDefinite, Vector
 from .dense import DenseBlock
 from .local_compliance import LocalCompliance, Rows
@@ -40,7 +40,7 @@ class Stiffness:
 
     @classmethod
     def of(cls, *matrices: Any, nodes: Matrix | None = None) -> Stiffness:
-        """With these diagonal blocks, dense or sparse, not copied. nodes : (n, 2) of the unknowns."""
+        """With these diagonal blocks, dense or sparse. nodes : (n, 2) of the unknowns."""
         ends = np.cumsum([0, *(K.shape[0] for K in matrices)])
         return cls(
             [
@@ -152,10 +152,10 @@ class Stiffness:
         """‖K‖_∞ = max_i Σ_j |K_ij|, N/mm, but for rounding."""
         return float(self.absolute_sums(np.ones(self.size)).max(initial=0.0))
 
-    def least_eigenvalues(self, D: Vector) -> list[float]:
+    def least_eigenvalues(self, D: Vector, steps: int = POWER_STEPS) -> list[float]:
         """About λmin of each block of DKD, no smaller."""
         _ = self.factors
-        return [least_eigenvalue(block.solve, D[rows]) for block, rows in self._own_rows()]
+        return [least_eigenvalue(block.solve, D[rows], steps) for block, rows in self._own_rows()]
 
     def condition(self, D: Vector) -> float:
         """About the condition number of DKD, whose largest eigenvalue is at most ‖DKD‖_∞."""
