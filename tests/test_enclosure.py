@@ -1,4 +1,4 @@
-"""Residuals against rational arithmetic: the error bounds hold, each of their terms counts, and they are small."""
+"""Residuals against rational arithmetic: the error bounds hold, are small, and each of their terms counts."""
 
 from __future__ import annotations
 
@@ -167,7 +167,10 @@ def test_the_residuals_of_a_problem_in_its_units(kind: str, seed: int) -> None:
     both = np.hstack([K.matrix.toarray(), A])
     for k, case in enumerate(loads):
         at = doubled(np.vstack([made.D * x.hi, made.R * lam.hi]))
-        force, gap = wanted_of(case.f[:, None], both, at[:, [k]], 0), wanted_of(case.g[:, None], A.T, at[:16, [k]], 0)
+        force, gap = (
+            wanted_of(case.f[:, None], both, at[:, [k]], 0),
+            wanted_of(case.g[:, None], A.T, at[:16, [k]], 0),
+        )
         units = exactly(made.D[:, 0]), exactly(made.R[:, 0])
         assert max(missed(r, k, [d * v for d, v in zip(units[0], force, strict=True)])) <= 0
         assert max(missed(s, k, [d * v for d, v in zip(units[1], gap, strict=True)])) <= 0

@@ -4,10 +4,10 @@ Sums are error-free: two_sum returns the rounding error beside the result (Knuth
 their rounding errors (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26:1955–1988, 2005):
 |Σ computed − Σ| ≤ u|Σ| + γ²_k Σ|terms|, u = 2⁻⁵³, γ_k = ku/(1 − ku).
 
-Products Mx are sliced (Ozaki, Ogita, Oishi and Rump, Numer. Algorithms 59:95–118, 2012): M = M₁ + M₂ + M₃ and
-x = x₁ + x₂ + x₃, where M₁, M₂, x₁ and x₂ have so few bits b that M₁x₁, M₁x₂ and M₂x₁ are exact in any order of
-summation: c products of 2b bits have a sum of at most 53 bits if 2(b − 1) + log₂ c ≤ 53, c the entries of the
-longest row. The other products, M₁x₃, M₂(x₂ + x₃) and M₃x, are 2⁻²ᵇ times smaller, and so is their rounding:
+Products Mx are sliced (Ozaki, Ogita, Oishi and Rump, Numer. Algorithms 59:95–118, 2012): M = M₁ + M₂ + M₃,
+x = x₁ + x₂ + x₃, where M₁, M₂, x₁ and x₂ have so few bits b that M₁x₁, M₁x₂ and M₂x₁ are exact in any order
+of summation: c products of 2b bits have a sum of at most 53 bits if 2(b − 1) + log₂ c ≤ 53, c the entries of
+the longest row. The other products, M₁x₃, M₂(x₂ + x₃) and M₃x, are 2⁻²ᵇ times smaller; so is their rounding:
 |fl(Pv) − Pv| ≤ γ_c |P||v| ≤ γ_c (Σ_j |P|_ij) max|v|.
 
 A product that underflows is off by η = 2⁻¹⁰⁷⁴ at most; additions are exact there. What overflows ends as

@@ -5,8 +5,8 @@ x and λ ≥ 0 with C = {λ > 0} are the exact answer of another problem, f̃ = 
     r = f − Kx − Aλ,    s = g − Aᵀx,    δ_i = −s_i for i in C,    δ_i = max(−s_i, 0) else.
 
 The answer is P(K⁻¹f), P the projection onto {Aᵀx ≤ g} in the norm of K. From f to f̃ it moves by at most
-‖r‖_{K⁻¹}. From g to g̃ the set is translated by d = A(AᵀA)⁻¹δ, and P then moves by at most ‖d‖_K, because I − P
-is nonexpansive. So, in balanced units (see `balanced`), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
+‖r‖_{K⁻¹}. From g to g̃ the set is translated by d = A(AᵀA)⁻¹δ, and P then moves by at most ‖d‖_K, because
+I − P is nonexpansive. So, in balanced units (see `balanced`), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
 
     |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).
 
@@ -15,8 +15,8 @@ matter where λ came from. The bound is made small by a refinement of x and λ_C
 
     x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
 
-by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M ≈ Q⁻¹ (see `near`). Load cases
-are columns, left out when done.
+by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M ≈ Q⁻¹ (see `near`). Load
+cases are columns, left out when done.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The reference that answers are compared with: forces from anywhere, refined, with a proven bound.
 
 Nothing is searched for here. Candidates are the problem's exact answer, if it was made from one, forces that
-the caller has, and the answers of the in-house methods in turn; each is refined and its error bounded from K, A,
-f and g alone (see `proof`), until a bound is at most a tenth of the limit. The bound does not depend on where
-the forces came from; the best one is kept.
+the caller has, and the answers of the in-house methods in turn; each is refined and its error bounded from K,
+A, f and g alone (see `proof`), until a bound is at most a tenth of the limit. The bound does not depend on
+where the forces came from; the best one is kept.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from harness.solving.candidates import candidates
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import MadeScene, Scene
+from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
@@ -28,6 +29,7 @@ from .definite import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
 from .proof import Proof, Proven
 
+ESTIMATED = 0.5  # of an estimate of λmin that is no smaller
 STOPPED = "no further method was tried"
 UNPROVEN = "could not be proven"
 KNOWN, ESTIMATED = 0.9, 0.5  # shares of λmin from Lanczos, and of an estimate that is no smaller
@@ -103,12 +105,15 @@ def proof_of(prepared: Prepared) -> Proof:
 
 def proven_lambda_min(prepared: Prepared) -> float:
     """κ ≤ λmin(DKD) in balanced units, from the cache if it was proven before for this assembly."""
-    K = prepared.assembly.K
     if prepared.key is None:
-        return smallest_eigenvalue(K, K.units)
+        return _proven_lambda_min(prepared.assembly.K)
     key = cache.digest("lambda_min", prepared.key, _code())
-    _, facts = cache.load_or_make(key, lambda: ({}, {"kappa": smallest_eigenvalue(K, K.units)}))
+    _, facts = cache.load_or_make(key, lambda: ({}, {"kappa": _proven_lambda_min(prepared.assembly.K)}))
     return float(facts["kappa"])
+
+
+def _proven_lambda_min(K: Stiffness) -> float:
+    return smallest_eigenvalue(K, K.units, [ESTIMATED * about for about in K.least_eigenvalues(K.units)])
 
 
 def _code() -> str:
