@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
-from springs import diagonal
-
 from harness.verification.batched.assess import assess
 from harness.verification.batched.bound import Bound, independence
 from harness.verification.batched.bound import gaps as batched_gaps
 from harness.verification.batched.residual import refined, residual, split
 from harness.verification.certificate import certify
 from harness.verification.exact_residual import DoubleDouble, forces, gaps
+from springs import diagonal
+
 from harness.verification.reference import UNPROVEN, best_of_candidates
 from problems.build import load_case, prepared
 from problems.forms.alteration import Alteration

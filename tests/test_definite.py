@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from lambda_min import proven, proven_in_units
 from sparse_matrices import band_matrix, chain, graph_matrix
 
+from harness.verification import definite
 from harness.verification.definite import independence
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness.operator import Stiffness
@@ -167,6 +168,13 @@ def test_independence_of_contacts() -> None:
     assert independence(sp.csc_array(sp.hstack([eye, eye]))) == 0.0
 
 
+def test_independence_counts_the_rounding_of_long_sums(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(definite, "SHARE", 1 - 2.0**-50)  # so that nothing else is left to spare
+    for entry in (0.1, 0.7, 1.1):
+        found = independence(sp.csc_array(np.full((4096, 1), entry)))
+        assert 0 < Fraction(found) <= 4096 * Fraction(entry) ** 2
+
+
 def test_independence_counts_the_rounding_of_its_products() -> None:
     a = np.array([[0.1, 0.3], [0.7, 0.9], [0.2, 0.4]])
     G = [[sum(Fraction(p) * Fraction(q) for p, q in zip(u, v, strict=True)) for v in a.T] for u in a.T]
@@ -174,4 +182,4 @@ def test_independence_counts_the_rounding_of_its_products() -> None:
     assert (G[0][0] - sigma2) * (G[1][1] - sigma2) >= G[0][1] ** 2
     nearly = np.array([[1.0, 1.0], [0.0, 2.0**-20]])  # λmin(AᵀA) is 2⁻⁴¹, a product is rounded by 2⁻⁵³
     assert 0 < independence(sp.csc_array(nearly)) <= 2.0**-41
-    assert independence(sp.csc_array(nearly * [[1.0], [2.0**-6]])) <= 2.0**-53
+    assert independence(sp.csc_array(nearly * [[1.0], [2.0**-4]])) == 0.0  # 2⁻⁴⁹

@@ -14,7 +14,7 @@ from harness.verification.enclosure import DoubleDouble, Enclosure, Residual, le
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.rounding import U, gamma
+from problems.stiffness.rounding import gamma
 
 ETA = 2.0**-1074
 WHOLE = slice(None)
@@ -69,9 +69,9 @@ def test_a_residual_lies_within_its_bound(kind: str, cases: int, seed: int) -> N
 
 #: n, and x and M with the only term of the product that is rounded; the least that its rounding may be.
 TERMS = {
-    "M1 x3": (1.0, 1 + 2.0**-50, 2.0**-50),
+    "M1 x3": (2 - 2.0**-20, 0.5 + 2.0**-48, (2 - 2.0**-20) * 2.0**-48),
     "M2 x2": (1 + 2.0**-26, 1 + 2.0**-26, 2.0**-52),
-    "M3 x": (1 + 2.0**-51, 1.0, 2.0**-51),
+    "M3 x": (1 + 2.0**-47, 1.0, 2.0**-47),
 }
 
 
@@ -85,15 +85,6 @@ def test_what_is_not_exact_is_in_doubt_by_the_size_of_its_terms(kind: str, term:
     found = residual_of(np.zeros((1, 1)), M, x, kind)
     assert found.value[0, 0] == 0.0
     assert gamma(n) * n * each <= found.error[0, 0] <= 100 * gamma(n) * n * each
-
-
-def test_what_is_left_out_counts() -> None:
-    """M₃ by the second half of x, where that cancels what x has beyond its slices."""
-    n = 64
-    M, x = np.full((1, n), 1 + 2.0**-51), doubled(np.full((n, 1), 1 + 2.0**-50), -(2.0**-50))
-    found = residual_of(np.full((1, 1), float(n)), M, x, "dense")
-    assert max(missed(found, 0, wanted_of(np.full((1, 1), float(n)), M, x, 0))) <= 0
-    assert found.error[0, 0] >= U * abs(found.value[0, 0]) + n * 2.0**-51 * 2.0**-50
 
 
 def test_the_rounding_of_the_sum_counts() -> None:
@@ -156,8 +147,7 @@ def test_the_residuals_of_a_problem_in_its_units(kind: str, seed: int) -> None:
         B, unit = rng.standard_normal((size, size)), 10.0 ** rng.uniform(-6, 6, size)
         K = (B @ B.T + np.eye(size)) * np.outer(unit, unit)
         blocks.append(np.asfortranarray(K + K.T) if kind == "dense" else sp.csc_array(K + K.T))
-    A = np.zeros((16, 5))
-    A[np.arange(5), np.arange(5)], A[9 + np.arange(5), np.arange(5)], A[15, 2] = 1.0, -0.3, 1e-3
+    A = rng.standard_normal((16, 5)) * (rng.random((16, 5)) < 0.7)
     K = Stiffness.of(*blocks)
     made = Balanced.of(Prepared(Assembly(K, sp.csc_array(A))))
     x, lam = doubled(wild(rng, 16, 2)), doubled(wild(rng, 5, 2))

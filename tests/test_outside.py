@@ -14,8 +14,7 @@ from synthetic_results import row, write_rows
 
 from harness.planning.road import chosen_form
 from harness.solving.answer import answer_of
-from harness.verification.judge import judge
-from harness.verification.judge import Reference
+from harness.verification.judge import Reference, judge
 from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
 from problems.errors import InputError

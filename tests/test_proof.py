@@ -140,6 +140,7 @@ def test_what_is_not_known_of_the_residuals_counts(kind: Any) -> None:
     assert bound(proof, LOAD, *at) < 1e-14
     assert 1e-3 <= bound(proof, LOAD, *at, s=1e-3) <= 1.03e-3
     assert 1e-3 <= bound(proof, LOAD, *at, r=4e-3) <= 4e-3
+    assert 2e-3 <= bound(proof, LOAD, array(1.001, 2.0), array(5.996), s=1e-3) <= 2.05e-3
     open_, touching = (LoadCase(array(4.0, 32.0), array(g)) for g in (2.0, 1.0))  # λ* = 0
     assert bound(proof, open_, array(1.0, 2.0), array(0.0), s=1e-3) < 1e-14
     assert 1e-3 <= bound(proof, touching, array(1.0, 2.0), array(0.0), s=1e-3) <= 1.03e-3
@@ -150,6 +151,22 @@ def test_what_is_cut_off_from_x_counts_in_mm(kind: Any) -> None:
     proof, _ = springs(kind, 4.0, 16.0)
     load = LoadCase(array(10.0, 32.0) + array(4.0, 16.0) * 0.25, array(1.25))
     assert 0.25 <= bound(proof, load, array(1.0, 2.0), array(6.0), lo=0.25) <= 0.26
+
+
+@KINDS
+def test_an_answer_that_underflows_is_rounded(kind: Any) -> None:
+    """x* = 0.75 η is no number."""
+    proof, _ = springs(kind, 2.0**40)
+    eta = 2.0**-1074
+    (found,) = proof.proven([LoadCase(array(0.75 * 2.0**40 * eta), array(1.0))], [array(0.0)])
+    assert (
+        abs(Fraction(float(found.x.hi[0])) - Fraction(eta) * 3 / 4) <= Fraction(found.bound_mm) <= 2.0**-1060
+    )
+
+
+@KINDS
+def test_the_norm_of_K_is_in_balanced_units(kind: Any) -> None:
+    assert 1.0 <= springs(kind, 4.0, 2.0**40, exact=False)[0].balanced.stiffest <= 1.02
 
 
 @KINDS
@@ -176,7 +193,8 @@ def test_what_overflows_proves_nothing(kind: Any, bad: float) -> None:
     found = proof.proven([load], [array(0.0)], [array(bad)])[0]
     assert found.bound_mm == np.inf or np.isfinite(found.x.hi).all()
     if np.isfinite(bad):
-        assert assess(proof, [load], [array(bad)], [None])[0].bound_mm == np.inf
+        for lam in (bad, -bad):
+            assert assess(proof, [load], [array(lam)], [None])[0].bound_mm == np.inf
 
 
 @KINDS

@@ -9,6 +9,7 @@ import os
 from itertools import product
 
 import numpy as np
+from harness.verification.principal_pivoting import contact_set
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from solving import CASES, IN_HOUSE, allowed, solve
@@ -16,7 +17,6 @@ from test_reference import exact_solution
 
 from harness.conformance.known_problems import contact_rows, stiffness
 from harness.verification.judge import conditioned_limit
-from harness.verification.principal_pivoting import contact_set
 from harness.verification.reference import best_of_candidates
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared

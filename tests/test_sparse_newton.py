@@ -13,7 +13,7 @@ from sparse_matrices import band_matrix, graph_matrix
 from test_matrices import write_mtx
 
 from harness.solving.session import SolverSession
-from harness.verification.reference import reference, best_of_candidates
+from harness.verification.reference import best_of_candidates, reference
 from problems.build import load_case, prepared
 from problems.forms import approximate_inverse
 from problems.forms.assembly import Assembly, LoadCase, Vector

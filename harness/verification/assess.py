@@ -54,8 +54,8 @@ def assess(
     known = np.column_stack([each.x.hi for each in proven])
     gap, r = load.g - assembly.A.T @ x, load.f - assembly.K.multiply(x) - assembly.A @ lam
     near = np.array([each.bound_mm for each in proven])
-    away, size = (abs(assembly.at_junction(v)).max(axis=0, initial=0.0) for v in (x - known, known))
-    bounds = SAFE * near + (1 + 4 * U) * away + 2 * U * size * (away > 0)
+    away = abs(assembly.at_junction(x - known)).max(axis=0, initial=0.0)
+    bounds = SAFE * near + (1 + 4 * U) * away
     bounds = np.where(np.isfinite(bounds), bounds, np.inf)
     return [
         Assessment(

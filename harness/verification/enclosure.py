@@ -103,19 +103,12 @@ class Residual:
         x1, after = cut(hi, top, bits)
         x2, x3 = cut(after, top - bits, bits)
         x3, after = x3 + lo, after + lo  # rounded by at most a rounding of themselves
-        most, most3, most_after, most_lo = (
-            abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after, lo)
-        )
-        # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one; by the second half
-        # of x M₃ is left out.
-        # Σ|terms| ≤ |Σ| + 2 Σ|products|, of which |Σ| is within the rounding of the sum.
+        most, most3, most_after = (abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after))
+        # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one. M₃ by the second
+        # half of x is left out, a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, of which |Σ| is within its own.
         rounding, again = gamma(longest + 8), 4 * gamma(TERMS) ** 2
-        of_M1, of_M2, of_M3 = (
-            rounding * most3 + again * most,
-            rounding * most_after,
-            rounding * most + most_lo,
-        )
-        of_each = SAFE * np.stack([of_M1, of_M2, of_M3, 8 * ETA * (1 + most) * (most > 0)])
+        of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
+        of_each = SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])
         for rows, columns, panel in panels:
             entries, count, above, of_row = _scaled(panel, unit[columns])
             M1, rest = cut(entries, of_row(above), bits)

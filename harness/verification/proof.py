@@ -133,11 +133,11 @@ class Proof:
         error = SAFE * (force / np.sqrt(self.kappa) + length(delta) * stretch) / np.sqrt(self.kappa)
         D, lo = asked(units.D), abs(asked(x.lo))
         bounds = SAFE * (D * (error + lo)).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
-        valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0) & (self.kappa > 0)
+        valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
         return np.where(valid, bounds, np.inf), (D * lo).max(axis=0, initial=0.0)
 
     def _corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float) -> tuple[Matrix, Matrix]:
-        """dx and dλ ≥ −λ. r, s, λ : as they are, a column for each load case."""
+        """dx and dλ. r, s, λ : as they are, a column for each load case."""
         units = self.balanced
         dx = units.solve(r)
         y = s - units.At @ dx
@@ -163,7 +163,7 @@ class Proof:
             step = np.where(going & (energy > 0), product / energy, 0.0)
             dlam, dx, missed = dlam + step * direction, dx - step * w, missed - step * q
             before = np.where(product > 0, product, 1.0)
-        return dx, np.maximum(dlam, -lam)
+        return dx, dlam
 
     def _found(self, x: DoubleDouble, lam: DoubleDouble, bound_mm: float) -> Proven:
         D, R = self.balanced.D[:, 0], self.balanced.R[:, 0]
