@@ -9,7 +9,6 @@ import os
 from itertools import product
 
 import numpy as np
-from harness.verification.principal_pivoting import contact_set
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from solving import CASES, IN_HOUSE, allowed, solve
@@ -58,7 +57,7 @@ def problem(seed: int, pairs: int, tools: int) -> tuple[Prepared, LoadCase]:
 def exact(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:
     """x and λ from rational arithmetic: of the contact set at hand, or of the first that is optimal."""
     m = prepared.assembly.m
-    guess = contact_set(prepared.Q, prepared.dual_load(case))
+    guess = best_of_candidates(prepared, case).active
     for active in (guess, *(np.array(choice) for choice in product((False, True), repeat=m))):
         x, forces, gaps = exact_solution(prepared, case, active)
         if min([*forces, *gaps], default=0) >= 0:

@@ -67,7 +67,7 @@ def test_a_scene_in_a_few_products(name: str) -> None:
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = session_of(data).next(load, None)
     assert answer.status == "solved"
-    known = best_of_candidates(data, load, guess=answer.lam)
+    known = best_of_candidates(data, load, given=[answer.lam])
     assert known.bound_mm < LIMIT_MM
     assert abs(np.asarray(answer.x) - known.x).max() < LIMIT_MM
     assert answer.details["products"] <= 20

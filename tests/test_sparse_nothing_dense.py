@@ -67,7 +67,7 @@ for path in sys.argv[1:]:
     state = solver.prepare(solver.convert(in_form(data, "sparse")))
     answer = solver.solve(solver.setup(state, load, 1e-10), load, 1e-10)
     solving = peak() - before
-    known = best_of_candidates(data, load, guess=answer.lam)
+    known = best_of_candidates(data, load, given=[answer.lam])
     verdict = judge(data, load, known, answer.x, answer.lam, 1e-7).verdict
     proving = peak() - before
 condensation = any(name.startswith("problems.condensation") for name in sys.modules)

@@ -105,7 +105,7 @@ class Residual:
         x3, after = x3 + lo, after + lo  # rounded by at most a rounding of themselves
         most, most3, most_after = (abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after))
         # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one. M₃ by the second
-        # half of x is left out, a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, of which |Σ| is within its own.
+        # half of x is left out: a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, where u|Σ| covers γ²|Σ|.
         rounding, again = gamma(longest + 8), 4 * gamma(TERMS) ** 2
         of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
         of_each = SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])

@@ -27,7 +27,7 @@ class Near:
 
     @classmethod
     def of(cls, prepared: Prepared, R: Vector) -> Near:
-        found = prepared.approximate_inverse
+        found = prepared.approximate_inverse if len(R) else None
         return cls(found.M, found.diagonal * R**2, R) if found else cls(None, np.ones(len(R)), R)
 
     def product(self, v: Vector) -> Vector:
