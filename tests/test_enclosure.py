@@ -147,10 +147,10 @@ def test_the_residuals_of_a_problem_in_its_units(kind: str, seed: int) -> None:
         B, unit = rng.standard_normal((size, size)), 10.0 ** rng.uniform(-6, 6, size)
         K = (B @ B.T + np.eye(size)) * np.outer(unit, unit)
         blocks.append(np.asfortranarray(K + K.T) if kind == "dense" else sp.csc_array(K + K.T))
-    A = rng.standard_normal((16, 5)) * (rng.random((16, 5)) < 0.7)
+    A = rng.standard_normal((16, 60)) * (rng.random((16, 60)) < 0.9)
     K = Stiffness.of(*blocks)
     made = Balanced.of(Prepared(Assembly(K, sp.csc_array(A))))
-    x, lam = doubled(wild(rng, 16, 2)), doubled(wild(rng, 5, 2))
+    x, lam = doubled(wild(rng, 16, 2)), doubled(rng.standard_normal((60, 2)))
     both, at = np.hstack([K.matrix.toarray(), A]), doubled(np.vstack([made.D * x.hi, made.R * lam.hi]))
     f, g = both @ at.hi, A.T @ at.hi[:16]  # so that little is left
     loads = [LoadCase(f[:, k], g[:, k]) for k in range(2)]
