@@ -31,7 +31,7 @@ from solvers.registry import make_solver
 
 Gaps = NDArray[np.float32]
 
-ENOUGH = 1e-3  # of the limit: a nearby answer proven to within it needs no further refinement
+ENOUGH = 1e-2  # of the limit: a nearby answer proven to within it needs no further refinement
 BLOCK = 64  # cases that share a pass over K and Q
 BLOCK_BYTES = 2**26  # of their f or x: some fifteen times as much is in use
 BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases are lost
