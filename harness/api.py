@@ -29,8 +29,8 @@ from numpy.typing import ArrayLike
 import harness.verification.judge as referee
 from harness.conformance.check import run as check_solver
 from harness.planning.road import chosen_form
-from harness.scene.answer import answer_of, forces_of, form_of, guess_of
 from harness.series.session import Job, Result, SeriesSession
+from harness.solving.answer import answer_of, forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference import reference_of
 from problems.build import load_case, prepared
@@ -143,7 +143,7 @@ def solve(
     taken = chosen_form(scene, forms, asked, in_house=not own).form
     data, load = prepared(scene, form=taken), load_case(scene, taken)
     has_contact = bool((data.dual_load(load) > 0).any())
-    known = reference_of(scene, data, load, guess=guess_of(data, load) if has_contact else None)
+    known = reference_of(scene, data, load)
     answer = Answer("solved", known.lam, known.x)
     if named is not None and has_contact:
         name, chosen = named
@@ -175,7 +175,7 @@ def judge(
     n, m = data.assembly.n, data.assembly.m
     x = _vector("judge", "x", x, n)
     forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)
-    known = reference_of(scene, data, load, guess=guess_of(data, load))
+    known = reference_of(scene, data, load)
     return referee.judge(data, load, known, x, forces, limit_mm)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import scikit_fem_plates
 from numpy.typing import NDArray
 
-from harness.scene.answer import answer_of
+from harness.solving.answer import answer_of
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase
 from problems.model.effect import GapEffect

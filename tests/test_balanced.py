@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from small import make_load, make_prepared
 from solving import TESTED
 
-from harness.measurement.solver_session import SolverSession
+from harness.solving.session import SolverSession
 from harness.verification.reference import reference
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from harness.verification.principal_pivoting import contact_set
 from joints import dof, make_joint, make_scene
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from harness.verification.principal_pivoting import contact_set
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap

@@ -12,8 +12,7 @@ import scipy.sparse as sp
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from harness.verification.judge import conditioned_limit, judge
-from harness.verification.reference import Reference
+from harness.verification.judge import Reference, conditioned_limit, judge
 from problems.forms import manufactured_problem
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
 from problems.forms.prepared import Prepared

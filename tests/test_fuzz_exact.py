@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -16,18 +17,15 @@ import scipy.sparse as sp
 from exact_draws import LOADS, ExactLoad, ExactProblem, exact_problem
 from fuzz_log import Log, contained, max_error
 from long import draws
-from numpy.typing import NDArray
 from promises import promised, promises
 from solving import SLOW, TOLERANCES
 
 from harness import InputError, own_matrices, solve_dual
-from harness.measurement.solver_session import SolverSession
-from harness.verification.batched.assess import assess
-from harness.verification.batched.bound import Bound
-from harness.verification.certificate import certify
-from harness.verification.exact_residual import DoubleDouble
-from harness.verification.judge import judge
-from harness.verification.reference import Reference, refined_active_set
+from harness.solving.session import SolverSession
+from harness.verification.assess import assess
+from harness.verification.judge import Reference, judge
+from harness.verification.proof import Proof
+from harness.verification.reference import best_of_candidates, proof_of
 from problems.build import prepared
 from problems.forms.assembly import Vector
 from problems.forms.names import Form
@@ -89,10 +87,10 @@ def _check(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
     condition = max(each[-1] for each in spectra) / min(each[0] for each in spectra)
     if not 0 < condition < LARGEST_CONDITION:
         return
-    bound = Bound.of(data)
+    proof = proof_of(data)
     references = [_check_reference(log, data, each) for each in made.loads]
-    for each in made.loads:
-        _check_certificate(log, data, bound.kappa, each, random)
+    for K in (made.assembly.K, made.assembly.K.as_sparse()):
+        _check_any_point(log, proof_of(Prepared(replace(made.assembly, K=K))), made.loads, random)
     lams: list[list[Vector]] = [[each.lam, *_hostile_forces(each, random)] for each in made.loads]
     if made.ordinary:
         log.seen["ordinary"] += len(made.loads)
@@ -103,9 +101,10 @@ def _check(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
                 lams[k].append(lam)
         log.seen["proven"] += sum(known.bound_mm < np.inf for known in references)
     for each, tried in zip(made.loads, lams, strict=True):
-        vouched = assess(bound, [each.load] * len(tried), tried, [None] * len(tried))
+        enough = float(10.0 ** -random.integers(0, 30))
+        vouched = assess(proof, [each.load] * len(tried), tried, [None] * len(tried), enough)
         given = [each.x * (1 + random.normal(0, 10.0 ** -random.integers(1, 16))) for _ in tried]
-        vouched += assess(bound, [each.load] * len(tried), tried, given)
+        vouched += assess(proof, [each.load] * len(tried), tried, given, enough)
         for found in vouched:
             log.bound("series", found.x, found.bound_mm, each.x)
     if random.random() < 0.05:
@@ -113,27 +112,24 @@ def _check(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
 
 
 def _check_reference(log: Log, data: Prepared, each: ExactLoad) -> Reference:
-    known = refined_active_set(data, each.load)
+    known = best_of_candidates(data, each.load)
     log.bound("reference", known.x, known.bound_mm, each.x)
     return known
 
 
-def _check_certificate(
-    log: Log, data: Prepared, kappa: float, each: ExactLoad, random: np.random.Generator
+def _check_any_point(
+    log: Log, proof: Proof, loads: tuple[ExactLoad, ...], random: np.random.Generator
 ) -> None:
-    """Of an answer that is wrong on purpose, with a set that may be."""
-    size = 10.0 ** -random.integers(0, 20)
-    x = each.x * (1 + size * random.normal(size=len(each.x)))
-    lam = abs(each.lam * (1 + size * random.normal(size=len(each.lam))))
-    active: NDArray[np.bool_] = (each.lam > 0) ^ (random.random(len(lam)) < 0.1)
-    zero_x, zero_lam = np.zeros_like(x), np.zeros_like(lam)
-    proof = certify(
-        data.assembly, each.load, DoubleDouble(x, zero_x), DoubleDouble(lam, zero_lam), active, kappa
-    )
-    log.bound("certificate", proof.x.hi, proof.bound_mm, each.x)
-    y = each.load.g - data.assembly.A.T @ each.x  # exact: integers times powers of two
-    if (proof.closed & (each.lam == 0)).any() or (proof.open & (y == 0)).any():
-        log.fault("proven wrongly", "a contact is called closed or open")
+    """x and λ ≥ 0 that are wrong on purpose, all load cases at once, without and with a refinement."""
+    size = 10.0 ** -random.integers(0, 20, len(loads))
+    xs = [each.x * (1 + s * random.normal(size=len(each.x))) for each, s in zip(loads, size, strict=True)]
+    lams = [
+        each.lam * (1 + s * random.normal(size=len(each.lam))) for each, s in zip(loads, size, strict=True)
+    ]
+    for enough in (np.inf, 10.0 ** -random.integers(0, 30)):
+        found = proof.proven([each.load for each in loads], lams, xs, enough)
+        for each, mine in zip(loads, found, strict=True):
+            log.bound("any point", mine.x.hi, mine.bound_mm, each.x)
 
 
 def _hostile_forces(each: ExactLoad, random: np.random.Generator) -> list[Vector]:
@@ -186,7 +182,7 @@ def _check_interface(log: Log, made: ExactProblem, random: np.random.Generator) 
     K = sp.block_diag(assembly.K.matrices)
     try:
         data = prepared(own_matrices(K, assembly.A, each.load.f, each.load.g))
-        known = refined_active_set(data, each.load)
+        known = best_of_candidates(data, each.load)
     except InputError:
         if made.ordinary:
             raise

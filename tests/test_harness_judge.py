@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from harness.verification.judge import Judgement, conditioned_limit, judge
-from harness.verification.reference import Reference
+from harness.verification.judge import Judgement, Reference, conditioned_limit, judge
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness

@@ -26,10 +26,10 @@ import harness.terminal.waiting as waiting_module
 from harness import InputError, own_matrices, solve, solve_series
 from harness.conformance.check import run as check_here
 from harness.conformance.known_problems import known_problems
-from harness.measurement.answers import LARGEST_DETAILS, Refused, checked
 from harness.measurement.describe import describe
 from harness.planning.suite import read_suite
 from harness.results import records
+from harness.solving.answers import LARGEST_DETAILS, Refused, checked
 from problems.forms.assembly import LoadCase
 from problems.forms.problem import in_form
 from solvers.base import Answer, Problem, Solver

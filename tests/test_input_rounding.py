@@ -15,7 +15,7 @@ import pytest
 import scipy.sparse as sp
 
 from harness import own_matrices, solve
-from harness.verification.reference import UNPROVEN, refined_active_set
+from harness.verification.reference import UNPROVEN, best_of_candidates
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
@@ -128,7 +128,7 @@ def test_the_bound_holds_for_the_problem_as_it_was_taken(
         assert note in made.assembly.notes[0]
         (K,) = made.assembly.blocks
         assert (K == K.T).all()
-        known = refined_active_set(made, load)
+        known = best_of_candidates(made, load)
         assert known.route.startswith("proven")
         assert error_of(known.x, made.assembly, load) <= Fraction(known.bound_mm)
 
@@ -218,6 +218,6 @@ def test_the_cache_keeps_the_notes(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_a_load_that_overflows_is_not_called_proven(f: float) -> None:
     K = np.array([[2.0, -1.0], [-1.0, 2.0]])
     made = Prepared(Assembly((np.asfortranarray(K),), sp.csc_array(np.eye(2))))
-    found = refined_active_set(made, LoadCase(np.full(2, f), np.zeros(2)))
+    found = best_of_candidates(made, LoadCase(np.full(2, f), np.zeros(2)))
     assert found.bound_mm == np.inf
     assert found.route == UNPROVEN

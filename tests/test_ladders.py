@@ -12,7 +12,7 @@ import pytest
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
 from harness.verification.judge import judge
-from harness.verification.reference import refined_active_set
+from harness.verification.reference import best_of_candidates
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
 from problems.build import prepared
 from problems.errors import InputError
@@ -123,7 +123,7 @@ def test_what_the_model_cannot_take_is_refused_in_words(name: str) -> None:
 def test_the_refined_reference_finds_the_exact_answer(name: str) -> None:
     """Two independent ways to the truth; beyond cond(K) = 1e13 no bound is proven any more."""
     base = opened(name)
-    found = refined_active_set(base.prepared, base.load)
+    found = best_of_candidates(base.prepared, base.load)
     assert base.reference.bound_mm == 0.0
     assert abs(found.x - base.reference.x).max() <= found.bound_mm
     assert np.isfinite(found.bound_mm) or base.prepared.facts["cond_K"] > 2e13  # type: ignore[operator]

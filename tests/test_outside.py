@@ -13,9 +13,9 @@ import scipy.sparse as sp
 from synthetic_results import row, write_rows
 
 from harness.planning.road import chosen_form
-from harness.scene.answer import answer_of
-from harness.verification.judge import judge
-from harness.verification.reference import Reference, refined_active_set
+from harness.solving.answer import answer_of
+from harness.verification.judge import Reference, judge
+from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.names import FORMS
@@ -37,7 +37,7 @@ def solved(name: str) -> tuple[Reference, float]:
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
     assert answer.status == "solved"
-    known = refined_active_set(data, load, guess=answer.lam)
+    known = best_of_candidates(data, load, given=[answer.lam])
     judged = judge(data, load, known, np.asarray(answer.x), np.asarray(answer.lam), 1e-7)
     assert judged.verdict == "within"
     assert judged.objective is not None

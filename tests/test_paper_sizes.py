@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from harness.verification.principal_pivoting import contact_set
+
 from problems.build import load_case, prepared
 from problems.forms.prepared import Prepared
 from problems.scene import read_scene, scene_names

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from small import make_load, make_prepared, solve_by_nnls
 from solving import IN_HOUSE, TOLERANCES
 
-from harness.measurement.solver_session import SolverSession
+from harness.solving.session import SolverSession
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form

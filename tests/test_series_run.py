@@ -249,8 +249,8 @@ def test_a_wrong_answer_is_not_vouched_for() -> None:
     assert [result.row["verdict"] for result in results] == ["outside", "cannot_be_judged"] * 2
 
 
-def test_what_p_has_lost_in_rounding_is_made_good(monkeypatch: pytest.MonkeyPatch) -> None:
-    """p is off by 1e-6 mm: the gaps that were found say so, and a second answer is within 1e-8 mm."""
+def test_what_p_has_lost_in_rounding_is_in_the_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """p is off by 1e-6 mm: the bound is the answer's distance from the proven one, not much more."""
     scene, rng = read_scene("strip.toml"), np.random.default_rng(0)
     loads = Dual.loads
 
@@ -258,17 +258,12 @@ def test_what_p_has_lost_in_rounding_is_made_good(monkeypatch: pytest.MonkeyPatc
         return [replace(load, p=load.p + 1e-6 * rng.standard_normal(45)) for load in loads(self, cases)]
 
     monkeypatch.setattr(Dual, "loads", spoilt)
-    found = {}
-    for limit in (1e-3, 1e-8):
-        job = Job(scene, random_gaps(scene, 9, 0), "newton", "dual", 1e-11, limit, 1, 1)
-        (results,) = SeriesSession(job).solve(range(9))
-        found[limit] = [result.row for result in results]
-        assert {row["verdict"] for row in found[limit]} == {"within"}
-        for row in found[limit]:
-            assert row["displacement_error_mm"] <= row["bound_mm"] <= limit
-    for once, twice in zip(*found.values(), strict=True):
-        assert once["bound_mm"] > 1e-8
-        assert twice["iterations"] > once["iterations"]
+    job = Job(scene, random_gaps(scene, 9, 0), "newton", "dual", 1e-11, 1e-3, 1, 1)
+    (results,) = SeriesSession(job).solve(range(9))
+    for row in (result.row for result in results):
+        assert row["verdict"] == "within"
+        error = row["displacement_error_mm"]
+        assert 1e-8 < error <= row["bound_mm"] <= 1.02 * (error + 1e-2 * job.limit_mm)
 
 
 def test_memory_does_not_grow_with_the_cases() -> None:

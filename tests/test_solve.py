@@ -142,16 +142,9 @@ def test_an_answer_outside_the_limit_fails(tmp_path: Path) -> None:
     assert "outside" in shown.getvalue()
 
 
-def no_factor(Q: Any, p: Any, closed: Any) -> tuple[Any, Any, float, float]:
-    """In the place of active_set._solve_on: fails where a contact is closed, so that a QP is solved."""
-    if closed.any():
-        pytest.fail("a contact was closed")
-    return np.zeros(len(p)), -p, 0.0, 0.0
-
-
 def test_parts_that_do_not_meet_are_a_linear_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.libraries.piqp.Piqp.convert", lambda *_: pytest.fail("a QP solver was run"))
-    monkeypatch.setattr("harness.verification.principal_pivoting._solve_for", no_factor)
+    monkeypatch.setattr("harness.solving.candidates.forces_of", lambda *_: pytest.fail("a QP was solved"))
     record = run(tmp_path, APART, solver="piqp")
     assert not record["qp"]
     assert record["code"] == 0

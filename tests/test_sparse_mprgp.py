@@ -9,8 +9,8 @@ import pytest
 import scipy.sparse as sp
 from small import make_load, make_strips, solve_by_nnls
 
-from harness.measurement.solver_session import SolverSession
-from harness.verification.reference import refined_active_set
+from harness.solving.session import SolverSession
+from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
@@ -67,7 +67,7 @@ def test_a_scene_in_a_few_products(name: str) -> None:
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = session_of(data).next(load, None)
     assert answer.status == "solved"
-    known = refined_active_set(data, load, guess=answer.lam)
+    known = best_of_candidates(data, load, given=[answer.lam])
     assert known.bound_mm < LIMIT_MM
     assert abs(np.asarray(answer.x) - known.x).max() < LIMIT_MM
     assert answer.details["products"] <= 20

@@ -12,8 +12,8 @@ from small import make_load, make_prepared, make_strips, solve_by_nnls
 from sparse_matrices import band_matrix, graph_matrix
 from test_matrices import write_mtx
 
-from harness.measurement.solver_session import SolverSession
-from harness.verification.reference import reference, refined_active_set
+from harness.solving.session import SolverSession
+from harness.verification.reference import best_of_candidates, reference
 from problems.build import load_case, prepared
 from problems.forms import approximate_inverse
 from problems.forms.assembly import Assembly, LoadCase, Vector
@@ -146,7 +146,7 @@ def test_sets_alone_solve_a_scene(name: str, monkeypatch: pytest.MonkeyPatch) ->
     scene = read_scene(name)
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = session_of(data).next(load, None)
-    known = refined_active_set(data, load)
+    known = best_of_candidates(data, load)
     assert answer.status == "solved"
     assert answer.x is not None
     assert answer.details["factorisations"] >= 1
@@ -178,7 +178,7 @@ def test_a_users_own_sparse_matrices(band: bool, with_nodes: bool, tmp_path: Pat
     session = session_of(data)
     check(session.next(load, None), x, lam)
     assert isinstance(data.assembly.K.blocks[0], BandedBlock if band else GeneralBlock)
-    found = refined_active_set(data, load)
+    found = best_of_candidates(data, load)
     assert abs(found.x - x).max() <= found.bound_mm + 1e-11
     assert found.bound_mm <= 1e-12
     again = replace(load, g=load.g + 0.01)

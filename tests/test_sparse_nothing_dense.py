@@ -46,7 +46,7 @@ from problems.forms.problem import in_form
 from problems.stiffness.dense import DenseBlock
 from problems.scene import read_scene
 from harness.verification.judge import judge
-from harness.verification.reference import refined_active_set
+from harness.verification.reference import best_of_candidates
 from solvers.registry import make_solver
 
 
@@ -67,7 +67,7 @@ for path in sys.argv[1:]:
     state = solver.prepare(solver.convert(in_form(data, "sparse")))
     answer = solver.solve(solver.setup(state, load, 1e-10), load, 1e-10)
     solving = peak() - before
-    known = refined_active_set(data, load, guess=answer.lam)
+    known = best_of_candidates(data, load, given=[answer.lam])
     verdict = judge(data, load, known, answer.x, answer.lam, 1e-7).verdict
     proving = peak() - before
 condensation = any(name == "problems.full_model.condensed" for name in sys.modules)

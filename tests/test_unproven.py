@@ -43,7 +43,7 @@ def test_solve_says_that_a_bound_could_not_be_proven(tmp_path: Path) -> None:
     assert ", proven" not in text
     record = json.loads((tmp_path / "out" / "solution.json").read_text())
     assert (record["error_bound_mm"], record["verdict"]) == (None, "cannot_be_judged")
-    assert record["route"] == "could not be proven"
+    assert record["route"].startswith("could not be proven")
     assert "No bound on the error could be proven." in (tmp_path / "out" / "answer.md").read_text("utf-8")
 
 

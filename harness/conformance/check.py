@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 
-from harness.measurement.answers import Refused, error_text, shown, vector
-from harness.measurement.solver_session import SolverSession
+from harness.solving.answers import Refused, error_text, shown, vector
+from harness.solving.session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form

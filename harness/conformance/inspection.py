@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from harness.measurement.answers import Refused, checked, is_count, is_seconds, shown
+from harness.solving.answers import Refused, checked, is_count, is_seconds, shown
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from harness.measurement.answers import error_text
 from harness.measurement.child import await_end, receive
 from harness.measurement.describe import IMPORT_S
 from harness.measurement.limited import POLL_S, Limited
 from harness.results.records import Row
+from harness.solving.answers import error_text
 from harness.terminal.exit_codes import DONE, FAILED
 from harness.terminal.waiting import waiting
 from problems.errors import Fault, InputError

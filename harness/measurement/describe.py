@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from harness.planning.suite import Suite
+from harness.solving.answers import shown
 from problems.errors import Fault, InputError
 from problems.forms.names import FORMS, default_form
 from solvers.base import Form
 
-from .answers import shown
 from .child import await_end, receive
 from .limited import POLL_S, Limited
 from .solver_code import code_of

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.solving.answers import Refused
 from problems.forms.assembly import Matrix
-
-from .answers import Refused
 
 
 class StoredFiles:

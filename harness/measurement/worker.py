@@ -17,6 +17,8 @@ import threadpoolctl
 
 from harness.results.machine import blas_kernels, resident_mib
 from harness.results.records import Row
+from harness.solving.answers import Refused, error_text, figures, save
+from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.problem import Problem, in_form
@@ -25,9 +27,7 @@ from problems.scene import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .answers import Refused, error_text, figures, save
 from .child import Events, await_end, receive
-from .solver_session import SolverSession
 from .stored_files import StoredFiles
 from .yardstick import yardstick
 

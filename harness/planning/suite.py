@@ -83,7 +83,8 @@ class Suite(BaseModel):
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
-    reference_limit_s is for the search of each reference; by default 60 s per thousand contacts, at least 60.
+    after reference_limit_s no further method is tried for a reference; by default 60 s per thousand
+    contacts, at least 60.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)

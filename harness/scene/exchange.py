@@ -23,7 +23,6 @@ from problems.input.user_matrices import checked
 from problems.model.scene import MatricesScene
 from problems.scene import read_scene
 
-from .answer import guess_of
 from .few_digits import digits_of, digits_sentence
 from .into_place import into_place
 
@@ -149,7 +148,7 @@ def _print_facts(out: Path, used: tuple[Form, Prepared, LoadCase], console: Cons
     if digits_of(data.assembly) == DOUBLE:
         x, lam = np.zeros(data.assembly.n), np.zeros(data.assembly.m)  # which the sentence does not need
     else:
-        known = reference(data, load, guess=guess_of(data, load))
+        known = reference(data, load)
         x, lam = known.x, known.lam
     sentence, few = digits_sentence(data, x, lam)
     console.print(f"{sentence}.", style="yellow" if few else None)

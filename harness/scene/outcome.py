@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from harness.results.records import replace_text, to_line
-from harness.verification.judge import LIMIT_MM
-from harness.verification.reference import UNPROVEN, Reference
+from harness.verification.judge import LIMIT_MM, Reference
+from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, LoadCase, Vector
 
 from .ledger import Entry

@@ -22,6 +22,7 @@ from rich.text import Text
 from harness.planning.road import Choice, chosen_form
 from harness.results.machine import machine, resident_mib
 from harness.results.provenance import provenance
+from harness.solving.answer import answer_of
 from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.gap_error import GapError
 from harness.verification.judge import LIMIT_MM, judge
@@ -38,15 +39,12 @@ from problems.scene import read_scene
 from solvers.base import Solver
 
 from . import allowed_gap
-from .answer import answer_of, guess_of
 from .fastener_forces import fastener_forces
 from .few_digits import digits_sentence
 from .layout import layout
 from .ledger import ledger, not_called_for
 from .outcome import save, show
 
-ACTIVE_SET = "active set (block principal pivoting), refined"
-SPARSE_ACTIVE_SET = "active set (newton on the sparse form), refined"
 LINEAR = "linear solve with the Cholesky factors of K"
 
 
@@ -120,12 +118,8 @@ def solve(
             largest, allowed = float(abs(load.f).max(initial=0.0)), "loads with finite displacements"
             raise InputError.one(scene.source_of("f"), "largest |f|", largest, allowed)
     has_contact = bool((p > 0).any())
-    guess = None
-    if has_contact and road.form == "sparse":
-        with steps.step("contact set"):
-            guess = guess_of(data, load)
     with steps.step("answer with a proven bound"):
-        known = reference_of(scene, data, load, reference_limit_s, guess)
+        known = reference_of(scene, data, load, reference_limit_s)
     if solver and chosen and has_contact:
         with steps.step(f"solving with {solver}"):
             x, lam, outcome = _answer(solver, chosen, data, road.form, load, tolerance)
@@ -134,7 +128,7 @@ def solve(
     else:
         x, lam = known.x, known.lam
         outcome = {
-            "method": SPARSE_ACTIVE_SET if guess is not None else ACTIVE_SET if has_contact else LINEAR,
+            "method": known.route if has_contact else LINEAR,
             "status": "solved",
             "verdict": "within" if known.bound_mm <= LIMIT_MM else "cannot_be_judged",
             "judged_error_mm": None,

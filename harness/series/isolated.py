@@ -14,19 +14,20 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from harness.measurement.answers import error_text
 from harness.measurement.child import Events, await_end, receive
 from harness.measurement.limited import POLL_S, Limited
 from harness.measurement.process import START_S
 from harness.measurement.stored_files import StoredFiles
 from harness.results.provenance import provenance
 from harness.results.records import Row
-from harness.verification.batched.assess import Assessment
+from harness.solving.answers import error_text
+from harness.verification.assess import Assessment
+from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
 
-from .session import Attempt, Job, Result, SeriesSession, assessor
+from .session import Attempt, Job, Result, SeriesSession
 
 
 class Isolated(Limited):
@@ -66,7 +67,7 @@ def solve_isolated(job: Job, numbers: Sequence[int]) -> Generator[list[Result], 
 
     Raises InputError if the plug-in cannot be imported or made.
     """
-    assessor(prepared(job.scene, form=job.form), job.limit_mm)  # builds what is not cached: without a limit
+    proof_of(prepared(job.scene, form=job.form))  # builds what is not cached: without a limit
     with Isolated(job, numbers) as child:
         while not child.over():
             child.listen(POLL_S)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -15,17 +14,14 @@ import numpy as np
 import threadpoolctl
 from numpy.typing import NDArray
 
-from harness.measurement.solver_session import SolverSession
 from harness.results.provenance import provenance
 from harness.results.records import Row
-from harness.verification.batched.assess import Assessment, assess
-from harness.verification.batched.bound import Bound
-from harness.verification.batched.sparse import SparseAssessor
+from harness.solving.session import SolverSession
+from harness.verification.assess import Assessment, assess
 from harness.verification.gap_error import GapError
 from harness.verification.judge import judge
-from harness.verification.reference import refined_active_set
+from harness.verification.reference import best_of_candidates, proof_of
 from problems.build import prepared
-from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
@@ -36,6 +32,7 @@ from solvers.registry import make_solver
 
 Gaps = NDArray[np.float32]
 
+ENOUGH = 1e-2  # of the limit: a nearby answer proven to within it needs no further refinement
 BLOCK = 64  # cases that share a pass over K and Q
 BLOCK_BYTES = 2**26  # of their f or x: some fifteen times as much is in use
 BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases are lost
@@ -73,24 +70,6 @@ class Result:
     gap: Gaps | None
 
 
-#: (load cases, their λ, their x) → their assessments.
-Assess = Callable[[Sequence[LoadCase], Sequence[Vector], Sequence[Vector | None]], list[Assessment]]
-
-
-def assessor(data: Prepared, limit_mm: float) -> Assess:
-    """What judges a block of answers, with bounds far below the limit where that is no trouble.
-
-    Raises InputError if rounding leaves Q indefinite.
-    """
-    if not data.assembly.K.dense:
-        return SparseAssessor(data, limit_mm / 10)
-    try:
-        return partial(assess, Bound.of(data))
-    except np.linalg.LinAlgError as error:
-        allowed = "must be positive definite: are contacts nearly dependent, and K nearly singular?"
-        raise InputError.one("series", "Q = AᵀK⁻¹A", str(error), allowed) from error
-
-
 @dataclass(frozen=True)
 class Attempt:
     case: int
@@ -109,7 +88,7 @@ class SeriesSession:
         self.job = job
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)
-        self.assess = assessor(self.data, job.limit_mm)
+        self.proof = proof_of(self.data)
         self.gap_error = GapError.of(self.data.assembly)
         self.problem = in_form(self.data, job.form)
         solver = solver or make_solver(job.solver, job.options, job.plugin)
@@ -174,32 +153,8 @@ class SeriesSession:
         """The rows and gaps, with a proven error bound for each answer."""
         start = time.perf_counter()
         known = self._assessed(attempts)
-        if self.session.batch is not None and self.data.assembly.K.dense:
-            self._retry(attempts, known)
         share = (time.perf_counter() - start) / len(attempts)
         return [self._result(each, known.get(each.case), share) for each in attempts]
-
-    def _retry(self, attempts: list[Attempt], known: dict[int, Assessment]) -> None:
-        """Solve again what is not proven to be within the limit, with p := Qλ − y for the gap y found.
-
-        This removes the rounding errors of Q and p. The better of the two answers is kept.
-        """
-        index = {each.case: k for k, each in enumerate(attempts)}
-        limit_mm = self.job.limit_mm
-        unproven = [each for each in attempts if each.case in known and known[each.case].bound_mm > limit_mm]
-        if not unproven:
-            return
-        lams = np.column_stack([each.answer.lam for each in unproven if each.answer.lam is not None])
-        p = self.data.Q @ lams - np.column_stack([known[each.case].gap for each in unproven])
-        pairs = zip(unproven, p.T, strict=True)
-        new = self._try_batch([(each.case, replace(each.load, p=column)) for each, column in pairs])
-        improved = self._assessed(new)
-        for old, better in zip(unproven, new, strict=True):
-            case = old.case
-            if case in improved and improved[case].bound_mm < known[case].bound_mm:
-                known[case] = improved[case]
-                count = (old.answer.iterations or 0) + (better.answer.iterations or 0)
-                attempts[index[case]] = replace(old, answer=replace(better.answer, iterations=count))
 
     def _assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
         needs = self.problem.needs
@@ -208,7 +163,7 @@ class SeriesSession:
             return {}
         lams = [np.asarray(each.answer.lam, dtype=float) for each in answered]
         own = [each.answer.x if "x" in needs else None for each in answered]
-        found = self.assess([each.load for each in answered], lams, own)
+        found = assess(self.proof, [each.load for each in answered], lams, own, ENOUGH * self.job.limit_mm)
         return {each.case: assessment for each, assessment in zip(answered, found, strict=True)}
 
     def _result(self, attempt: Attempt, assessment: Assessment | None, assess_s: float) -> Result:
@@ -245,7 +200,7 @@ class SeriesSession:
 
     def _against_reference(self, attempt: Attempt, x: Vector) -> Row:
         """The distance to the certified reference, which replaces the bound in the verdict."""
-        known = refined_active_set(self.data, attempt.load)
+        known = best_of_candidates(self.data, attempt.load)
         lam = np.asarray(attempt.answer.lam, dtype=float)
         judged = judge(self.data, attempt.load, known, x, lam, self.job.limit_mm)
         names = ("displacement_error_mm", "reference_bound_mm", "contact_mismatch")

@@ -23,18 +23,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.results.schema import Verdict
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-
-from .reference import Reference
 
 #: The required accuracy: max-norm of the displacement error, mm.
 LIMIT_MM = 1e-7
 
 #: The reference's error bound may be at most this share of the limit.
 REFERENCE_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Reference:
+    """x (n,) in mm, λ (m,) in N, the closed contacts, and a bound on max|x − x*| in mm.
+
+    unit_mm, gap_unit_mm : the length of one unit of x and of the gaps, mm.
+    """
+
+    x: Vector
+    lam: Vector
+    active: NDArray[np.bool_]
+    bound_mm: float
+    route: str
+    unit_mm: Vector | float = 1.0
+    gap_unit_mm: Vector | float = 1.0
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 
-from .judge import Judgement, conditioned_limit, judge
-from .reference import Reference, default_limit_s, reference, reference_of
+from .judge import Judgement, Reference, conditioned_limit, judge
+from .reference import default_limit_s, reference, reference_of
 
 ANSWER_MIB = 1024  # the largest file of an answer that is read
 

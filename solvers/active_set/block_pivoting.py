@@ -1,8 +1,4 @@
-"""Block principal pivoting: finds the contact set C with λ ≥ 0 on it and y ≥ 0 off it.
-
-The reference has a block-pivoting code of its own (harness/verification/principal_pivoting.py), on purpose:
-the referee shares no code with the solvers it judges.
-"""
+"""Block principal pivoting: finds the contact set C with λ ≥ 0 on it and y ≥ 0 off it."""
 
 from __future__ import annotations
 

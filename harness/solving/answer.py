@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from harness.measurement.answers import Refused
-from harness.measurement.solver_session import SolverSession
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase, Vector
+from problems.forms.assembly import LoadCase
 from problems.forms.names import Form, default_form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
 from solvers.base import Answer, Solver
 
-GUESS_MM = 1e-11  # tolerance of newton
+from .answers import Refused
+from .session import SolverSession
+
 NO_ANSWER = "gave no answer; try another solver or form"
 
 
@@ -24,17 +24,6 @@ def form_of(name: str, taken: Sequence[Form], form: Form | None = None) -> Form:
     if form not in taken:
         raise InputError.one(f"solver {name}", "form", form, f"it takes {' and '.join(taken)}")
     return form
-
-
-def guess_of(data: Prepared, load: LoadCase) -> Vector | None:
-    """λ (m,) N by newton in the sparse form, from which its reference starts; None in the dense forms, where
-    the reference finds the contact set itself.
-    """
-    if data.assembly.K.dense:
-        return None
-    from solvers.registry import make_solver  # slow to import
-
-    return answer_of("newton", make_solver("newton", {}), data, "sparse", load, GUESS_MM).lam
 
 
 def answer_of(

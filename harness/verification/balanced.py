@@ -1,0 +1,97 @@
+"""A problem in units in which its unknowns and contacts weigh alike, and what its load cases share.
+
+With D and R, powers of two, D_i √K_ii and R_j ‖DA_j‖₂ about 1,
+
+    K' = DKD,  A' = DAR,  f' = Df,  g' = Rg,  x = Dx',  λ = Rλ':
+
+the same problem without rounding, whatever the units of its unknowns and contacts were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.forms.assembly import Assembly, LoadCase, Matrix, stacked
+from problems.forms.prepared import Prepared
+
+from .definite import independence
+from .enclosure import SAFE, DoubleDouble, Enclosure, Panel, Residual, row_panels
+
+
+@dataclass(frozen=True)
+class Balanced:
+    """An assembly in units D (n, 1) and R (m, 1); A (n, m) and its rows and columns are A'."""
+
+    prepared: Prepared
+    D: Matrix
+    R: Matrix
+    A: sp.csr_array
+    At: sp.csr_array
+
+    @classmethod
+    def of(cls, prepared: Prepared) -> Balanced:
+        assembly = prepared.assembly
+        D = assembly.K.units
+        A = sp.csc_array(sp.diags_array(D) @ assembly.A)
+        size = abs(A).max(axis=0).toarray().ravel() if A.shape[1] else np.zeros(0)
+        R = np.exp2(-np.round(np.log2(np.where(size > 0, size, 1.0))))
+        A = sp.csc_array(A @ sp.diags_array(R))
+        return cls(prepared, D[:, None], R[:, None], sp.csr_array(A), sp.csr_array(A.T))
+
+    @property
+    def assembly(self) -> Assembly:
+        return self.prepared.assembly
+
+    def load(self, loads: Sequence[LoadCase]) -> LoadCase:
+        """f' (n, k) or (n, 1), g' (m, k)."""
+        both = stacked(loads)
+        return LoadCase(self.D * both.f, self.R * both.g)
+
+    def solve(self, b: Matrix) -> Matrix:
+        """K'⁻¹b."""
+        return self.assembly.K.solve(b / self.D) / self.D
+
+    def forces(self, f: Matrix, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
+        """r = f − Kx − Aλ, (n, k)."""
+        total = Residual(np.broadcast_to(f, x.hi.shape))
+        total.subtract_product(row_panels(self.A), _longest(self.A), lam)
+        total.subtract_product(self._panels(), max(map(_longest, self.assembly.K.matrices)), x)
+        return total.enclosed()
+
+    def gaps(self, g: Matrix, x: DoubleDouble) -> Enclosure:
+        """s = g − Aᵀx, (m, k)."""
+        total = Residual(g)
+        total.subtract_product(row_panels(self.At), _longest(self.At), x)
+        return total.enclosed()
+
+    @cached_property
+    def stiffest(self) -> float:
+        """‖K'‖_∞ or more."""
+        D = self.D[:, 0]
+        return SAFE * float((self.assembly.K.absolute_sums(D) * D).max(initial=0.0))
+
+    @cached_property
+    def sigma2(self) -> float:
+        """σ² ≤ λmin(A'ᵀA'), proven; 0 if the contacts are dependent."""
+        return independence(sp.csc_array(self.A))
+
+    def _panels(self) -> Iterator[Panel]:
+        """Rows of K'."""
+        D = self.D[:, 0]
+        for rows, columns, panel in self.assembly.K.panels():
+            if sp.issparse(panel):
+                data = panel.data * D[columns][panel.indices] * np.repeat(D[rows], np.diff(panel.indptr))
+                yield rows, columns, sp.csr_array((data, panel.indices, panel.indptr), shape=panel.shape)
+            else:
+                yield rows, columns, panel * D[columns] * D[rows, None]
+
+
+def _longest(M: Any) -> int:
+    """The most entries in a row of a symmetric or CSR matrix."""
+    return int(np.diff(M.indptr).max(initial=1)) if sp.issparse(M) else int(M.shape[1])

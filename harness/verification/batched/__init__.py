@@ -1,1 +1,0 @@
-"""The same bounds for many load cases at a time."""

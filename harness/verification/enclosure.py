@@ -1,0 +1,165 @@
+"""Numbers known to within an error: sums of two float64, products without rounding, norms from above.
+
+Sums are error-free: two_sum returns the rounding error beside the result (Knuth), and terms are added with
+their rounding errors (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26:1955–1988, 2005):
+|Σ computed − Σ| ≤ u|Σ| + γ²_k Σ|terms|, u = 2⁻⁵³, γ_k = ku/(1 − ku).
+
+Products Mx are sliced (Ozaki, Ogita, Oishi and Rump, Numer. Algorithms 59:95–118, 2012): M = M₁ + M₂ + M₃,
+x = x₁ + x₂ + x₃, where M₁, M₂, x₁ and x₂ have so few bits b that M₁x₁, M₁x₂ and M₂x₁ are exact in any order
+of summation: c products of 2b bits have a sum of at most 53 bits if 2(b − 1) + log₂ c ≤ 53, c the entries of
+the longest row. The other products, M₁x₃, M₂(x₂ + x₃) and M₃x, are 2⁻²ᵇ times smaller; so is their rounding:
+|fl(Pv) − Pv| ≤ γ_c |P||v| ≤ γ_c (Σ_j |P|_ij) max|v|.
+
+A product that underflows is off by η = 2⁻¹⁰⁷⁴ at most; additions are exact there. What overflows ends as
+infinity or NaN, which bounds nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.forms.assembly import Matrix, Vector
+from problems.stiffness.rounding import U, gamma
+
+ETA = 2.0**-1074  # the smallest positive number
+SAFE = 1.01  # for the rounding of the bounds themselves
+TERMS = 9  # of a row of a residual, or fewer: four for each product, and one
+ENTRIES_AT_A_TIME = 2**15  # of M: they and what is computed from them stay in the processor's cache
+
+#: (rows, columns, M[rows, columns]), dense or CSR; M is zero beside.
+Panel = tuple[slice, slice, Any]
+
+
+@dataclass(frozen=True)
+class DoubleDouble:
+    """hi + lo, |lo| at most about u|hi|."""
+
+    hi: Matrix
+    lo: Matrix
+
+    def plus(self, correction: Matrix) -> DoubleDouble:
+        hi, error = two_sum(self.hi, correction)
+        return DoubleDouble(*two_sum(hi, error + self.lo))
+
+    def __getitem__(self, place: Any) -> DoubleDouble:
+        return DoubleDouble(self.hi[place], self.lo[place])
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Values and an entrywise bound on their errors."""
+
+    value: Matrix
+    error: Matrix
+
+
+def two_sum(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
+    """(s, e) with s = fl(a + b) and s + e = a + b exactly."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+def exponent(size: Matrix | float) -> Any:
+    """The least e with |size| < 2^e."""
+    return np.frexp(size)[1].astype(float)
+
+
+def cut(a: Matrix, top: Matrix | float, bits: int) -> tuple[Matrix, Matrix]:
+    """a = piece + rest exactly, piece in units of 2^(top − bits + 1), for |a| ≤ 2^top."""
+    sigma = 1.5 * np.exp2(top + 53 - bits)
+    piece = (a + sigma) - sigma
+    return piece, a - piece
+
+
+def length(v: Matrix) -> Any:
+    """‖v‖₂ of each column, but for a relative rounding of nu; not finite if v is not.
+
+    Squares of entries below 1e-162 would underflow: v is scaled by a power of two first.
+    """
+    scale = np.exp2(exponent(abs(v).max(axis=0, initial=0.0)))
+    norm = np.linalg.norm(v / scale, axis=0)
+    return scale * norm + ETA * (norm > 0)  # the product may be rounded to a multiple of η
+
+
+class Residual:
+    """value − Σ products, a column for each load case; the terms are added with their rounding errors."""
+
+    def __init__(self, value: Matrix) -> None:
+        self.hi, self.lo = np.array(value), np.zeros(value.shape)
+        self.error = ETA * (value != 0)  # a value in other units may be rounded to a multiple of η
+
+    def subtract_product(self, panels: Iterable[Panel], longest: int, x: DoubleDouble) -> None:
+        """Mx, x (columns of M, k). panels : of M, no row with more entries."""
+        bits = (53 - int(np.ceil(np.log2(max(longest, 2))))) // 2 + 1
+        unit = _units(x.hi)  # M diag(unit) and x / unit have no rounding
+        hi, lo = x.hi / unit[:, None], x.lo / unit[:, None]
+        top = exponent(abs(hi).max(axis=0, initial=0.0))
+        x1, after = cut(hi, top, bits)
+        x2, x3 = cut(after, top - bits, bits)
+        x3, after = x3 + lo, after + lo  # rounded by at most a rounding of themselves
+        most, most3, most_after = (abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after))
+        # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one. M₃ by the second
+        # half of x is left out: a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, where u|Σ| covers γ²|Σ|.
+        rounding, again = gamma(longest + 8), 4 * gamma(TERMS) ** 2
+        of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
+        of_each = SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])
+        for rows, columns, panel in panels:
+            entries, count, above, of_row = _scaled(panel, unit[columns])
+            M1, rest = cut(entries, of_row(above), bits)
+            M2, M3 = cut(rest, of_row(above - bits), bits)
+            first, second, third = (_with(panel, part) for part in (M1, M2, M3))
+            rest = first @ x3[columns] + (second @ after[columns] + third @ hi[columns])
+            for term in (first @ x1[columns], first @ x2[columns], second @ x1[columns], rest):
+                self.hi[rows], error = two_sum(self.hi[rows], -term)
+                self.lo[rows] += error
+            of_M2 = count * np.exp2(above - bits)
+            of_M1 = _with(panel, abs(entries)).sum(axis=1)[:, None] + of_M2
+            self.error[rows] += np.hstack([of_M1, of_M2, of_M2 * 2.0**-bits, count + 1]) @ of_each
+
+    def enclosed(self) -> Enclosure:
+        value = self.hi + self.lo
+        return Enclosure(value, SAFE * (U * abs(value) + self.error))
+
+
+def _units(x: Matrix) -> Vector:
+    """Powers of two above the entries of each row; those of rows of zeros weigh no more than others."""
+    size = abs(x).max(axis=1, initial=0.0)
+    unit = np.exp2(exponent(size))
+    return np.where(size > 0, unit, unit[size > 0].min(initial=1.0))
+
+
+def row_panels(M: sp.csr_array) -> Iterator[Panel]:
+    """Some rows of M at a time."""
+    height = max(ENTRIES_AT_A_TIME * M.shape[0] // max(M.nnz, 1), 1)
+    for start in range(0, M.shape[0], height):
+        rows = slice(start, min(start + height, M.shape[0]))
+        yield rows, slice(None), M[rows]
+
+
+def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[[Matrix], Matrix]]:
+    """The entries of M diag(unit), of each row (r, 1) their number and the exponent of the largest, and what
+    gives each entry its row's.
+    """
+    if not sp.issparse(panel):
+        entries = panel * unit
+        top = exponent(abs(entries).max(axis=1, keepdims=True))
+        return entries, np.full_like(top, panel.shape[1]), top, lambda of_row: of_row
+    entries, count = panel.data * unit[panel.indices], np.diff(panel.indptr)
+    largest = np.zeros(len(count))
+    largest[count > 0] = (
+        np.maximum.reduceat(abs(entries), panel.indptr[:-1][count > 0]) if entries.size else 0
+    )
+    return entries, count[:, None], exponent(largest)[:, None], lambda of_row: np.repeat(of_row[:, 0], count)
+
+
+def _with(panel: Any, entries: Matrix) -> Any:
+    """The panel with other entries."""
+    if not sp.issparse(panel):
+        return entries
+    return sp.csr_array((entries, panel.indices, panel.indptr), shape=panel.shape)

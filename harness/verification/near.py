@@ -1,0 +1,79 @@
+"""The gaps of closed contacts made zero: Q_CC dλ = −y_C by an approximate inverse M ≈ Q⁻¹."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.forms.assembly import Vector
+from problems.forms.banded_inverse import BandedInverse, BandFactor
+from problems.forms.prepared import Prepared
+
+MAX_SETS = 10  # tried with M for one load case
+
+Contacts = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Near:
+    """M, if one can be made, and about the diagonal of Q (m,), both in units R (m,) of the contacts."""
+
+    M: BandedInverse | None
+    diagonal: Vector
+    R: Vector
+
+    @classmethod
+    def of(cls, prepared: Prepared, R: Vector) -> Near:
+        found = prepared.approximate_inverse if len(R) else None
+        return cls(found.M, found.diagonal * R**2, R)
+
+    def product(self, v: Vector) -> Vector:
+        """M v."""
+        assert self.M is not None
+        u = np.empty_like(v)
+        u[self.M.order] = self.M.product((v / self.R)[self.M.order])
+        return u / self.R
+
+    def factor(self, N: Contacts) -> BandFactor | None:
+        """Of M_NN; None without M, or if rounding makes it indefinite."""
+        if self.M is not None:
+            with suppress(np.linalg.LinAlgError):
+                return self.M.factor(N[self.M.order])
+        return None
+
+
+class ClosedContacts:
+    """C (m,) of a load case, and a first dλ (m,) ≥ −λ.
+
+    C = {λ_i q_ii > y_i} (semismooth Newton; Hintermüller, Ito and Kunisch, SIAM J. Optim. 13:865–888, 2002)
+    without those whose force would become negative. y (m,) : the gaps that dλ is to close. λ : as it is.
+    """
+
+    def __init__(self, near: Near, y: Vector, lam: Vector) -> None:
+        self.near, C = near, lam * near.diagonal > y
+        for _ in range(MAX_SETS):
+            self.C, self.factor = C, near.factor(~C)
+            if self.factor is None:
+                self.dlam = np.where(C, 0.0, -lam)
+                return
+            dlam = np.where(C, -self._solved(self.factor, np.where(C, y, 0.0), lam), -lam)
+            self.dlam = np.maximum(dlam, -lam)
+            negative = C & (lam + dlam < 0)
+            if not negative.any():
+                return
+            C = C & ~negative
+
+    def precondition(self, v: Vector) -> Vector:
+        """About Q_CC⁻¹ v, for v (m,) zero outside C; v itself without M."""
+        return v if self.factor is None else np.where(self.C, self._solved(self.factor, v, 0.0), 0.0)
+
+    def _solved(self, factor: BandFactor, v: Vector, lam: Vector | float) -> Vector:
+        """u with (M⁻¹u)_C = v_C and u_N = λ_N: u = M(v − t), M_NN t_N = (M v)_N − λ_N."""
+        near = self.near
+        assert near.M is not None
+        u, t = near.product(v), np.empty_like(v)
+        t[near.M.order] = factor.solve((np.where(self.C, 0.0, u - lam) * near.R)[near.M.order])
+        return u - near.product(t * near.R)

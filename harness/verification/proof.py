@@ -1,0 +1,170 @@
+"""A proven bound on the displacement error of an answer, from K, A, f, g and forces λ alone.
+
+x and λ ≥ 0 with C = {λ > 0} are the exact answer of another problem, f̃ = f − r and g̃ = g + δ, where
+
+    r = f − Kx − Aλ,    s = g − Aᵀx,    δ_i = −s_i for i in C,    δ_i = max(−s_i, 0) else.
+
+The answer is P(K⁻¹f), P the projection onto {Aᵀx ≤ g} in the norm of K. From f to f̃ it moves by at most
+‖r‖_{K⁻¹}. From g to g̃ the set is translated by d = A(AᵀA)⁻¹δ, and P then moves by at most ‖d‖_K, because
+I − P is nonexpansive. So, in balanced units (see `balanced`), with κ ≤ λmin(K) and σ² ≤ λmin(AᵀA),
+
+    |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).
+
+Nothing is assumed about the contact set: weakly active contacts need no special treatment, and it does not
+matter where λ came from. The bound is made small by a refinement of x and λ_C in twice the working precision:
+
+    x ← x + K⁻¹r,        Q_CC dλ = −y_C,        λ ← max(λ + dλ, 0),        x ← x − K⁻¹A dλ,
+
+by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditioned by M ≈ Q⁻¹ (see `near`). Load
+cases are columns, left out when done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.prepared import Prepared
+
+from .balanced import Balanced
+from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
+from .near import ClosedContacts, Near
+
+MAX_PASSES = 30
+MAX_WORSE = 2  # passes in a row that do not halve the bound
+MAX_PRODUCTS = 60  # of conjugate gradients in a pass
+REDUCTION = 1e-6  # of y_C in a pass
+AT_ROUNDING = 1.5  # of the rounding of x to float64: a bound that no further pass improves
+
+Contacts = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Proven:
+    """x (n,) and λ (m,) as sums of two float64; max|x.hi − x*| ≤ bound_mm over the displacements asked for.
+
+    bound_mm is infinite, never NaN, where nothing can be proven.
+    """
+
+    x: DoubleDouble
+    lam: DoubleDouble
+    bound_mm: float
+
+    @property
+    def active(self) -> Contacts:
+        return self.lam.hi > 0
+
+
+class Proof:
+    """What the load cases of an assembly share. kappa : κ ≤ λmin(DKD), in balanced units."""
+
+    def __init__(self, prepared: Prepared, kappa: float) -> None:
+        self.balanced, self.kappa = Balanced.of(prepared), kappa
+
+    @cached_property
+    def near(self) -> Near:
+        """Made when an answer is first refined."""
+        return Near.of(self.balanced.prepared, self.balanced.R[:, 0])
+
+    @cached_property
+    def spread(self) -> float:
+        """max|x − x*| / ‖δ‖₂ at most, mm."""
+        units = self.balanced
+        stretch = np.sqrt(np.divide(units.stiffest, units.sigma2 * self.kappa))
+        return float(units.assembly.at_junction(units.D).max(initial=0.0) * stretch) or 1.0
+
+    @np.errstate(over="ignore", invalid="ignore", divide="ignore")
+    def proven(
+        self,
+        loads: Sequence[LoadCase],
+        lams: Sequence[Vector],
+        xs: Iterable[Vector] | None = None,
+        enough_mm: float = 0.0,
+    ) -> list[Proven]:
+        """From forces λ (m,) N of each load case, and about their displacements x (n,), if known.
+
+        enough_mm : a bound that needs no further pass; one about the rounding of x never does.
+        """
+        units, load = self.balanced, self.balanced.load(loads)
+        f, g = np.broadcast_to(load.f, (len(units.D), len(loads))), load.g
+        lam = np.maximum(np.column_stack(lams), 0.0) / units.R
+        x = units.solve(f - units.A @ lam) if xs is None else np.column_stack(list(xs)) / units.D
+        state = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
+        best: list[Proven | None] = [None] * len(loads)
+        worse, left = np.zeros(len(loads), dtype=int), np.arange(len(loads))
+        for _ in range(MAX_PASSES):
+            x2, lam2 = state
+            r, s = units.forces(f, x2, lam2), units.gaps(g, x2)
+            bounds, rounding = self.bounds(x2, lam2, r, s)
+            going = np.ones(len(left), dtype=bool)
+            for column, k in enumerate(left):
+                bound, before = float(bounds[column]), best[k]
+                worse[k] = 0 if before is None or bound <= before.bound_mm / 2 else worse[k] + 1
+                if before is None or bound < before.bound_mm:
+                    best[k] = self._found(x2[:, column], lam2[:, column], bound)
+                enough = max(enough_mm, AT_ROUNDING * float(rounding[column]))
+                going[column] = not (bound <= enough or worse[k] == MAX_WORSE or not self.kappa > 0)
+            if not going.any():
+                break
+            left, f, g = left[going], f[:, going], g[:, going]
+            x2, lam2 = x2[:, going], lam2[:, going]
+            dx, dlam = self._corrections(r.value[:, going], s.value[:, going], lam2.hi, enough_mm)
+            moved = lam2.plus(dlam)
+            negative = moved.hi < 0
+            state = (
+                x2.plus(dx),
+                DoubleDouble(np.where(negative, 0, moved.hi), np.where(negative, 0, moved.lo)),
+            )
+        return [each for each in best if each is not None]
+
+    def bounds(self, x: DoubleDouble, lam: DoubleDouble, r: Enclosure, s: Enclosure) -> tuple[Vector, Vector]:
+        """(k,) mm of each column, and what of it is due to the rounding of x to float64."""
+        units, asked = self.balanced, self.balanced.assembly.at_junction
+        pressing = lam.hi > 0
+        delta = np.where(pressing, abs(s.value), np.maximum(-s.value, 0.0))
+        delta = delta + s.error * (pressing | (s.value < s.error))
+        force = length(abs(r.value) + r.error)
+        stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if delta.any() else 0.0
+        error = SAFE * (force / np.sqrt(self.kappa) + length(delta) * stretch) / np.sqrt(self.kappa)
+        D, lo = asked(units.D), abs(asked(x.lo))
+        bounds = SAFE * (D * (error + lo)).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
+        valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
+        return np.where(valid, bounds, np.inf), (D * lo).max(axis=0, initial=0.0)
+
+    def _corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float) -> tuple[Matrix, Matrix]:
+        """dx and dλ. r, s, λ : as they are, a column for each load case."""
+        units = self.balanced
+        dx = units.solve(r)
+        y = s - units.At @ dx
+        starts = [ClosedContacts(self.near, *columns) for columns in zip(y.T, lam.T, strict=True)]
+        C = np.column_stack([start.C for start in starts])
+        dlam = np.column_stack([start.dlam for start in starts])
+        w = units.solve(units.A @ dlam)
+        dx -= w
+        missed = np.where(C, -(y + units.At @ w), 0.0)
+        target = np.maximum(REDUCTION * length(np.where(C, y, 0.0)), enough_mm / 4 / self.spread)
+        direction, before = np.zeros_like(missed), np.ones(missed.shape[1])
+        for _ in range(MAX_PRODUCTS):
+            going = length(missed) > target
+            if not going.any():
+                break
+            columns = zip(starts, missed.T, strict=True)
+            z = np.where(going, np.column_stack([start.precondition(v) for start, v in columns]), 0.0)
+            product = (missed * z).sum(axis=0)
+            direction = z + np.where(product > 0, product / before, 0.0) * direction
+            w = units.solve(units.A @ direction)
+            q = np.where(C, units.At @ w, 0.0)
+            energy = (direction * q).sum(axis=0)
+            step = np.where(going & (energy > 0), product / energy, 0.0)
+            dlam, dx, missed = dlam + step * direction, dx - step * w, missed - step * q
+            before = np.where(product > 0, product, 1.0)
+        return dx, dlam
+
+    def _found(self, x: DoubleDouble, lam: DoubleDouble, bound_mm: float) -> Proven:
+        D, R = self.balanced.D[:, 0], self.balanced.R[:, 0]
+        return Proven(DoubleDouble(D * x.hi, D * x.lo), DoubleDouble(R * lam.hi, R * lam.lo), bound_mm)

@@ -1,0 +1,185 @@
+"""Terms of the smallest eigenvalue's lower bound, each where it dominates, for a dense block and a band.
+
+The errors are exact: in closed form, or in rational numbers. `mutate_proofs.py` takes the terms out in turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from lambda_min import proven, proven_in_units
+from sparse_matrices import band_matrix, chain, graph_matrix
+
+from harness.verification import definite
+from harness.verification.definite import independence
+from problems.forms.assembly import Matrix, Vector
+from problems.stiffness.operator import Stiffness
+from problems.stiffness.rounding import U, gamma
+
+KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array])
+Kind = Callable[[Any], Any]
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 40])
+@pytest.mark.parametrize("c", [1e-10, 1e-6])
+@pytest.mark.parametrize("blocks", [1, 3])
+@KINDS
+def test_the_margin_is_that_of_the_theorem(kind: Kind, n: int, c: float, blocks: int) -> None:
+    """K = 11ᵀ + cI: |R|ᵀ|R| = B, and ‖B‖₂ = n. Of three such in one band, no sum has more than n terms."""
+    if blocks > 1 and kind is np.asfortranarray:
+        pytest.skip("sums of a dense block are as long as the block")
+    K = sp.block_diag([np.ones((n, n)) + c * np.eye(n)] * blocks).toarray()
+    s = 0.9 * c
+    margin = Fraction(s) - Fraction(proven(kind(K), s))
+    theorem = Fraction(gamma(2 * (n + 1))) * n + Fraction(U)
+    assert Fraction(1009, 1000) <= margin / theorem <= Fraction(1013, 1000)
+
+
+@KINDS
+def test_a_matrix_that_completes_by_rounding_is_not_taken_for_definite(kind: Kind) -> None:
+    """λmin = c exactly, s just above it, and the factorisation of the indefinite K − sI completes."""
+    completed = 0
+    for seed in range(60):
+        v = np.random.default_rng(seed).integers(2**19, 2**20, 2).astype(float)
+        c = 2.0**-13  # below a rounding of the entries of vvᵀ, up to 2⁴⁰
+        K = np.outer(v, v) + c * np.eye(2)
+        s = 1.01 * c
+        try:
+            np.linalg.cholesky(K - s * np.eye(2))
+        except np.linalg.LinAlgError:
+            continue
+        completed += 1
+        assert proven(kind(K), s) <= c
+    assert completed > 5
+
+
+@pytest.mark.parametrize(("K", "norm"), [([[1.0, -0.9], [-0.9, 1.0]], 1.9), ([[1.0, 0.0], [0.0, 0.01]], 1.0)])
+@KINDS
+def test_the_norm_is_the_largest_and_of_sizes(kind: Kind, K: list[list[float]], norm: float) -> None:
+    """‖|R|ᵀ|R|‖₂, where K itself has 1.9 as well; and where the rows of R differ."""
+    s, terms = 1e-3, 2 if kind is np.asfortranarray or K[0][1] else 1
+    theorem = Fraction(gamma(2 * (terms + 1))) * Fraction(norm) + Fraction(U) * Fraction(1.0 - s)
+    assert Fraction(s) - Fraction(proven(kind(np.array(K)), s)) >= Fraction(1005, 1000) * theorem
+
+
+@KINDS
+def test_the_rounding_of_the_difference_counts(kind: Kind) -> None:
+    """n = 1: the theorem's margin is 5u (1 − s), and s − margin is rounded by up to us/2."""
+    for k in range(100):
+        K = 1 + k / 128
+        for s in (0.9 * K, 0.5 * K):
+            margin = Fraction(s) - Fraction(proven(kind(np.full((1, 1), K)), s))
+            assert margin >= (Fraction(gamma(4)) + Fraction(U)) * (Fraction(K) - Fraction(s))
+
+
+@pytest.mark.parametrize("exponent", [-990, -500, 500, 1000])
+@KINDS
+def test_in_any_unit(kind: Kind, exponent: int) -> None:
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    usual, scaled = proven(kind(K), 0.9), proven(kind(np.ldexp(K, exponent)), np.ldexp(0.9, exponent))
+    assert scaled == np.ldexp(usual, exponent)
+    assert proven(kind(np.ldexp(K, -1040)), 2.0**-1040) == 0.0
+    assert proven(kind(np.diag([2.0**-995, 2.0**-1010])), 2.0**-1010) == 0.0
+
+
+@KINDS
+def test_a_factorisation_that_stops_proves_nothing(kind: Kind) -> None:
+    """λmin = 3: shares of the guess above it are passed over."""
+    K = kind(np.array([[4.0, 1.0], [1.0, 4.0]]))
+    assert proven(K, 2.0**9) == 0.0
+    assert 1.9 < proven(K, 10.0) <= 2.0
+
+
+def is_semidefinite(K: Matrix, D: Vector, kappa: float) -> bool:
+    """Whether no eigenvalue of DKD − κI is negative, in rational arithmetic."""
+    S = [
+        [Fraction(k) * Fraction(a) * Fraction(b) for k, a in zip(row, D, strict=True)]
+        for row, b in zip(K, D, strict=True)
+    ]
+    for i in range(len(S)):
+        S[i][i] -= Fraction(kappa)
+    for k in range(len(S)):
+        if S[k][k] < 0 or (S[k][k] == 0 and any(S[k][k + 1 :])):
+            return False
+        if S[k][k]:
+            for i in range(k + 1, len(S)):
+                share = S[i][k] / S[k][k]
+                for j in range(k + 1, len(S)):
+                    S[i][j] -= share * S[k][j]
+    return True
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_lambda_min_is_proven_for_matrices_that_are_nearly_singular(seed: int) -> None:
+    """λmin from 1e-2 down to what rounding leaves, and below zero: κ is never above it."""
+    random = np.random.default_rng(seed)
+    n = int(random.integers(2, 11))
+    K = band_matrix(random, n, int(random.integers(0, 4)))
+    D = Stiffness.of(K).units
+    least = float(np.linalg.eigvalsh(D[:, None] * K.toarray() * D)[0])
+    proven = []
+    for left in (1e-2, 1e-5, 1e-8, 1e-12, 1e-15, 1e-16, 0.0, -1e-16):
+        near = sp.csc_array(K - sp.diags_array((least - left) / D**2))
+        held = Stiffness.of(near)
+        units = held.units
+        kappa = proven_in_units(held, units)
+        if kappa > 0:
+            assert is_semidefinite(near.toarray(), units, kappa)
+            assert not is_semidefinite(near.toarray(), units, 16 * kappa)
+        proven.append(kappa > 0)
+    assert proven[:4] == [True] * 4
+
+
+@pytest.mark.parametrize("n", [5, 60, 300])
+def test_lambda_min_of_a_chain_held_softly(n: int) -> None:
+    """3 (chain + cI): λmin(DKD) = 3c/4 exactly, the largest ones 3."""
+    for c in 2.0 ** -np.arange(2, 60, 4):
+        K = sp.csc_array(3 * (chain(n) + c * sp.eye_array(n)))
+        if K.diagonal()[1] == 6.0:  # c is lost in rounding
+            break
+        for order in (np.arange(n), np.random.default_rng(1).permutation(n)):
+            held = Stiffness.of(sp.csc_array(K[order][:, order]))
+            assert (held.units == 0.5).all()
+            kappa = proven_in_units(held, held.units)
+            assert kappa <= 0.75 * c
+            assert c < 1e-11 or kappa >= 0.3 * c
+
+
+def test_the_softest_block_counts_and_a_general_one_too() -> None:
+    random = np.random.default_rng(2)
+    blocks = (sp.csc_array(3 * (chain(40) + 2.0**-12 * sp.eye_array(40))), graph_matrix(random, 400))
+    for order in (blocks, blocks[::-1]):
+        held = Stiffness.of(*order)
+        assert 0.3 * 2.0**-12 <= proven_in_units(held, held.units) <= 0.75 * 2.0**-12
+
+
+def test_independence_of_contacts() -> None:
+    """Two parts: 2. A chain of three parts: AᵀA = [[2, −1], [−1, 2]] at each node, 1. A tool: 1."""
+    eye = sp.eye_array(4)
+    pair = sp.csc_array(sp.vstack([eye, -eye]))
+    chain = sp.csc_array(sp.block_array([[eye, None], [-eye, eye], [None, -eye]]))
+    for A, wanted in ((pair, 2.0), (chain, 1.0), (sp.csc_array(eye), 1.0)):
+        assert 0.8 * wanted <= independence(A) <= wanted
+    assert independence(sp.csc_array(sp.hstack([eye, eye]))) == 0.0
+
+
+def test_independence_counts_the_rounding_of_long_sums(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(definite, "SHARE", 1 - 2.0**-50)  # so that nothing else is left to spare
+    for entry in (0.1, 0.7, 1.1):
+        found = independence(sp.csc_array(np.full((4096, 1), entry)))
+        assert 0 < Fraction(found) <= 4096 * Fraction(entry) ** 2
+
+
+def test_independence_counts_the_rounding_of_its_products() -> None:
+    a = np.array([[0.1, 0.3], [0.7, 0.9], [0.2, 0.4]])
+    G = [[sum(Fraction(p) * Fraction(q) for p, q in zip(u, v, strict=True)) for v in a.T] for u in a.T]
+    sigma2 = Fraction(independence(sp.csc_array(a)))
+    assert (G[0][0] - sigma2) * (G[1][1] - sigma2) >= G[0][1] ** 2
+    nearly = np.array([[1.0, 1.0], [0.0, 2.0**-20]])  # λmin(AᵀA) is 2⁻⁴¹, a product is rounded by 2⁻⁵³
+    assert 0 < independence(sp.csc_array(nearly)) <= 2.0**-41
+    assert independence(sp.csc_array(nearly * [[1.0], [2.0**-4]])) == 0.0  # 2⁻⁴⁹

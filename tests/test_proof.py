@@ -1,0 +1,300 @@
+"""The one bound: each of its terms where it dominates and is attained, and refinement from any forces.
+
+The errors are known in closed form. `mutate_proofs.py` takes the terms out in turn.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from harness.verification.assess import assess
+from harness.verification.enclosure import DoubleDouble, Enclosure
+from harness.verification.proof import Proof
+from harness.verification.reference import proof_of
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
+
+KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array], ids=["dense", "sparse"])
+
+
+def array(*values: float) -> np.ndarray:
+    return np.array(values, dtype=float)
+
+
+def springs(
+    kind: Any, *stiffness: float, A: Any = None, junction: Any = None, exact: bool = True
+) -> tuple[Proof, Assembly]:
+    """Independent springs, the first against a rigid tool. exact : with the exact constants of the bound."""
+    n = len(stiffness)
+    contacts = sp.csc_array(np.eye(n, 1) if A is None else np.asarray(A, dtype=float).reshape(n, -1))
+    made = Assembly(Stiffness.of(kind(np.diag(array(*stiffness)))), contacts, junction=junction)
+    proof = proof_of(Prepared(made))
+    if exact:
+        proof.kappa, proof.balanced.__dict__["stiffest"] = 1.0, 1.0
+        scaled = proof.balanced.A.toarray()
+        proof.balanced.__dict__["sigma2"] = float(np.linalg.eigvalsh(scaled.T @ scaled)[0])
+    return proof, made
+
+
+def bound(
+    proof: Proof,
+    load: LoadCase,
+    x: np.ndarray,
+    lam: np.ndarray,
+    lo: float = 0.0,
+    s: float = 0.0,
+    r: float = 0.0,
+) -> float:
+    """Of x and λ as they are. lo : the second half of x; s, r : uncertainties of gap and force, mm and N."""
+    units, one = proof.balanced, proof.balanced.load([load])
+    at = DoubleDouble(x[:, None] / units.D, np.full((len(x), 1), lo) / units.D)
+    forces = DoubleDouble(lam[:, None] / units.R, np.zeros((len(lam), 1)))
+    force, gap = units.forces(one.f, at, forces), units.gaps(one.g, at)
+    force = Enclosure(force.value, force.error + r * units.D)
+    return float(proof.bounds(at, forces, force, Enclosure(gap.value, gap.error + s * units.R))[0][0])
+
+
+#: Springs of 4 and 16 N/mm; x* = (1, 2), λ* = 6 N.
+LOAD = LoadCase(array(10.0, 32.0), array(1.0))
+
+
+@KINDS
+@pytest.mark.parametrize("x", [1.001, 0.999])
+def test_a_closed_contact_with_a_gap_or_an_overlap_moves_the_answer_by_as_much(kind: Any, x: float) -> None:
+    proof, _ = springs(kind, 4.0, 16.0)
+    assert 1e-3 * (1 - 1e-12) <= bound(proof, LOAD, array(x, 2.0), array(10 - 4 * x)) <= 1.03e-3
+
+
+@KINDS
+def test_an_overlap_of_an_open_contact_counts_and_a_gap_does_not(kind: Any) -> None:
+    proof, _ = springs(kind, 4.0, 16.0)
+    touching = LoadCase(array(4.004, 32.0), array(1.0))  # x* = 1, λ* = 0.004
+    assert 1e-3 <= bound(proof, touching, array(1.001, 2.0), array(0.0)) <= 1.03e-3
+    assert bound(proof, LoadCase(array(2.0, 32.0), array(1.0)), array(0.5, 2.0), array(0.0)) <= 1e-14
+
+
+@KINDS
+@pytest.mark.parametrize("a", [0.25, 1.0, 8.0])
+def test_a_normal_that_is_long_or_short_moves_the_answer_by_less_or_more(kind: Any, a: float) -> None:
+    """A gap of 1e-3 in units of the contact."""
+    proof, _ = springs(kind, 4.0, A=[a])
+    x = 1 - 1e-3 / a
+    found = bound(proof, LoadCase(array(10.0), array(a)), array(x), array((10 - 4 * x) / a))
+    assert 1e-3 / a * (1 - 1e-12) <= found <= 1.03e-3 / a
+
+
+@KINDS
+def test_both_sides_of_a_gap_move(kind: Any) -> None:
+    """AᵀA = 2, and each side moves by half of the gap; σ counts as it stands in the bound."""
+    proof, _ = springs(kind, 1.0, 1.0, A=[[1.0], [-1.0]])
+    found = bound(proof, LoadCase(array(2.0, 0.0), array(0.0)), array(1.0 - 1e-3, 1.0), array(1.0))
+    assert found >= 1e-3 / 2
+    proof.balanced.__dict__["sigma2"] = proof.balanced.sigma2 / 4
+    assert bound(
+        proof, LoadCase(array(1.0, 1.0), array(1e-3)), array(1.0, 1.0), array(1e-30)
+    ) >= 1e-3 * np.sqrt(2)
+    proof.balanced.__dict__["stiffest"] = 4.0
+    assert bound(
+        proof, LoadCase(array(1.0, 1.0), array(1e-3)), array(1.0, 1.0), array(1e-30)
+    ) >= 2e-3 * np.sqrt(2)
+
+
+@KINDS
+def test_a_force_out_of_balance_moves_the_answer_in_the_unit_of_its_unknown(kind: Any) -> None:
+    """The first unknown is twice as soft, so that it might be that one, if it is asked for."""
+    proof, _ = springs(kind, 4.0, 16.0)
+    assert 1e-3 <= bound(proof, LOAD, array(1.0, 2.001), array(6.0)) <= 2.05e-3
+    second, _ = springs(kind, 4.0, 16.0, junction=np.array([1]))
+    assert 1e-3 <= bound(second, LOAD, array(1.0, 2.001), array(6.0)) <= 1.03e-3
+    for n in (1, 4):  # equal errors: the bound is on their length
+        many, _ = springs(kind, *[4.0] * n)
+        free = LoadCase(np.full(n, 4.0), array(10.0))
+        found = bound(many, free, np.full(n, 1 + 2.0**-20), array(0.0))
+        assert 2.0**-20 * np.sqrt(n) <= found <= 1.03 * 2.0**-20 * np.sqrt(n)
+
+
+@KINDS
+@pytest.mark.parametrize("kappa", [1 / 16, 1 / 4])
+def test_a_softer_K_has_a_wider_bound(kind: Any, kappa: float) -> None:
+    """1/κ by forces, 1/√κ by gaps."""
+    proof, _ = springs(kind, 4.0)
+    by_force, by_gap = (
+        (LoadCase(array(4.0), array(10.0)), array(1.001), array(0.0)),
+        (LoadCase(array(10.0), array(1.0)), array(0.999), array(10 - 4 * 0.999)),
+    )
+    proof.kappa = kappa
+    assert 1e-3 / kappa <= bound(proof, *by_force) <= 1.03e-3 / kappa
+    assert 1e-3 * (1 - 1e-12) / np.sqrt(kappa) <= bound(proof, *by_gap) <= 1.03e-3 / np.sqrt(kappa)
+
+
+@KINDS
+def test_what_is_not_known_of_the_residuals_counts(kind: Any) -> None:
+    proof, _ = springs(kind, 4.0, 16.0)
+    at = array(1.0, 2.0), array(6.0)
+    assert bound(proof, LOAD, *at) < 1e-14
+    assert 1e-3 <= bound(proof, LOAD, *at, s=1e-3) <= 1.03e-3
+    assert 1e-3 <= bound(proof, LOAD, *at, r=4e-3) <= 4e-3
+    assert 2e-3 <= bound(proof, LOAD, array(1.001, 2.0), array(5.996), s=1e-3) <= 2.05e-3
+    open_, touching = (LoadCase(array(4.0, 32.0), array(g)) for g in (2.0, 1.0))  # λ* = 0
+    assert bound(proof, open_, array(1.0, 2.0), array(0.0), s=1e-3) < 1e-14
+    assert 1e-3 <= bound(proof, touching, array(1.0, 2.0), array(0.0), s=1e-3) <= 1.03e-3
+
+
+@KINDS
+def test_what_is_cut_off_from_x_counts_in_mm(kind: Any) -> None:
+    proof, _ = springs(kind, 4.0, 16.0)
+    load = LoadCase(array(10.0, 32.0) + array(4.0, 16.0) * 0.25, array(1.25))
+    assert 0.25 <= bound(proof, load, array(1.0, 2.0), array(6.0), lo=0.25) <= 0.26
+
+
+@KINDS
+def test_an_answer_that_underflows_is_rounded(kind: Any) -> None:
+    """x* = 0.75 η is no number."""
+    proof, _ = springs(kind, 2.0**40)
+    eta = 2.0**-1074
+    (found,) = proof.proven([LoadCase(array(0.75 * 2.0**40 * eta), array(1.0))], [array(0.0)])
+    assert (
+        abs(Fraction(float(found.x.hi[0])) - Fraction(eta) * 3 / 4) <= Fraction(found.bound_mm) <= 2.0**-1060
+    )
+
+
+@KINDS
+def test_the_norm_of_K_is_in_balanced_units(kind: Any) -> None:
+    assert 1.0 <= springs(kind, 4.0, 2.0**40, exact=False)[0].balanced.stiffest <= 1.02
+
+
+@KINDS
+def test_nothing_is_proven_of_forces_that_pull_or_of_a_K_or_A_that_is_not(kind: Any) -> None:
+    at = array(1.0, 2.0)
+    proof, _ = springs(kind, 4.0, 16.0)
+    assert bound(proof, LOAD, at, array(-1e-30)) == np.inf
+    proof.kappa = 0.0
+    with np.errstate(all="ignore"):
+        assert bound(proof, LOAD, at, array(6.0)) == np.inf
+        assert proof.proven([LOAD], [array(6.0)])[0].bound_mm == np.inf
+        twice, _ = springs(kind, 4.0, 16.0, A=[[1.0, 1.0], [0.0, 0.0]], exact=False)
+        load = LoadCase(LOAD.f, array(1.0, 1.0))
+        assert twice.balanced.sigma2 == 0.0
+        assert bound(twice, load, array(0.999, 2.0), array(3.0, 3.0)) == np.inf
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@KINDS
+@pytest.mark.parametrize("bad", [1.7e308, np.inf, np.nan])
+def test_what_overflows_proves_nothing(kind: Any, bad: float) -> None:
+    proof, _ = springs(kind, 0.25, exact=False)
+    load = LoadCase(array(1.7e308), array(1.0))
+    found = proof.proven([load], [array(0.0)], [array(bad)])[0]
+    assert found.bound_mm == np.inf or np.isfinite(found.x.hi).all()
+    if np.isfinite(bad):
+        for lam in (bad, -bad):
+            assert assess(proof, [load], [array(lam)], [None])[0].bound_mm == np.inf
+
+
+@KINDS
+@pytest.mark.parametrize("cases", [1, 3])
+def test_refinement_ends_at_the_answer_from_any_forces(kind: Any, cases: int) -> None:
+    proof, _ = springs(kind, 4.0, 16.0, exact=False)
+    for lam in (0.0, 3.0, 6.0, 60.0, -1.0, 1e-30):
+        loads = [LoadCase(LOAD.f, array(1.0 - k / 8)) for k in range(cases)]
+        found = proof.proven(loads, [array(lam)] * cases)
+        for k, each in enumerate(found):
+            assert each.bound_mm <= 1e-15
+            np.testing.assert_allclose(each.x.hi, [1.0 - k / 8, 2.0], atol=1e-15)
+            assert each.lam.hi == pytest.approx(6.0 + k / 2)
+            assert each.active.all()
+
+
+def beam(n: int, kind: Any, spread: int) -> tuple[Prepared, LoadCase, np.ndarray, np.ndarray]:
+    """A chain held softly with a contact at each unknown, and its answer in integers: a third of the contacts
+    closed, a third closed without a force. spread : bits between the sizes of the contacts' units.
+    """
+    rng = np.random.default_rng(n)
+    K = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    K = K @ K + 2.0**-10 * np.eye(n)
+    A = np.diag(rng.choice([-1.0, 1.0], n) * 2.0 ** rng.integers(-spread, spread + 1, n))
+    x, of = rng.integers(-(2**10), 2**10, n).astype(float), np.arange(n) % 3
+    lam = np.where(of == 0, rng.integers(1, 2**10, n), 0).astype(float)
+    y = np.where(of == 2, rng.integers(1, 2**10, n), 0) / 2.0**spread
+    load = LoadCase(K @ x + A @ lam, A.T @ x + y)
+    nodes = np.column_stack([np.arange(n, dtype=float), np.zeros(n)])
+    return Prepared(Assembly(Stiffness.of(kind(K)), sp.csc_array(A), nodes)), load, x, lam
+
+
+@KINDS
+@pytest.mark.parametrize("spread", [0, 8])
+@pytest.mark.parametrize("without_M", [False, True])
+@pytest.mark.parametrize("n", [6, 150])
+def test_forces_near_the_answer_are_refined_to_rounding(
+    n: int, without_M: bool, spread: int, kind: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By an approximate inverse of Q, by its exact one, and by conjugate gradients alone, which need a better
+    guess of which contacts touch without a force."""
+    data, load, x, lam = beam(n, kind, spread)
+    if without_M:
+        monkeypatch.setattr(Prepared, "approximate_inverse", None)
+    noise = 1 + (1e-12 if without_M else 1e-6) * np.random.default_rng(1).standard_normal((3, n))
+    found = proof_of(data).proven([load] * 3, list(lam * noise))
+    for each in found:
+        assert abs(each.x.hi - x).max() <= each.bound_mm <= 1e-12
+        np.testing.assert_allclose(each.lam.hi, lam, atol=1e-9 * lam.max())
+
+
+def test_a_case_that_is_near_enough_is_not_refined_with_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, load, _, lam = beam(60, sp.csc_array, 0)
+    proof, passes = proof_of(data), []
+    corrections = proof._corrections
+
+    def noted(r: np.ndarray, *others: Any) -> Any:
+        passes.append(r.shape[1])
+        return corrections(r, *others)
+
+    monkeypatch.setattr(proof, "_corrections", noted)
+    assert proof.proven([load], [lam * 1.001], enough_mm=1e9)[0].bound_mm <= 1e9
+    assert not passes
+    both = proof.proven([load, load], [lam, lam * 1.001], enough_mm=1e-7)
+    assert set(passes) == {1}
+    assert max(each.bound_mm for each in both) <= 1e-7
+
+
+def shed(kind: Any, stiffness: float, force: float, x: float | None = None) -> tuple[float, Fraction]:
+    """Bound and exact error of an answer that presses an open contact with a force; no load, x* = 0."""
+    proof, _ = springs(kind, stiffness, exact=False)
+    own = None if x is None else array(x)
+    (found,) = assess(proof, [LoadCase(array(0.0), array(10.0))], [array(force)], [own])
+    return found.bound_mm, abs(Fraction(float(found.x[0])))
+
+
+@KINDS
+@pytest.mark.parametrize("stiffness", [1.0, 3.0, 7e-290])
+def test_an_answer_is_bounded_by_its_distance_from_the_proven_one(kind: Any, stiffness: float) -> None:
+    for k in range(20):
+        bound_mm, error = shed(kind, stiffness, (1 + k / 7) * stiffness)
+        assert error <= Fraction(bound_mm) <= error * Fraction(102, 100)
+        bound_mm, error = shed(kind, stiffness, 0.0, 1 + k / 7)
+        assert error <= Fraction(bound_mm) <= error * Fraction(102, 100)
+
+
+@KINDS
+def test_the_rounding_of_what_was_moved_counts(kind: Any) -> None:
+    """A solver's own x, far from k/3 and near it: the distance is itself rounded."""
+    proof, _ = springs(kind, 3.0, exact=False)
+    for k in range(1, 60):
+        for x in (1e9 * k / 7, k / 3, np.nextafter(k / 3, 0.0)):
+            (found,) = assess(proof, [LoadCase(array(float(k)), array(1e12))], [array(0.0)], [array(x)])
+            error = abs(Fraction(float(x)) - Fraction(k, 3))
+            assert error <= Fraction(found.bound_mm) <= error * 4 + Fraction(k, 10**15)
+
+
+@KINDS
+def test_the_bound_of_the_proven_answer_counts(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    proof, _ = springs(kind, 4.0, exact=False)
+    monkeypatch.setattr(proof, "bounds", lambda x, *_: (np.ones(x.hi.shape[1]), np.ones(x.hi.shape[1])))
+    (found,) = assess(proof, [LoadCase(array(4.0), array(10.0))], [array(0.0)], [None])
+    assert 1.0 <= found.bound_mm <= 1.02
