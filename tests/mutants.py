@@ -195,9 +195,9 @@ MUTANTS = [
     Mutant(KKT, "max(float((-y).max(initial=0.0)), float(", "max(float("),
     Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "0.0"),
     Mutant(KKT, "float(abs(y[lam > 0]).max(initial=0.0))", "float(y[lam > 0].min(initial=0.0))"),
-    Mutant(KKT, "(abs(p) + size)", "abs(p)"),
-    Mutant(KKT, "(abs(p) + size)", "(abs(Q) @ lam)"),
-    Mutant(KKT, "4 * EPS * float((abs(p) + size)", "8 * EPS * float((abs(p) + size)"),
+    Mutant(KKT, "(abs(p) + abs(Q) @ lam)", "abs(p)"),
+    Mutant(KKT, "(abs(p) + abs(Q) @ lam)", "(abs(Q) @ lam)"),
+    Mutant(KKT, "4 * EPS * float((abs(p) + abs(Q) @ lam)", "8 * EPS * float((abs(p) + abs(Q) @ lam)"),
 ]
 
 

@@ -27,8 +27,11 @@ class Near:
 
     @classmethod
     def of(cls, prepared: Prepared, R: Vector) -> Near:
-        found = prepared.approximate_inverse if len(R) else None
-        return cls(found.M, found.diagonal * R**2, R)
+        with suppress(np.linalg.LinAlgError):  # Q is not positive definite, but for rounding
+            if len(R):
+                found = prepared.approximate_inverse
+                return cls(found.M, found.diagonal * R**2, R)
+        return cls(None, np.ones(len(R)), R)
 
     def product(self, v: Vector) -> Vector:
         """M v."""
