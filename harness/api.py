@@ -16,7 +16,6 @@ InputError. Matrices are cached as by the command line.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -26,14 +25,15 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-import harness.verification.judge as referee
 from harness.conformance.check import run as check_solver
 from harness.planning.road import chosen_form
+from harness.scene import solution
+from harness.scene.solution import Solution, solver_named
 from harness.series.session import Job, Result, SeriesSession
-from harness.solving.answer import answer_of, forces_of, form_of
+from harness.solving.answer import forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
-from harness.verification.reference import reference_of
-from problems.build import load_case, prepared
+from harness.verification.reference_problem import opened
+from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.manufactured_problem import ManufacturedProblem
@@ -48,7 +48,6 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import MadeScene, Scene
 from problems.scene import read_scene, scene_of
 from solvers.base import Answer, Solver
-from solvers.registry import in_house, make_solver
 
 __all__ = [
     "Answer",
@@ -70,27 +69,6 @@ __all__ = [
 
 NOT_FINITE = "NaN or infinity"
 Source = Scene | str | Path | Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Solution:
-    """An answer to a scene.
-
-    x : (n,) displacements, mm. lam : (m,) contact forces, N; NaN if the solver gives none.
-    gap : (m,) the remaining gaps, g − Aᵀx, mm.
-    status, iterations : what the solver said; the reference has no iterations.
-    judgement : what the judge found. error_bound_mm : proven, max|x − x*| for the exact answer x*.
-    notes : what was rounded or symmetrised of your own matrices; x* is the answer to what that gave.
-    """
-
-    x: Vector
-    lam: Vector
-    gap: Vector
-    status: str
-    iterations: int | None
-    judgement: Judgement
-    error_bound_mm: float
-    notes: tuple[str, ...] = ()
 
 
 def load_scene(source: Source) -> Scene:
@@ -128,34 +106,8 @@ def solve(
     form: Form | None = None,
     tolerance: float = 1e-9,
 ) -> Solution:
-    """Solve a scene, and judge the answer.
-
-    solver : a name (`python -m harness list solvers`) or an object of your own; by default the certified
-        reference, as also where the answer without contact violates no gap and so no solver is called for.
-    form : "primal", "dual" or "sparse"; by default the cheaper one that the solver takes, as of the command.
-    tolerance : passed to the solver, with its options.
-    """
-    scene = load_scene(scene)
-    named = None if solver is None else _solver(solver, options)
-    own = not (solver is None or (isinstance(solver, str) and in_house(solver)))
-    forms = FORMS if named is None else named[1].forms
-    asked = form_of(named[0], forms, form) if form and named else form
-    taken = chosen_form(scene, forms, asked, in_house=not own).form
-    data, load = prepared(scene, form=taken), load_case(scene, taken)
-    has_contact = bool((data.dual_load(load) > 0).any())
-    known = reference_of(scene, data, load)
-    answer = Answer("solved", known.lam, known.x)
-    if named is not None and has_contact:
-        name, chosen = named
-        answer = answer_of(name, chosen, data, taken, load, tolerance)
-    x = np.asarray(answer.x, dtype=float)
-    lam = np.full(data.assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
-    judgement = referee.judge(data, load, known, x, lam, LIMIT_MM)
-    error = judgement.displacement_error_mm
-    bound = np.inf if error is None else error + known.bound_mm
-    gap = load.g - data.assembly.A.T @ x
-    x = data.assembly.at_junction(x)
-    return Solution(x, lam, gap, answer.status, answer.iterations, judgement, bound, data.assembly.notes)
+    """Solve a scene, and judge the answer: see `harness.scene.solution.solve`."""
+    return solution.solve(load_scene(scene), solver, options=options, form=form, tolerance=tolerance)
 
 
 def judge(
@@ -170,13 +122,11 @@ def judge(
     In the sparse form x are all unknowns of the model, and nothing dense is made.
     """
     scene = load_scene(scene)
-    form = chosen_form(scene, FORMS, form).form
-    data, load = prepared(scene, form=form), load_case(scene, form)
-    n, m = data.assembly.n, data.assembly.m
+    problem = opened(scene, chosen_form(scene, FORMS, form).form)
+    n, m = problem.prepared.assembly.n, problem.prepared.assembly.m
     x = _vector("judge", "x", x, n)
     forces = np.full(m, np.nan) if lam is None else _vector("judge", "lam", lam, m)
-    known = reference_of(scene, data, load)
-    return referee.judge(data, load, known, x, forces, limit_mm)
+    return problem.judged(x, forces, limit_mm)
 
 
 def solve_dual(
@@ -203,7 +153,7 @@ def solve_dual(
         sla.cholesky(Q)
     except np.linalg.LinAlgError as error:
         raise InputError.one("solve_dual", "Q", str(error), "must be positive definite") from error
-    name, chosen = _solver(solver, options)
+    name, chosen = solver_named(solver, options)
     form = form_of(name, chosen.forms, "dual")
     return forces_of(name, chosen, in_form(dual_alone(Q), form), load_of(p), tolerance)
 
@@ -229,7 +179,7 @@ def solve_series(
     verdict) and the remaining `gap`, (m,) mm in float32; None without an answer.
     """
     scene = load_scene(scene)
-    name, chosen = _solver(solver, options)
+    name, chosen = solver_named(solver, options)
     taken = form_of(name, chosen.forms, form)
     assembly = prepared(scene, form=taken).assembly
     if not isinstance(cases, LoadCases):
@@ -241,15 +191,6 @@ def solve_series(
         scene, cases, name, taken, tolerance, limit_mm, check, threads=None, options=dict(options or {})
     )
     return chain.from_iterable(SeriesSession(job, chosen).solve(range(cases.count)))
-
-
-def _solver(solver: str | Solver, options: Mapping[str, Any] | None) -> tuple[str, Solver]:
-    """The solver and its name."""
-    if isinstance(solver, str):
-        return solver, make_solver(solver, dict(options or {}))
-    if options:
-        raise InputError.one("solver", "options", dict(options), "an object has its options already")
-    return type(solver).__name__, solver
 
 
 def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:

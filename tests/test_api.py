@@ -36,7 +36,7 @@ from problems.forms.problem import in_form
 from problems.full_model.joint_model import JointModel
 from problems.model.joint import Joint
 from solvers.base import failed
-from solvers.registry import modules
+from solvers.registry import make_solver, modules
 
 
 def matrices(seed: int = 3) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
@@ -218,7 +218,7 @@ def test_a_series_of_random_gaps_by_an_object() -> None:
     scene = load_scene(tomllib.loads(STRIP))
     cases = random_gaps(scene, 3, seed=5)
     named, own = (
-        list(solve_series(scene, cases, solver)) for solver in ("newton", api.make_solver("newton", {}))
+        list(solve_series(scene, cases, solver)) for solver in ("newton", make_solver("newton", {}))
     )
     for one, two in zip(named, own, strict=True):
         np.testing.assert_array_equal(one.gap, two.gap)

@@ -12,7 +12,7 @@ from rich.table import Table
 from harness.results.incomparable import Incomparable
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
-from harness.verification.judge import Judgement, judge
+from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
 from problems.errors import InputError
 from problems.forms.assembly import Vector
@@ -53,7 +53,7 @@ def judge_file(
         x = problem.prepared.recover(lam, problem.load)
     forces = np.full(assembly.m, np.nan) if lam is None else lam
     limit = problem.limit_mm(limit_mm)
-    found = judge(problem.prepared, problem.load, problem.reference, x, forces, limit)
+    found = problem.judged(x, forces, limit)
     console.print(_table(problem, found, x))
     console.print(_sentence(problem, found, limit), style=STYLES[found.verdict])
     return CODES[found.verdict]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from harness.results import records
 from harness.results.checksums import arrays_in
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
@@ -31,17 +32,36 @@ ANSWER_MIB = 1024  # the largest file of an answer that is read
 
 @dataclass(frozen=True)
 class ReferenceProblem:
-    """A scene whose answers can be measured and judged. reference_s, limit_s : seconds that its
-    reference took, and may take.
+    """A scene whose answers can be measured and judged; its reference is proven when it is first asked for.
+
+    limit_s : after it no further candidate for the reference is tried. case : of a series, whose own load is
+    `load`; None for the scene's.
     """
 
     scene: Scene
     prepared: Prepared
     load: LoadCase
-    reference: Reference
-    reference_s: float
+    form: Form
     limit_s: float | None = None
-    form: Form = "dual"
+    case: int | None = None
+
+    @cached_property
+    def reference(self) -> Reference:
+        return self._proven[0]
+
+    @property
+    def reference_s(self) -> float:
+        """The seconds that it took."""
+        return self._proven[1]
+
+    @cached_property
+    def _proven(self) -> tuple[Reference, float]:
+        start = time.perf_counter()
+        if self.case is None:
+            found = reference_of(self.scene, self.prepared, self.load, self.limit_s)
+        else:
+            found = reference(self.prepared, self.load, self.limit_s)
+        return found, time.perf_counter() - start
 
     def limit_mm(self, asked: float) -> float:
         """The limit on an answer: as asked for; on a rung of a ladder, no less than conditioning allows."""
@@ -56,7 +76,11 @@ class ReferenceProblem:
         if series is None or case is None:
             return self
         load = random_gaps(self.scene, **series, form=self.form).load(case)
-        return replace(self, load=load, reference=reference(self.prepared, load, self.limit_s))
+        return replace(self, load=load, case=case)
+
+    def judged(self, x: Vector, lam: Vector, limit_mm: float) -> Judgement:
+        """x of all unknowns of the form, mm; lam (m,) N, NaN if there are none."""
+        return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
 
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""
@@ -67,7 +91,22 @@ class ReferenceProblem:
             return Judgement("no_answer", self.reference.bound_mm)
         if not x.dtype.kind == lam.dtype.kind == "f":
             return Judgement("no_answer", self.reference.bound_mm)
-        return judge(self.prepared, self.load, self.reference, x, lam, limit_mm)
+        return self.judged(x, lam, limit_mm)
+
+
+def opened(
+    scene: Scene,
+    form: Form = "dual",
+    progress: Progress = lambda text, fraction: None,
+    limit_s: float | None = None,
+) -> ReferenceProblem:
+    """Open or build a scene. Raises InputError.
+
+    form : that of the answers; those of the sparse form have an entry of x per unknown of the model.
+    """
+    data = prepared(scene, progress, form)
+    limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
+    return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
 
 
 def reference_problem(
@@ -76,21 +115,14 @@ def reference_problem(
     limit_s: float | None = None,
     form: Form = "dual",
 ) -> ReferenceProblem:
-    """Open or build a scene, by name or path, and its reference, within limit_s. Raises InputError.
-
-    form : that of the answers; those of the sparse form have an entry of x per unknown of the model.
-    """
-    scene = read_scene(source)
-    data = prepared(scene, progress, form)
-    if data.assembly.m == 0:
+    """Open or build a scene, by name or path, and prove its reference. Raises InputError."""
+    problem = opened(read_scene(source), form, progress, limit_s)
+    if problem.prepared.assembly.m == 0:
         allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
         raise InputError.one(source, "contacts", 0, allowed)
-    load = load_case(scene, form)
-    limit_s = default_limit_s(data.assembly.m) if limit_s is None else limit_s
-    progress(f"reference, at most {limit_s:g} s", 0.0)
-    start = time.perf_counter()
-    known = reference_of(scene, data, load, limit_s)
-    return ReferenceProblem(scene, data, load, known, time.perf_counter() - start, limit_s, form)
+    progress(f"reference, at most {problem.limit_s:g} s", 0.0)
+    _ = problem.reference
+    return problem
 
 
 def record(problem: ReferenceProblem, directory: Path) -> None:

@@ -1,0 +1,170 @@
+"""From a scene to a judged answer with a proven bound, step by step: what `solve` does, as a command and from
+Python.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import threadpoolctl
+
+from harness.planning.road import Choice, chosen_form
+from harness.solving.answer import answer_of, form_of
+from harness.verification.judge import LIMIT_MM, Judgement
+from harness.verification.reference_problem import ReferenceProblem, opened
+from problems.errors import InputError
+from problems.forms.assembly import Vector
+from problems.forms.names import FORMS, Form
+from problems.forms.problem import Progress
+from problems.model.scene import Scene
+from solvers.base import Answer, Solver
+
+LINEAR = "linear solve with the Cholesky factors of K"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """An answer to a scene.
+
+    lam : (m,) contact forces, N; NaN if the solver gives none. gap : (m,) the remaining gaps, g − Aᵀx, mm.
+    status, iterations : what the solver said; the reference has no iterations.
+    judgement : what the judge found. error_bound_mm : proven, max|x − x*| for the exact answer x*.
+    notes : what reading has rounded or symmetrised of a user's numbers.
+    method : who gave the answer. unknowns : (N,) those of the form. closest_mm : the smallest gap if contact
+    is ignored; None without contacts. seconds : of each step.
+    """
+
+    lam: Vector
+    gap: Vector
+    status: str
+    iterations: int | None
+    judgement: Judgement
+    error_bound_mm: float
+    notes: tuple[str, ...]
+    method: str
+    unknowns: Vector
+    closest_mm: float | None
+    seconds: dict[str, float]
+    choice: Choice
+    problem: ReferenceProblem
+
+    @property
+    def x(self) -> Vector:
+        """(n,) displacements, mm."""
+        return self.problem.prepared.assembly.at_junction(self.unknowns)
+
+    @property
+    def has_contact(self) -> bool:
+        """Whether the answer without contact violates a gap, so that there is a quadratic program."""
+        return self.closest_mm is not None and self.closest_mm < 0
+
+
+def solve(
+    scene: Scene,
+    solver: str | Solver | None = None,
+    *,
+    options: Mapping[str, Any] | None = None,
+    form: Form | None = None,
+    tolerance: float = 1e-9,
+    limit_s: float | None = None,
+    progress: Progress = lambda text, fraction: None,
+    doing: Callable[[str], AbstractContextManager[Any]] = lambda step: nullcontext(),
+    said: Callable[[str], None] = lambda sentence: None,
+) -> Solution:
+    """Solve a scene, and judge the answer.
+
+    solver : a name (`python -m harness list solvers`) or an object of your own; by default the proven
+        reference, as also where the answer without contact violates no gap and so no solver is called for.
+    form : "primal", "dual" or "sparse"; by default the cheaper one that the solver takes.
+    tolerance : passed to the solver, with its options. limit_s : after it no further candidate for the
+        reference is tried. progress : of building the matrices. doing : entered around each step, given its
+        name. said : given what a person should know before the answer is there.
+
+    Raises InputError.
+    """
+    seconds: dict[str, float] = {}
+
+    @contextmanager
+    def step(name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        with doing(name):
+            yield
+        seconds[name] = time.perf_counter() - start
+
+    named = None if solver is None else solver_named(solver, options)
+    with step("choosing the form"):
+        forms = FORMS if named is None else named[1].forms
+        asked = form_of(named[0], forms, form) if form and named else form
+        choice = chosen_form(scene, forms, asked, in_house=solver is None or _in_house(solver))
+    if choice.why:
+        said(f"In the sparse form, without condensation: {choice.why}")
+    # A second thread gains nothing on narrow bands, and spins.
+    with threadpoolctl.threadpool_limits(1) if choice.form == "sparse" else nullcontext():
+        with step("matrices, loads and gaps"):
+            problem = opened(scene, choice.form, progress, limit_s)
+            _ = problem.prepared.assembly.K.factors
+            p = problem.prepared.dual_load(problem.load)
+        if np.isnan(p).any():
+            largest = float(abs(problem.load.f).max(initial=0.0))
+            raise InputError.one(
+                scene.source_of("f"), "largest |f|", largest, "loads with finite displacements"
+            )
+        for note in problem.prepared.assembly.notes:
+            said(note)
+        with step("answer with a proven bound"):
+            known = problem.reference
+        closest = float(-p.max()) if p.size else None
+        if named is None or closest is None or closest >= 0:
+            method = known.route if closest is not None and closest < 0 else LINEAR
+            answer = Answer("solved", known.lam, known.x)
+        else:
+            name, chosen = named
+            method = f"{name}, {choice.form} form, tolerance {tolerance:g}"
+            with step(f"solving with {name}"):
+                answer = answer_of(name, chosen, problem.prepared, choice.form, problem.load, tolerance)
+        assembly, x = problem.prepared.assembly, np.asarray(answer.x, dtype=float)
+        lam = np.full(assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
+        judgement = problem.judged(x, lam, LIMIT_MM)
+        if answer.x is known.x:  # its error is the bound
+            proven = known.bound_mm <= LIMIT_MM
+            judgement = replace(judgement, verdict="within" if proven else "cannot_be_judged")
+    error = 0.0 if answer.x is known.x else judgement.displacement_error_mm
+    return Solution(
+        lam=lam,
+        gap=problem.load.g - assembly.A.T @ x,
+        status=answer.status,
+        iterations=answer.iterations,
+        judgement=judgement,
+        error_bound_mm=np.inf if error is None else error + known.bound_mm,
+        notes=assembly.notes,
+        method=method,
+        unknowns=x,
+        closest_mm=closest,
+        seconds=seconds,
+        choice=choice,
+        problem=problem,
+    )
+
+
+def solver_named(solver: str | Solver, options: Mapping[str, Any] | None) -> tuple[str, Solver]:
+    """The solver and its name."""
+    if isinstance(solver, str):
+        from solvers.registry import make_solver  # slow to import: not without a solver
+
+        return solver, make_solver(solver, dict(options or {}))
+    if options:
+        raise InputError.one("solver", "options", dict(options), "an object has its options already")
+    return type(solver).__name__, solver
+
+
+def _in_house(solver: str | Solver) -> bool:
+    if not isinstance(solver, str):
+        return False
+    from solvers.registry import in_house
+
+    return in_house(solver)
