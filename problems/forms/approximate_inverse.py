@@ -51,11 +51,10 @@ def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse:
 
 def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> ApproximateInverse:
     """From local blocks of `like`, a Q of the same contacts: in single precision, in double where some block
-    is not positive definite in that. Of few contacts without coordinates, or on a K without a band, M = Q⁻¹.
+    is not positive definite in that. Of few contacts without coordinates M = Q⁻¹.
 
-    No M of more contacts where K has no band, and of contacts all over an area, where M takes longer than
-    some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is not positive
-    definite.
+    No M where K has no band, and of many contacts all over an area, where M takes longer than some
+    factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is indefinite.
     """
     m, windows = assembly.m, _along_bands(assembly)
     few = m <= FEW
@@ -67,8 +66,6 @@ def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> Approxim
             with suppress(np.linalg.LinAlgError):
                 found = _from_windows(like, windows, single=True)
         found = found or _from_windows(like, windows, single=False)
-    if found is None and few:
-        return of_dense(DenseCompliance(Q.toarray()), assembly.contact_nodes)
     return found or ApproximateInverse(None, assembly.A.power(2).T @ (1 / assembly.K.diagonal))
 
 

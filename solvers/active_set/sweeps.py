@@ -18,14 +18,15 @@ corrects more than further sets; so the limit on the sets of a sweep grows with 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from problems.forms.assembly import Matrix, Vector
-from problems.forms.banded_inverse import BandedInverse, BandFactor
+from problems.forms.assembly import Vector
+from problems.forms.banded_inverse import BandFactor
+from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
 from solvers.kkt import kkt_residual, largest_rounding
 
@@ -33,15 +34,13 @@ from .banded_sets import BandedSets
 from .block_pivoting import ROUNDING_FACTOR, block_pivoting, wrong_signs
 from .bordered_factor import Set
 from .contact_sets import TrialSolution
+from .factored_sets import FactoredSets, approached_set
 
 MAX_SWEEPS = 200
 FIRST_SETS = 5  # contact sets in the first sweep
 TARGET = 0.02  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
 STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve |y_C|, at an |y_C| that can be rounding
 STEP_RANGE = 0.5, 2.0  # on an unchanged set; beyond it, a step is rounding
-
-#: Forces λ (m, k) of k load cases → their gaps y = Qλ − p, (m, k) mm.
-Gaps = Callable[[Matrix, Sequence[LoadCase]], Matrix]
 
 
 @dataclass
@@ -66,17 +65,21 @@ class Case:
 
 @dataclass
 class Sweeps:
-    """M ≈ Q⁻¹ and the diagonal of Q (m,) mm/N. last : the cases solved last, from which the next ones start.
+    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; without M, factorisations of K take its place in every
+    set (see `factored_sets`). last : the cases solved last, from which the next ones start.
 
     A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ), ρ the rounding of
     Qλ − p (`kkt.largest_rounding`), and r = max(|y_C|, max(−y)) is at most 0.02 tolerance; or does not halve
     any more and is at most max(tolerance, 10ρ), or has not for three sweeps and is at most 1e-8 mm.
     """
 
-    M: BandedInverse
-    diagonal: Vector
-    gaps: Gaps
+    prepared: Prepared
     last: list[Case] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        near = self.prepared.approximate_inverse
+        self.M, self.diagonal, self.gaps = near.M, near.diagonal, self.prepared.gaps
+        self.order = np.arange(len(near.diagonal)) if near.M is None else near.M.order
 
     def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """An answer to each load, all with p, solved together from the nearest of the cases before them."""
@@ -90,10 +93,11 @@ class Sweeps:
         self, load: LoadCase, tolerance: float, start: WarmStart | None = None, C: Set | None = None
     ) -> Case:
         """The case of a load with p, from nothing or from a solved one. C : its first set, if it is known."""
-        order = self.M.order
+        order = self.order
         if start is None:
             y = -load.p[order]
-            case = Case(load, y < 0, TrialSolution(np.zeros(len(y)), y, float(abs(y).max(initial=0.0))))
+            first = y < 0 if self.M is not None else approached_set(self.prepared, load)
+            case = Case(load, first, TrialSolution(np.zeros(len(y)), y, float(abs(y).max(initial=0.0))))
         else:
             lam, y = start.lam[order], start.gap[order]
             closed = self.diagonal[order] * lam > y
@@ -107,7 +111,7 @@ class Sweeps:
 
         "solved" if max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm.
         """
-        order = self.M.order
+        order = self.order
         lam, y = np.empty(len(order)), np.empty(len(order))
         lam[order], y[order] = np.maximum(case.trial.lam, 0.0), case.trial.y
         if (case.trial.lam < 0).any():
@@ -123,12 +127,12 @@ class Sweeps:
 
     def _from(self, solved: Case, load: LoadCase) -> Case:
         """A load case that starts from the solution of another one."""
-        y = solved.trial.y + (solved.load.p - load.p)[self.M.order]
+        y = solved.trial.y + (solved.load.p - load.p)[self.order]
         trial = TrialSolution(solved.trial.lam, y, float(abs(y).max(initial=0.0)))
         return Case(load, solved.C, trial, solved.factor)
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
-        order = self.M.order
+        order = self.order
         compliance, left = self.diagonal[order], cases
         for _ in range(MAX_SWEEPS):
             found = [self._step(case, compliance) for case in left]
@@ -151,11 +155,15 @@ class Sweeps:
         """λ (m,) of the case with Q replaced by M⁻¹, and whether its set is the one before; on such a set it
         is conjugate to the last step.
         """
-        banded = BandedSets(self.M, case.trial, case.factor)
-        floor = largest_rounding(compliance, case.load.p[self.M.order], case.trial.lam)
-        found = block_pivoting(banded.at, case.C, compliance, floor, FIRST_SETS + case.sweeps // 2)
+        sets: BandedSets | FactoredSets
+        if self.M is None:
+            sets = FactoredSets(self.prepared, case.trial)
+        else:
+            sets = BandedSets(self.M, case.trial, case.factor)
+        floor = largest_rounding(compliance, case.load.p[self.order], case.trial.lam)
+        found = block_pivoting(sets.at, case.C, compliance, floor, FIRST_SETS + case.sweeps // 2)
         unchanged = not (case.C ^ found.C).any()
-        case.C, case.factor, case.sets = found.C, banded.factor, case.sets + found.passes
+        case.C, case.factor, case.sets = found.C, sets.factor, case.sets + found.passes
         lam = found.trial.lam
         if unchanged and case.before is not None:
             step, change = case.before
@@ -166,7 +174,7 @@ class Sweeps:
         self, case: Case, lam: Vector, y: Vector, unchanged: bool, compliance: Vector, tolerance: float
     ) -> None:
         """Take λ and y, or a part of the step, and decide whether the case is settled."""
-        order = self.M.order
+        order = self.order
         step, change = lam - case.trial.lam, y - case.trial.y
         slope, curvature = float(step @ case.trial.y), float(step @ change)
         case.before = None

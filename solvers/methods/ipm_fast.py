@@ -74,8 +74,8 @@ class FastIpm(Solver):
         finish = DualState.of(data)
         if isinstance(finish, Answer):
             return finish
-        if self.band:
-            return _Ready(data, Banded(data.Q, finish.sweeps.M), finish)
+        if self.band and (M := finish.sweeps.M):
+            return _Ready(data, Banded(data.Q, M), finish)
         return _Ready(data, SinglePrecision(data.Q) if self.single else Direct(data.Q), finish)
 
     def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:

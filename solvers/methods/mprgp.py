@@ -91,8 +91,7 @@ class Mprgp(Solver):
     def prepare(self, data: Problem) -> _Ready | Answer:
         """M and ᾱ, by 30 products, as the option needs them.
 
-        A failed answer if M finds Q indefinite, and in the sparse form if K is. Where there is no M, diag(Q)
-        takes its place.
+        A failed answer if M finds Q indefinite, and in the sparse form if K is, or has no M.
         """
         try:
             near = data.prepared.approximate_inverse
@@ -100,6 +99,8 @@ class Mprgp(Solver):
             return failed(f"K is not positive definite: {error}")
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
+        if near.M is None:
+            return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
         Q, sparse = data.prepared.compliance, "x" in data.needs
         metric = self._metric(Q, near.diagonal, near.M)
         return _Ready(Q, near.diagonal, metric, data.prepared if sparse else None)

@@ -6,7 +6,8 @@ For a guess C of the contact set, the linear equations λ_N = 0, y_C = 0 are sol
 wrong sign changes sides: Newton's method on min(λ, y) = 0 (Hintermüller, Ito and Kunisch, SIAM J.
 Optim. 13:865–888, 2002), made finite by block principal pivoting. The equations are solved with a banded
 M ≈ Q⁻¹ and corrected by products with Q, whatever the form and the share of closed contacts
-(solvers/active_set/sweeps.py); nothing of order m³ is made. Where Q does not decay along the joint, M is Q⁻¹.
+(solvers/active_set/sweeps.py). Where Q does not decay along the joint, M is Q⁻¹; where contacts lie all over
+an area, the equations of each set are solved with a factorisation of K.
 """
 
 from __future__ import annotations
@@ -37,14 +38,11 @@ class DualState:
     def of(cls, problem: Problem) -> DualState | Answer:
         """M; a failed answer if Q, or K in the sparse form, is not positive definite, or there is no M."""
         try:
-            near = problem.prepared.approximate_inverse
+            return cls(problem, Sweeps(problem.prepared))
         except NotPositiveDefinite as error:
             return failed(f"K is not positive definite: {error}")
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
-        if near.M is None:
-            return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area; try mprgp")
-        return cls(problem, Sweeps(near.M, near.diagonal, problem.prepared.gaps))
 
     def solve(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """One load case, or several together."""

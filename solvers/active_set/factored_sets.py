@@ -1,0 +1,83 @@
+"""Contact sets by factorisations of K, where there is no M ≈ Q⁻¹: no band, or contacts all over an area.
+
+From (λ, y), y exact, to the point of a set C, λ⁺ zero off it and y⁺ on it, it is a change
+
+    [ K    A_C ] [ dx  ]   [ A_N λ_N ]
+    [ A_Cᵀ  0  ] [ dλ_C ] = [ y_C     ]
+
+which springs of a stiffness ρ at the contacts of C give (augmented Lagrangian; Hestenes, J. Optim. Theory
+Appl. 4:303–320, 1969),
+
+    (K + ρ A_C A_Cᵀ) dx = A_N λ_N + A_C (ρ y_C − dλ_C),        dλ_C ← dλ_C + ρ (A_Cᵀdx − y_C).
+
+Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; what is left is for the next product with Q.
+
+The first set is found with springs alone, ever stiffer: an edge of contact moves as far as they give way,
+however fine the mesh, where pivoting moves it by a row of contacts per set (Hintermüller and Kunisch, SIAM J.
+Optim. 17:159–187, 2006). One step of Newton's method per ρ, from the stiffness of the body to that of K.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.forms.banded_inverse import BandFactor
+from problems.forms.prepared import Prepared
+from problems.stiffness.operator import Stiffness
+from solvers.base import LoadCase
+
+from .bordered_factor import Set
+from .contact_sets import TrialSolution
+
+STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
+PASSES = 2
+GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
+SIGN_UNCERTAINTY = 1e-5  # of |y_C| at the point: smaller values have no reliable sign
+
+
+@dataclass(frozen=True)
+class FactoredSets:
+    """λ⁺ and y⁺ of the sets C, from a point (λ, y)."""
+
+    prepared: Prepared
+    start: TrialSolution
+    factor: BandFactor | None = None  # there is none to keep
+
+    def at(self, C: Set) -> TrialSolution:
+        A, lam, y = self.prepared.assembly.A, self.start.lam, self.start.y
+        rho = STIFFER * stiffest_contact(self.prepared)
+        K, change = with_springs(self.prepared, rho, C), np.zeros_like(lam)
+        for _ in range(PASSES):
+            closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))
+            change = np.where(C, change + rho * (closed - y), -lam)
+        uncertainty = SIGN_UNCERTAINTY * self.start.rounding
+        return TrialSolution(lam + change, np.where(C, 0.0, y - closed), uncertainty)
+
+
+def approached_set(prepared: Prepared, load: LoadCase) -> Set:
+    """(m,) the contacts that overlap with springs as stiff as K. load : with p."""
+    A, overlap = prepared.assembly.A, np.maximum(load.p, 0.0)
+    C = overlap > 0
+    if not C.any():
+        return C
+    rho = float(overlap @ overlap / (overlap @ (prepared.compliance @ overlap)))
+    while rho < stiffest_contact(prepared) and C.any():
+        x = with_springs(prepared, rho, C).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
+        C, rho = A.T @ x > load.g, GROWTH * rho
+    return C
+
+
+def with_springs(prepared: Prepared, rho: float, C: Set) -> Stiffness:
+    """K + ρ A_C A_Cᵀ."""
+    assembly = prepared.assembly
+    A_C = assembly.A[:, np.flatnonzero(C)]
+    return Stiffness.of(sp.csc_array(assembly.K.matrix + rho * (A_C @ A_C.T)), nodes=assembly.nodes)
+
+
+def stiffest_contact(prepared: Prepared) -> float:
+    """The stiffness of the stiffest unknown at a contact, for a spring at that contact."""
+    K, A = prepared.assembly.K, prepared.assembly.A
+    return float(K.diagonal[A.indices].max(initial=0.0) / ((A.data**2).max(initial=0.0) or 1.0))
