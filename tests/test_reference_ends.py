@@ -22,12 +22,11 @@ from harness.verification.principal_pivoting import contact_set
 from harness.verification.reference import STOPPED, reference, refined_active_set
 from harness.verification.reference_problem import reference_problem
 from problems.forms.prepared import Prepared
-from problems.manufactured.ladder import make_rung
+from problems.scene import read_scene
 
 
 def fathi(m: int) -> Prepared:
-    made = make_rung(f"hard/pivoting/fathi-{m:03d}").made
-    assert made is not None
+    made = read_scene(f"hard/pivoting/fathi-{m:03d}").made
     return Prepared(made.assembly)
 
 
@@ -93,8 +92,7 @@ def test_a_search_out_of_time_says_so_and_is_not_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
-    made = make_rung("hard/pivoting/fathi-128").made
-    assert made is not None
+    made = read_scene("hard/pivoting/fathi-128").made
     data = Prepared(made.assembly)
     data.key = "fathi"
     stopped = reference(data, made.load, 1e-9)
