@@ -23,11 +23,11 @@ from pydantic import ValidationError
 from problems.drawn import EXAMPLES, drawn_table
 from problems.input.bounded import regular_file, resolved
 from problems.input.validation import UNITS, unknown, validation_faults
-from problems.manufactured.ladder import LADDERS, make_rung, prefix_of, rung_names
+from problems.manufactured.ladder import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
 from problems.model.joint import Joint, Table
-from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
+from problems.model.scene import JointScene, MatricesScene, Scene
 
 from .errors import Fault, InputError
 
@@ -51,7 +51,9 @@ def read_scene(name_or_path: str) -> Scene:
     Raises InputError naming the file, the key, the value and what is allowed, all faults at once.
     """
     if prefix := prefix_of(name_or_path):
-        return _rung_scene(prefix, name_or_path)
+        if name_or_path not in (known := rung_names(prefix)):
+            raise _unknown_scene(name_or_path, known)
+        return make_rung(name_or_path)
     if table := drawn_table(name_or_path):
         return _scene(name_or_path, SCENES / name_or_path, table)
     path = Path(name_or_path)
@@ -87,19 +89,6 @@ def _as_toml(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_as_toml(inner) for inner in value]
     return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def _rung_scene(prefix: str, name: str) -> Scene:
-    if name not in (known := rung_names(prefix)):
-        raise _unknown_scene(name, known)
-    rung = make_rung(name)
-    on_ladder = prefix in LADDERS
-    if rung.made:
-        return MadeScene(
-            name, rung.title, rung.made, on_ladder=on_ladder, refused=rung.refused, printed=rung.printed
-        )
-    assert rung.joint is not None
-    return JointScene(name, rung.title, rung.joint, rung.effects, on_ladder=on_ladder, refused=rung.refused)
 
 
 def _unknown_scene(name: str, known: list[str]) -> InputError:

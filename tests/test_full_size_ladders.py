@@ -17,9 +17,9 @@ from problems.forms import manufactured_problem
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.ladders.full_size import degeneracy, duplicates
-from problems.manufactured.exact import Shares, exact_model, spectrum
-from problems.manufactured.ladder import ladder_names, make_rung, rung_names
+from problems.manufactured.exact import contacts, exact_assembly, spectrum, two_parts
+from problems.manufactured.ladder import ladders, make_rung, rung_names
+from problems.model.scene import MadeScene
 from problems.scene import read_scene
 from solvers.base import Form
 from solvers.registry import make_solver
@@ -29,11 +29,11 @@ OF_BOTH_SIZES = ["degeneracy", "duplicates", "supports", "thickness"]
 N = 300  # unknowns per part: 256 + 32 + 8 + 4
 SMALL = {
     **{
-        f"{percent} % weak": degeneracy.touching(N, 1e6, Shares(min(0.4, 1 - percent / 100), percent / 100))
+        f"{percent} % weak": two_parts(N, 1e6, seed=2, closed=min(0.4, 1 - percent / 100), weak=percent / 100)
         for percent in (25, 50, 75, 100)
     },
-    **{f"cond {cond:g}": degeneracy.touching(N, cond, Shares()) for cond in (1e10, 1e12)},
-    **{f"2^-{bits} apart": duplicates._make(N, 2.0**-bits) for bits in (4, 12, 16)},
+    **{f"cond {cond:g}": two_parts(N, cond, seed=2) for cond in (1e10, 1e12)},
+    **{f"2^-{bits} apart": two_parts(N, 1e4, seed=3, A=contacts(N, 128, 2.0**-bits)) for bits in (4, 12, 16)},
 }
 IN_HOUSE: list[tuple[str, Form, float]] = [
     *(("newton", "dual", 1e-10), ("ipm-fast", "dual", 1e-10), ("ipm", "dual", 1e-14)),
@@ -72,7 +72,7 @@ def test_the_share_without_a_force_is_as_named(percent: int) -> None:
 def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_of_two() -> None:
     for n in (1, 22, 64):
         d = spectrum(n, 1e4)
-        (K,) = exact_model(d).assembly().K.matrices
+        K, _ = exact_assembly(d, d).K.matrices
         np.testing.assert_allclose(np.linalg.eigvalsh(K), 64 * np.sort(d), rtol=1e-9)
     H = sla.hadamard(64, dtype=float)
     np.testing.assert_array_equal(K, (H * d) @ H)  # 64 = the stiffness of the grid's smallest eigenvalue
@@ -108,7 +108,7 @@ def test_in_house_solvers_are_right(name: str, solver: str, form: Form, toleranc
 
 
 def test_a_rung_is_named_by_its_size_and_has_it() -> None:
-    assert ladder_names("hard-full/") == ["conditioning", *OF_BOTH_SIZES]
+    assert list(ladders("hard-full/")) == ["conditioning", *OF_BOTH_SIZES]
     for name in RUNGS:
         size = int(name.split("/")[2].split("-")[0])
         assert (read_scene(name).expected_size or ())[0] == size
@@ -125,9 +125,10 @@ def test_nothing_is_made_before_it_is_needed_and_one_is_kept(monkeypatch: pytest
         return SMALL["25 % weak"]
 
     for name in RUNGS:
-        problem = make_rung(name).made
-        if isinstance(problem, DeferredProblem):
-            monkeypatch.setitem(vars(problem), "make", lambda name=name: make(name))
+        scene = make_rung(name)
+        if isinstance(scene, MadeScene):
+            assert isinstance(scene.problem, DeferredProblem)
+            monkeypatch.setitem(vars(scene.problem), "make", lambda name=name: make(name))
     expand(read_suite("hard-full"))
     assert not made
     first, second = read_scene("hard-full/degeneracy/4386-025"), read_scene("hard-full/degeneracy/4386-050")

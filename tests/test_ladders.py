@@ -17,18 +17,20 @@ from harness.verification.reference_problem import ReferenceProblem, reference_p
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
+from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.forms.problem import in_form
 from problems.manufactured.exact import spectrum
-from problems.manufactured.ladder import ManufacturedProblem, make_rung, rung_names
+from problems.manufactured.ladder import make_rung, rung_names
+from problems.model.scene import MadeScene
 from problems.scene import read_scene, scene_names
 from solvers.base import Answer, Form
 from solvers.registry import make_solver
 
 WHOLE = 2**1200
-RUNGS = rung_names()
+RUNGS = rung_names("hard/")
 TAKEN = [name for name in RUNGS if not make_rung(name).refused]
 REFUSED = [name for name in RUNGS if make_rung(name).refused]
-EXACT = [name for name in TAKEN if (made := make_rung(name).made) and made.x is not None]
+EXACT = [name for name in TAKEN if isinstance(made := make_rung(name), MadeScene) and made.made.x is not None]
 IN_HOUSE: list[tuple[str, Form, float]] = [
     ("ipm", "dual", 1e-14),
     ("gi", "dual", 1e-10),
@@ -56,9 +58,9 @@ def whole(values: Any) -> Any:
 
 
 def made_of(name: str) -> ManufacturedProblem:
-    made = make_rung(name).made
-    assert made is not None
-    return made
+    scene = make_rung(name)
+    assert isinstance(scene, MadeScene)
+    return scene.made
 
 
 def test_there_are_enough_rungs_and_none_twice() -> None:

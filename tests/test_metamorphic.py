@@ -17,7 +17,7 @@ from solving import CASES, IN_HOUSE, allowed, eigenvalues, solve
 
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.manufactured.ladder import make_rung
+from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.base import Form
 
@@ -100,8 +100,7 @@ def problem(kind: str) -> tuple[Prepared, LoadCase]:
     if kind == "plain":
         prepared = make_prepared(21, pairs=12, tools=4)
         return prepared, make_load(22, prepared)[0]
-    made = make_rung(kind).made
-    assert made is not None
+    made = read_scene(kind).made
     return Prepared(Assembly(made.assembly.K, made.assembly.A)), made.load
 
 

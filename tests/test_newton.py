@@ -13,7 +13,7 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.forms.product import product
-from problems.manufactured.ladder import make_rung
+from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.active_set.block_pivoting import MAX_STALE_PASSES, block_pivoting
 from solvers.active_set.bordered_factor import BorderedFactor
@@ -186,8 +186,7 @@ def test_sets_that_make_no_progress_give_way_to_an_interior_point(
     for name, value in (("block_pivoting.MAX_STALE_PASSES", 0), ("block_pivoting.MAX_SINGLE_EXCHANGES", 0)):
         monkeypatch.setattr(f"solvers.active_set.{name}", value)
     monkeypatch.setattr("solvers.active_set.solve.MAX_SINGLE_EXCHANGES", 0)
-    made = make_rung("hard/pivoting/fathi-064").made
-    assert made is not None
+    made = read_scene("hard/pivoting/fathi-064").made
     order = np.random.default_rng(5).permutation(64)
     K = np.asfortranarray(made.assembly.K.matrices[0][np.ix_(order, order)])
     problem = in_form(Prepared(Assembly(Stiffness.of(K), made.assembly.A)), "dual")

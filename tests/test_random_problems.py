@@ -20,7 +20,7 @@ from harness.verification.reference import best_of_candidates
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.ladders.units import rescaled
-from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
+from problems.manufactured.exact import manufacture, spectrum
 from problems.stiffness.operator import Stiffness
 
 LONG = bool(os.environ.get("RIVETBENCH_LONG"))
@@ -117,7 +117,7 @@ def test_in_house_solvers_hold_or_say_so(
 ) -> None:
     """cond(K) up to 1e12, contacts without a force, contacts and forces in any unit."""
     d = [spectrum(2**bits, 10.0**exponent) for exponent in exponents]
-    made = manufacture(exact_model(*d), seed, Shares(closed, weak * (1 - closed)))
+    made = manufacture(*d, seed=seed, closed=closed, weak=weak * (1 - closed))
     C = np.exp2(np.random.default_rng(seed).integers(-contact_bits, contact_bits + 1, 2**bits))
     made = rescaled(made, 1.0, C, 2.0**force_bits)
     prepared = Prepared(Assembly(made.assembly.K, made.assembly.A))

@@ -15,13 +15,12 @@ from harness.verification.judge import Judgement
 from harness.verification.reference import STOPPED, best_of_candidates
 from harness.verification.reference_problem import reference_problem
 from problems.forms.prepared import Prepared
-from problems.manufactured.ladder import make_rung
+from problems.scene import read_scene
 
 
 @pytest.mark.parametrize("m", [32, 64, 128, 256])
 def test_an_exponential_family_is_proven(m: int) -> None:
-    made = make_rung(f"hard/pivoting/fathi-{m:03d}").made
-    assert made is not None
+    made = read_scene(f"hard/pivoting/fathi-{m:03d}").made
     found = best_of_candidates(Prepared(made.assembly), made.load)
     assert abs(found.x - np.asarray(made.x)).max() <= found.bound_mm < 1e-12
 

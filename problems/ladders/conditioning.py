@@ -4,26 +4,30 @@ from __future__ import annotations
 
 from functools import partial
 
-from problems.manufactured.exact import exact_model, manufacture, spectrum
-from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
-
-N = 64  # unknowns per part
-
-
-def _rung(condition: float) -> Rung:
-    d = spectrum(N, condition)
-    return Rung(f"Two parts, cond(K) = {condition:g}", made=manufacture(exact_model(d, d), seed=1))
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.exact import deferred, exact_assembly, spectrum, two_parts
+from problems.manufactured.ladder import Ladder, Scene, matrices
 
 
-def _beyond(condition: float) -> Rung:
+def _rung(n: int, seed: int, condition: float) -> Scene:
+    return matrices(f"Two parts, cond(K) = {condition:g}", deferred(n, condition, seed))
+
+
+def _beyond(condition: float) -> Scene:
     """K is no longer exact, which does not matter because it is refused."""
-    d = spectrum(N, condition)
-    model = exact_model(d, d)
-    made = ManufacturedProblem(model.assembly(), manufacture(exact_model(d[:1], d[:1]), seed=1).load)
-    return Rung(f"Two parts, cond(K) = {condition:g}", made=made, refused="K must be positive definite")
+    d = spectrum(64, condition)
+    problem = ManufacturedProblem(exact_assembly(d, d), two_parts(1, 1.0, seed=1).load)
+    return matrices(f"Two parts, cond(K) = {condition:g}", problem, refused="K must be positive definite")
 
 
 RUNGS: Ladder = {
-    **{f"{condition:.0e}": partial(_rung, condition) for condition in (1e6, 1e8, 1e10, 1e12, 1e13, 9e13)},
+    **{
+        f"{condition:.0e}": partial(_rung, 128, 1, condition)
+        for condition in (1e6, 1e8, 1e10, 1e12, 1e13, 9e13)
+    },
     "1e+16": partial(_beyond, 1e16),
+}
+FULL_SIZE: Ladder = {
+    f"{n}-{condition:.0e}": partial(_rung, n, 2, condition)
+    for n, condition in ((4386, 1e8), (4386, 1e10), (4386, 1e11), (4386, 1e12))
 }

@@ -9,20 +9,16 @@ from functools import partial
 
 import numpy as np
 
-from problems.manufactured.exact import exact_model, manufacture, spectrum
-from problems.manufactured.ladder import Ladder, Rung
+from problems.manufactured.exact import two_parts
+from problems.manufactured.ladder import Ladder, Scene, matrices
 
 from .units import rescaled
 
-N = 64  # unknowns per part
-CONDITION = 1e4
 
-
-def _rung(k: int) -> Rung:
-    random, d = np.random.default_rng(9), spectrum(N, CONDITION)
-    C = np.exp2(random.integers(-k, k + 1, N))
+def _rung(k: int) -> Scene:
+    C = np.exp2(np.random.default_rng(9).integers(-k, k + 1, 64))
     title = f"Two parts, each contact in a unit of its own, 2^−{k} to 2^{k} mm"
-    return Rung(title, made=rescaled(manufacture(exact_model(d, d), seed=9), 1.0, C, 1.0))
+    return matrices(title, rescaled(two_parts(64, 1e4, seed=9), 1.0, C, 1.0))
 
 
 RUNGS: Ladder = {f"{k:02d}-bits": partial(_rung, k) for k in (5, 10, 20, 30, 40)}

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from functools import partial
 
-from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
-from problems.manufactured.ladder import Ladder, Rung
-
-N = 64  # contacts
-CONDITION = 1e6
+from problems.manufactured.exact import deferred
+from problems.manufactured.ladder import Ladder, Scene, matrices
 
 
-def _rung(percent: int) -> Rung:
+def _rung(n: int, percent: int) -> Scene:
     weak = percent / 100
-    d = spectrum(N, CONDITION)
-    made = manufacture(exact_model(d, d), seed=2, shares=Shares(min(0.4, 1 - weak), weak))
-    return Rung(f"Two parts, {percent} % of the contacts touch without a force", made=made)
+    problem = deferred(n, 1e6, seed=2, closed=min(0.4, 1 - weak), weak=weak)
+    return matrices(f"Two parts, {percent} % of the contacts touch without a force", problem)
 
 
-RUNGS: Ladder = {f"{percent:03d}": partial(_rung, percent) for percent in (5, 10, 25, 50, 75, 100)}
+RUNGS: Ladder = {f"{percent:03d}": partial(_rung, 128, percent) for percent in (5, 10, 25, 50, 75, 100)}
+FULL_SIZE: Ladder = {
+    f"{n}-{percent:03d}": partial(_rung, n, percent)
+    for n, percent in ((4386, 25), (4386, 50), (4386, 75), (4386, 100), (11308, 50))
+}

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from problems.manufactured.exact import exact_model, manufacture, spectrum
-from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung, plates
-
-from .parts import CLAMPED_PART, FASTENERS, GAP, JUNCTION
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.exact import exact_assembly, spectrum, two_parts
+from problems.manufactured.ladder import Ladder, Scene, matrices
+from problems.manufactured.plates import CLAMPED, FREE, plates
 
 REFUSED = "K must be positive definite"
 
 
-def _on_a_part() -> Rung:
-    parts = [CLAMPED_PART | {"name": "clamped"}, {"name": "floating", "thickness": 6.0}]
-    joint = {"junction": JUNCTION, "part": parts}
-    return plates("A free plate against a clamped one", joint, GAP, FASTENERS, refused=REFUSED)
-
-
-def _on_a_tool() -> Rung:
-    part = {"name": "floating", "thickness": 6.0}
-    joint = {"junction": JUNCTION, "part": [part], "contacts": (("floating", "tool"),)}
-    return plates("A free plate against a rigid tool", joint, GAP, FASTENERS, refused=REFUSED)
-
-
-def _singular() -> Rung:
+def _singular() -> Scene:
     d = spectrum(16, 1e4)
-    made = manufacture(exact_model(d, d), seed=13)
     free = np.concatenate([[0.0], d[1:]])
-    made = ManufacturedProblem(exact_model(d, free).assembly(), made.load)
-    return Rung("A part that can move without strain", made=made, refused=REFUSED)
+    problem = ManufacturedProblem(exact_assembly(d, free), two_parts(16, 1e4, seed=13).load)
+    return matrices("A part that can move without strain", problem, refused=REFUSED)
 
 
-RUNGS: Ladder = {"on-a-part": _on_a_part, "on-a-tool": _on_a_tool, "matrix": _singular}
+_floating = partial(plates, refused=REFUSED)
+
+RUNGS: Ladder = {
+    "on-a-part": partial(
+        _floating, "A free plate against a clamped one", {"clamped": CLAMPED, "floating": FREE}
+    ),
+    "on-a-tool": partial(
+        _floating, "A free plate against a rigid tool", {"floating": FREE}, contacts=(("floating", "tool"),)
+    ),
+    "matrix": _singular,
+}

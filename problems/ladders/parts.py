@@ -2,82 +2,56 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase
-from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
-from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung, plates
-
-JUNCTION = {"length": 1000.0, "width": 300.0, "nodes": (12, 5)}
-CLAMPED_PART = {"thickness": 6.0, "north": {"length": 300.0, "elements": 4}, "clamped": ("north",)}
-GAP = {"kind": "initial_gap", "mean": 0.3, "random": {"sd": 0.1, "correlation_length": 150.0, "seed": 1}}
-FASTENERS = {"kind": "fasteners", "preload": 1000.0, "pattern": {"columns": 4, "rows": 2, "edge": 50.0}}
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.exact import exact_assembly, manufacture, spectrum, two_parts
+from problems.manufactured.ladder import Ladder, Scene, matrices
+from problems.manufactured.plates import CLAMPED, Tables, plates
 
 
-def _joint(*parts: dict[str, Any], **more: Any) -> dict[str, Any]:
-    named = [{"name": f"part {k + 1}"} | CLAMPED_PART | part for k, part in enumerate(parts)]
-    return {"junction": JUNCTION, "part": named, **more}
+def _stack(count: int) -> Tables:
+    return {f"part {k + 1}": CLAMPED for k in range(count)}
 
 
-def _stack(count: int) -> Rung:
-    return plates(f"A stack of {count} parts", _joint(*[{}] * count), GAP, FASTENERS)
+def _one_node() -> Scene:
+    assembly = exact_assembly(np.ones(1), A=sp.csc_array([[1.0]]))
+    problem = ManufacturedProblem(assembly, LoadCase(np.ones(1), np.zeros(1)))
+    return matrices("One node against a rigid tool", problem)
 
 
-def _stiff() -> Rung:
-    joint = _joint({}, {"young": 70e6})
-    return plates("A part a thousand times as stiff as the other", joint, GAP, FASTENERS)
-
-
-def _tool() -> Rung:
-    joint = _joint({}, contacts=(("part 1", "tool"),))
-    return plates("A part against a rigid tool", joint, GAP, FASTENERS)
-
-
-def _between() -> Rung:
-    joint = _joint({}, {}, contacts=(("part 1", "part 2"), ("part 2", "tool")))
-    return plates("Two parts on a rigid tool", joint, GAP, FASTENERS)
-
-
-def _one_node() -> Rung:
-    one = exact_model(np.ones(1), A=sp.csc_array([[1.0]]))
-    return Rung(
-        "One node against a rigid tool",
-        made=ManufacturedProblem(one.assembly(), LoadCase(np.ones(1), np.zeros(1))),
-    )
-
-
-def _two_nodes() -> Rung:
-    made = manufacture(exact_model(np.ones(1), np.ones(1)), seed=10, shares=Shares(1.0))
-    return Rung("Two parts of one node", made=made)
-
-
-def _one_contact() -> Rung:
+def _one_contact() -> Scene:
     d, normal = spectrum(64, 1e6), np.zeros((128, 1))
     normal[[0, 64]] = [[1.0], [-1.0]]
-    made = manufacture(exact_model(d, d, A=sp.csc_array(normal)), seed=11, shares=Shares(1.0))
-    return Rung("Two parts of 64 nodes, one contact", made=made)
+    problem = manufacture(d, d, A=sp.csc_array(normal), seed=11, closed=1.0)
+    return matrices("Two parts of 64 nodes, one contact", problem)
 
 
-def _many_contacts() -> Rung:
+def _many_contacts() -> Scene:
     """Twelve contacts on eight unknowns: x is unique, the forces are not, and Q is singular."""
     random = np.random.default_rng(12)
     A = sp.csc_array(np.hstack([np.eye(8), random.choice([-1.0, 1.0], (8, 4))]))
-    d = spectrum(8, 1e3)
-    made = ManufacturedProblem(exact_model(d, A=A).assembly(), LoadCase(np.ones(8), np.zeros(12)))
-    return Rung("More contacts than unknowns", made=made, refused="must not depend on the columns before it")
+    problem = ManufacturedProblem(exact_assembly(spectrum(8, 1e3), A=A), LoadCase(np.ones(8), np.zeros(12)))
+    refused = "must not depend on the columns before it"
+    return matrices("More contacts than unknowns", problem, refused=refused)
 
+
+TOOL = ("part 1", "tool")
+BETWEEN = (("part 1", "part 2"), ("part 2", "tool"))
+STIFF = _stack(1) | {"part 2": CLAMPED | {"young": 70e6}}
 
 RUNGS: Ladder = {
     "one-node": _one_node,
-    "two-nodes": _two_nodes,
+    "two-nodes": lambda: matrices("Two parts of one node", two_parts(1, 1.0, seed=10, closed=1.0)),
     "one-contact": _one_contact,
-    "tool": _tool,
-    "two-and-tool": _between,
-    "three": lambda: _stack(3),
-    "five": lambda: _stack(5),
-    "stiff": _stiff,
+    "tool": partial(plates, "A part against a rigid tool", _stack(1), contacts=(TOOL,)),
+    "two-and-tool": partial(plates, "Two parts on a rigid tool", _stack(2), contacts=BETWEEN),
+    "three": partial(plates, "A stack of 3 parts", _stack(3)),
+    "five": partial(plates, "A stack of 5 parts", _stack(5)),
+    "stiff": partial(plates, "A part a thousand times as stiff as the other", STIFF),
     "more-contacts-than-unknowns": _many_contacts,
 }

@@ -23,31 +23,25 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.manufactured.exact import Shares, exact_model, manufacture, spectrum
-from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.exact import manufacture, spectrum
+from problems.manufactured.ladder import Ladder, Scene, matrices
 from problems.stiffness.operator import Stiffness
 
 GRID = 2.0**24  # the chain's gaps are multiples of 1/GRID
 
 
-def _fathi(m: int) -> Rung:
-    return Rung(f"Fathi's problem with {m} contacts, one closed", made=_triangular(m, np.ones(m)))
-
-
-def _murty(m: int) -> Rung:
-    p: Vector = 2.0 - np.exp2(-np.arange(m))
-    return Rung(f"Murty's problem with {m} contacts, one closed", made=_triangular(m, p))
-
-
-def _triangular(m: int, p: Vector) -> ManufacturedProblem:
+def _triangular(author: str, p: Vector) -> Scene:
+    m = len(p)
     i, j = np.indices((m, m))
     inverse = np.where(i > j, 2.0 * (-1.0) ** (i - j), np.where(i == j, 1.0, 0.0))
     x, lam = np.full(m, -2.0), np.zeros(m)
     x[0], lam[0] = -1.0, 1.0
-    return _one_to_one(inverse.T @ inverse, np.zeros(m), -p, x, lam)
+    title = f"{author}'s problem with {m} contacts, one closed"
+    return _one_to_one(title, inverse.T @ inverse, np.zeros(m), -p, x, lam)
 
 
-def _chain(m: int) -> Rung:
+def _chain(m: int) -> Scene:
     i = np.arange(m)
     B = np.exp2(-np.round(i / 2))
     K = 2 * np.eye(m) + np.eye(m, k=1) + np.eye(m, k=-1)
@@ -55,31 +49,34 @@ def _chain(m: int) -> Rung:
     K *= B * B[:, None]
     g = -np.round(GRID * 0.75**i) / GRID
     title = f"A chain of {m} springs: dual active-set methods add each contact again and again"
-    return Rung(title, made=_one_to_one(K, np.zeros(m), g, g, -K @ g))
+    return _one_to_one(title, K, np.zeros(m), g, g, -K @ g)
 
 
-def _one_to_one(K: Matrix, f: Vector, g: Vector, x: Vector, lam: Vector) -> ManufacturedProblem:
+def _one_to_one(title: str, K: Matrix, f: Vector, g: Vector, x: Vector, lam: Vector) -> Scene:
     """One part, with a contact at each unknown."""
-    assembly = Assembly(
-        Stiffness.of(np.asfortranarray(K)), sp.eye_array(len(K), format="csc"), None, ("part 1",)
-    )
-    return ManufacturedProblem(assembly, LoadCase(f, g), x, lam)
+    A = sp.eye_array(len(K), format="csc")
+    assembly = Assembly(Stiffness.of(np.asfortranarray(K)), A, None, ("part 1",))
+    return matrices(title, ManufacturedProblem(assembly, LoadCase(f, g), x, lam))
 
 
-def _vertex(n: int) -> Rung:
+def _vertex(n: int) -> Scene:
     """Contact j acts on unknown j and on up to two before it, so the columns of A are independent."""
     random = np.random.default_rng(17)
     A = np.eye(n)
     for j in range(1, n):
         A[random.integers(0, j, 2), j] = random.choice([-1.0, 1.0], 2)
-    model = exact_model(spectrum(n, 1e4), A=sp.csc_array(A))
-    made = manufacture(model, seed=18, shares=Shares(1 / 3, 2 / 3))
-    return Rung(f"A vertex of {n} contacts on {n} unknowns, a third with a force", made=made)
+    made = manufacture(spectrum(n, 1e4), A=sp.csc_array(A), seed=18, closed=1 / 3, weak=2 / 3)
+    return matrices(f"A vertex of {n} contacts on {n} unknowns, a third with a force", made)
 
 
 RUNGS: Ladder = {
-    **{f"fathi-{m:03d}": partial(_fathi, m) for m in (8, 16, 32, 48, 64, 128, 256, 512)},
-    **{f"murty-{m:02d}": partial(_murty, m) for m in (8, 16, 32, 48)},
+    **{
+        f"fathi-{m:03d}": partial(_triangular, "Fathi", np.ones(m))
+        for m in (8, 16, 32, 48, 64, 128, 256, 512)
+    },
+    **{
+        f"murty-{m:02d}": partial(_triangular, "Murty", 2.0 - np.exp2(-np.arange(m))) for m in (8, 16, 32, 48)
+    },
     **{f"chain-{m:02d}": partial(_chain, m) for m in (8, 16, 24, 32)},
     **{f"vertex-{n:03d}": partial(_vertex, n) for n in (16, 64, 256)},
 }

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 
-from problems.manufactured.ladder import Ladder, Rung, plates
+from problems.manufactured.ladder import Ladder
+from problems.manufactured.plates import CLAMPED, plates
 
-from .parts import CLAMPED_PART, FASTENERS, GAP, JUNCTION
+PARTS = {"wing": CLAMPED, "fragment": CLAMPED}
 
-
-def _rung(nodes: int) -> Rung:
-    parts = [CLAMPED_PART | {"name": "wing"}, CLAMPED_PART | {"name": "fragment"}]
-    joint = {"junction": JUNCTION | {"nodes": (nodes, 3)}, "part": parts}
-    return plates(f"Two plates, {nodes} × 3 nodes", joint, GAP, FASTENERS)
-
-
-RUNGS: Ladder = {f"{nodes:02d}": partial(_rung, nodes) for nodes in (8, 16, 32, 64)}
+RUNGS: Ladder = {
+    f"{nodes:02d}": partial(plates, f"Two plates, {nodes} × 3 nodes", PARTS, nodes=(nodes, 3))
+    for nodes in (8, 16, 32, 64)
+}

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from functools import partial
 
-from problems.manufactured.ladder import Ladder, Rung, plates
+from problems.manufactured.ladder import Ladder, Scene
+from problems.manufactured.plates import CLAMPED, plates, wing_panel
 
-from .parts import CLAMPED_PART, FASTENERS, GAP, JUNCTION
+
+def _rung(times: int) -> Scene:
+    parts = {"thin": CLAMPED, "thick": CLAMPED | {"thickness": 6.0 * times}}
+    return plates(f"A plate of 6 mm and one of {6 * times} mm", parts)
 
 
-def _rung(times: int) -> Rung:
-    parts = [CLAMPED_PART | {"name": "thin"}, CLAMPED_PART | {"name": "thick", "thickness": 6.0 * times}]
-    title = f"A plate of 6 mm and one of {6 * times} mm"
-    return plates(title, {"junction": JUNCTION, "part": parts}, GAP, FASTENERS)
+def _full_size(n: int, times: int) -> Scene:
+    return wing_panel(f"A wing panel of 6 mm on a fragment of {6 * times} mm", n, thicker=times)
 
 
 RUNGS: Ladder = {f"{times:03d}": partial(_rung, times) for times in (1, 4, 10, 40, 100, 300)}
+FULL_SIZE: Ladder = {
+    f"{n}-{times:02d}": partial(_full_size, n, times)
+    for n, times in ((4386, 1), (4386, 4), (4386, 10), (4386, 30), (4386, 70), (11308, 30))
+}

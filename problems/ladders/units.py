@@ -5,35 +5,30 @@ Powers of two replace the thousands (1024 mm for a metre), so that nothing is ro
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Assembly, LoadCase, Vector
-from problems.manufactured.exact import exact_model, manufacture, spectrum
-from problems.manufactured.ladder import Ladder, ManufacturedProblem, Rung
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.manufactured.exact import two_parts
+from problems.manufactured.ladder import Ladder, Scene, matrices
 from problems.stiffness.operator import Stiffness
 
-N = 64  # unknowns per part
-CONDITION = 1e6
 KILO, MEGA = 2.0**10, 2.0**20
 
 
-def _problem() -> ManufacturedProblem:
-    d = spectrum(N, CONDITION)
-    return manufacture(exact_model(d, d), seed=5)
+def _rung(title: str, S: Vector | float = 1.0, C: Vector | float = 1.0, v: float = 1.0) -> Scene:
+    return matrices(f"Two parts, {title}", rescaled(two_parts(64, 1e6, seed=5), S, C, v))
 
 
-def _rung(title: str, S: Vector | float = 1.0, C: Vector | float = 1.0, v: float = 1.0) -> Rung:
-    return Rung(f"Two parts, {title}", made=rescaled(_problem(), S, C, v))
-
-
-def _random(title: str, unknowns: int, contacts: int) -> Rung:
+def _random(title: str, unknowns: int, contacts: int) -> Scene:
     """Scalings from 2^−k to 2^k."""
     random = np.random.default_rng(6)
-    S = np.exp2(random.integers(-unknowns, unknowns + 1, 2 * N))
-    return _rung(title, S, np.exp2(random.integers(-contacts, contacts + 1, N)))
+    S = np.exp2(random.integers(-unknowns, unknowns + 1, 128))
+    return _rung(title, S, np.exp2(random.integers(-contacts, contacts + 1, 64)))
 
 
 def rescaled(
@@ -42,14 +37,13 @@ def rescaled(
     """In x' = S⁻¹x, λ' = C⁻¹λ/v: K' = SKS/v, A' = SAC, f' = Sf/v, g' = Cg. S, C and v powers of two."""
     assert made.x is not None
     assert made.lam is not None
-    n, m = made.assembly.n, made.assembly.m
-    S, C = np.broadcast_to(S, n), np.broadcast_to(C, m)
-    K = made.assembly.K
-    parts = zip(K.blocks, K.slices, strict=True)
-    blocks = [np.asfortranarray(S[rows, None] * block.matrix * S[rows] / v) for block, rows in parts]
-    A = sp.csc_array(sp.diags_array(S) @ made.assembly.A @ sp.diags_array(C))
+    K, A = made.assembly.K, made.assembly.A
+    S, C = np.broadcast_to(S, A.shape[0]), np.broadcast_to(C, A.shape[1])
+    parts = zip(K.matrices, K.slices, strict=True)
+    blocks = [np.asfortranarray(S[rows, None] * block * S[rows] / v) for block, rows in parts]
+    A = sp.csc_array(sp.diags_array(S) @ A @ sp.diags_array(C))
     load = LoadCase(S * made.load.f / v, C * made.load.g)
-    assembly = Assembly(Stiffness.of(*blocks), A, None, made.assembly.parts)
+    assembly = replace(made.assembly, K=Stiffness.of(*blocks), A=A)
     return ManufacturedProblem(assembly, load, made.x / S, made.lam / (C * v), S.copy(), 1 / C)
 
 

@@ -13,51 +13,19 @@ x and λ are the exact solution. Finally everything is scaled by powers of two.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg as sla
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
 from problems.stiffness.operator import Stiffness
-
-from .ladder import ManufacturedProblem
 
 STIFFNESS = 64.0  # N/mm: the smallest eigenvalue of K
 
 Random = np.random.Generator
-
-
-@dataclass(frozen=True)
-class Shares:
-    """Fractions of the contacts: closed with a force, and weakly active (λᵢ = yᵢ = 0)."""
-
-    closed: float = 0.4
-    weak: float = 0.0
-
-
-@dataclass(frozen=True)
-class ExactModel:
-    """K and A as integers times a power of two, and the grid of the solutions.
-
-    d : the eigenvalues of each block of K, integers. A : (n, m). length : mm, force : N, of one grid step.
-    """
-
-    d: tuple[Vector, ...]
-    A: sp.csc_array
-    length: float
-    force: float
-
-    @property
-    def largest(self) -> float:
-        return float(max(d.max() for d in self.d))
-
-    def assembly(self) -> Assembly:
-        """K in N/mm; its smallest eigenvalue is force/length times that of d."""
-        blocks = tuple(_stiffness(d) * (self.force / self.length) for d in self.d)
-        names = tuple(f"part {k + 1}" for k in range(len(blocks)))
-        return Assembly(Stiffness.of(*blocks), self.A, None, names)
 
 
 def spectrum(n: int, condition: float) -> Vector:
@@ -65,32 +33,58 @@ def spectrum(n: int, condition: float) -> Vector:
     return np.round(np.geomspace(1.0, condition, n))
 
 
-def exact_model(*d: Vector, A: sp.csc_array | None = None) -> ExactModel:
-    """Parts with these eigenvalues; by default A is for two equal parts in contact at every node.
+def contacts(n: int, duplicated: int = 0, tilt: float = 0.0) -> sp.csc_array:
+    """A (2n, n + duplicated) of two parts of n unknowns, in contact at each, and at the first ones once more.
 
+    A duplicate touches the second part beside the node of the original, `tilt` of the way to another node. If
+    n is no power of two, the unknowns of the second part are in reverse order: so the blocks of H in one part
+    overlap those in the other, and no contact stands alone.
+    """
+    one = sp.eye_array(n, format="csc")
+    beside = one[:, :duplicated] + tilt * one[:, duplicated : 2 * duplicated]
+    A = sp.csc_array(sp.block_array([[one, one[:, :duplicated]], [-one, -beside]]))
+    return A if n & (n - 1) == 0 else sp.csc_array(A[np.r_[:n, 2 * n - 1 : n - 1 : -1]])
+
+
+def exact_assembly(*d: Vector, A: sp.csc_array | None = None) -> Assembly:
+    """Parts with these eigenvalues times STIFFNESS; by default two equal ones in contact at every node."""
+    K = Stiffness.of(*(STIFFNESS * _stiffness(part) for part in d))
+    names = tuple(f"part {k + 1}" for k in range(len(d)))
+    return Assembly(K, contacts(len(d[0])) if A is None else A, None, names)
+
+
+def manufacture(
+    *d: Vector, seed: int, A: sp.csc_array | None = None, closed: float = 0.4, weak: float = 0.0
+) -> ManufacturedProblem:
+    """`exact_assembly` with a prescribed solution: similar forces in all modes, gaps up to about 0.5 mm.
+
+    closed, weak : fractions of the contacts: closed with a force, and weakly active (λᵢ = yᵢ = 0).
     A grid step is so fine that a force of STIFFNESS · 1 mm moves the stiffest mode by one step.
     """
-    if A is None:
-        one = sp.eye_array(len(d[0]))
-        A = sp.csc_array(sp.vstack([one, -one]))
-    length = 2.0 ** -np.ceil(np.log2(max(part.max() for part in d)))
-    return ExactModel(d, A, length, STIFFNESS * length)
+    assembly, random, largest = exact_assembly(*d, A=A), np.random.default_rng(seed), max(map(np.max, d))
+    x, Kx = np.hstack([_modes(random, part, largest) for part in d])
+    lam, y = _contacts(random, assembly.m, int(largest), closed, weak)
+    length = 2.0 ** -np.ceil(np.log2(largest))  # mm, of one grid step
+    force = STIFFNESS * length  # N
+    load = LoadCase((Kx + assembly.A @ lam) * force, (assembly.A.T @ x + y) * length)
+    return ManufacturedProblem(assembly, load, x * length, lam * force)
 
 
-def manufacture(model: ExactModel, seed: int, shares: Shares | None = None) -> ManufacturedProblem:
-    """A problem with a prescribed solution: forces of similar size in all modes, gaps up to about 0.5 mm."""
-    random = np.random.default_rng(seed)
-    parts = [_modes(random, d, model.largest) for d in model.d]
-    x, Kx = np.concatenate([x for x, _ in parts]), np.concatenate([Kx for _, Kx in parts])
-    lam, y = _contacts(random, model, shares or Shares())
-    return from_solution(model, x, Kx, lam, y)
+def two_parts(
+    n: int, condition: float, seed: int, A: sp.csc_array | None = None, **shares: float
+) -> ManufacturedProblem:
+    """`manufacture` of two parts of n unknowns with the same spectrum."""
+    d = spectrum(n, condition)
+    return manufacture(d, d, seed=seed, A=A, **shares)
 
 
-def from_solution(model: ExactModel, x: Vector, Kx: Vector, lam: Vector, y: Vector) -> ManufacturedProblem:
-    """The problem with the solution x, λ and the gaps y, all in grid steps."""
-    f, g = Kx + model.A @ lam, model.A.T @ x + y
-    load = LoadCase(f * model.force, g * model.length)
-    return ManufacturedProblem(model.assembly(), load, x * model.length, lam * model.force)
+def deferred(
+    n: int, condition: float, seed: int, A: sp.csc_array | None = None, **shares: float
+) -> DeferredProblem:
+    """`two_parts` with n unknowns together, made when needed."""
+    size = n // 2
+    m = size if A is None else A.shape[1]
+    return DeferredProblem((size, size), m, partial(two_parts, size, condition, seed, A, **shares))
 
 
 def _stiffness(d: Vector) -> Matrix:
@@ -99,7 +93,7 @@ def _stiffness(d: Vector) -> Matrix:
     for rows in _blocks(len(d)):
         i = np.arange(rows.stop - rows.start)
         blocks.append((_hadamard(d[rows]) / len(i))[i ^ i[:, None]])
-    return np.asfortranarray(blocks[0] if len(blocks) == 1 else sla.block_diag(*blocks))
+    return np.asfortranarray(sla.block_diag(*blocks))
 
 
 def _blocks(n: int) -> list[slice]:
@@ -128,11 +122,10 @@ def _modes(random: Random, d: Vector, force: float) -> tuple[Vector, Vector]:
     return _hadamard(c), _hadamard(d * c)
 
 
-def _contacts(random: Random, model: ExactModel, shares: Shares) -> tuple[Vector, Vector]:
+def _contacts(random: Random, m: int, largest: int, closed: float, weak: float) -> tuple[Vector, Vector]:
     """λ up to STIFFNESS · 1 mm and gaps up to half a millimetre, in grid steps."""
-    m, largest = model.A.shape[1], int(model.largest)
     kind = random.permutation(m)
-    closed, weak = round(shares.closed * m), round(shares.weak * m)
+    with_force, touching = round(closed * m), round(closed * m) + round(weak * m)
     lam = random.integers(max(largest // 8, 1), largest + 1, m).astype(float)
     y = random.integers(max(largest // 64, 1), max(largest // 2, 1) + 1, m).astype(float)
-    return np.where(kind < closed, lam, 0.0), np.where(kind < closed + weak, 0.0, y)
+    return np.where(kind < with_force, lam, 0.0), np.where(kind < touching, 0.0, y)

@@ -1,9 +1,9 @@
 """Ladders: problems that grow harder rung by rung, to see where a solver fails and whether it reports that.
 
 A ladder is a file of problems/ladders with RUNGS, its rungs by name, the easiest first; each is a function
-that makes the same rung at every call. A rung is a scene, `hard/<ladder>/<rung>`; those of
-problems/ladders/full_size are `hard-full/<ladder>/<rung>`. The problems of others in problems/outside are
-found likewise, `outside/<problem>/<size>`.
+that makes the same rung at every call. A rung is a scene, `hard/<ladder>/<rung>`; those in FULL_SIZE, where a
+ladder has them, are `hard-full/<ladder>/<n>-<rung>`, at the sizes of the paper: n = 4386, 6112 and 11308. The
+problems of others in problems/outside are found likewise, `outside/<problem>/<size>`.
 """
 
 from __future__ import annotations
@@ -11,59 +11,37 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from dataclasses import replace
+from functools import cache, partial
 
-from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
-from problems.model.effect import Effect, effect_class
-from problems.model.joint import Joint
-from problems.model.scene import PrintedOptimum
+from problems.model.scene import MadeScene, Scene
 
-#: The package of the ladders whose scenes' names begin so.
-PACKAGES = {
-    "hard/": "problems.ladders",
-    "hard-full/": "problems.ladders.full_size",
-    "outside/": "problems.outside",
+#: The package of the ladders whose scenes' names begin so, and what their rungs are called there.
+PREFIXES = {
+    "hard/": ("problems.ladders", "RUNGS"),
+    "hard-full/": ("problems.ladders", "FULL_SIZE"),
+    "outside/": ("problems.outside", "RUNGS"),
 }
 LADDERS = ("hard/", "hard-full/")  # whose limit follows their conditioning
-PREFIXES = tuple(PACKAGES)
+
+Ladder = Mapping[str, Callable[[], Scene]]
+
+#: A rung of matrices, from its title and its problem. It has no name of its own: the ladder names it.
+matrices = partial(MadeScene, "")
 
 
-@dataclass(frozen=True, eq=False)
-class Rung:
-    """A joint with its effects, or a manufactured problem instead, made or still to be made.
-
-    refused : part of the InputError with which the model refuses the problem; "" if it accepts it.
-    printed : the optimum that its source prints.
-    """
-
-    title: str
-    joint: Joint | None = None
-    effects: tuple[Effect, ...] = ()
-    made: ManufacturedProblem | DeferredProblem | None = None
-    refused: str = ""
-    printed: PrintedOptimum | None = None
+@cache
+def ladders(prefix: str) -> dict[str, Ladder]:
+    """All ladders of a prefix by name: the files of its package that have such rungs."""
+    package, rungs = PREFIXES[prefix]
+    names = sorted(module.name for module in pkgutil.iter_modules(importlib.import_module(package).__path__))
+    found = {name: getattr(importlib.import_module(f"{package}.{name}"), rungs, {}) for name in names}
+    return {name: ladder for name, ladder in found.items() if ladder}
 
 
-def plates(title: str, joint: dict[str, Any], *effects: dict[str, Any], refused: str = "") -> Rung:
-    """A rung of plates, from the tables of a scene file."""
-    checked = tuple(effect_class(table["kind"]).model_validate(table) for table in effects)
-    return Rung(title, Joint.model_validate(joint), checked, refused=refused)
-
-
-Ladder = Mapping[str, Callable[[], Rung]]
-
-
-def ladder_names(prefix: str) -> list[str]:
-    """All ladders of a prefix: the files of its package."""
-    package = importlib.import_module(PACKAGES[prefix])
-    return sorted(module.name for module in pkgutil.iter_modules(package.__path__) if not module.ispkg)
-
-
-def rung_names(prefix: str = PREFIXES[0]) -> list[str]:
+def rung_names(prefix: str) -> list[str]:
     """All rungs of a prefix, ladder by ladder, the easiest of each first."""
-    return [f"{prefix}{ladder}/{rung}" for ladder in ladder_names(prefix) for rung in _rungs(prefix, ladder)]
+    return [f"{prefix}{ladder}/{rung}" for ladder, rungs in ladders(prefix).items() for rung in rungs]
 
 
 def prefix_of(name: str) -> str | None:
@@ -72,12 +50,10 @@ def prefix_of(name: str) -> str | None:
 
 
 @cache
-def make_rung(name: str) -> Rung:
+def make_rung(name: str) -> Scene:
     """The rung with a name of `rung_names`."""
-    prefix, ladder, rung = name.split("/")
-    return _rungs(f"{prefix}/", ladder)[rung]()
-
-
-def _rungs(prefix: str, ladder: str) -> Ladder:
-    rungs: Ladder = importlib.import_module(f"{PACKAGES[prefix]}.{ladder}").RUNGS
-    return rungs
+    folder, ladder, rung = name.split("/")
+    prefix = f"{folder}/"
+    made = ladders(prefix)[ladder][rung]()
+    size = f", n = {rung.partition('-')[0]}" if prefix == "hard-full/" else ""
+    return replace(made, name=name, title=made.title + size, on_ladder=prefix in LADDERS)

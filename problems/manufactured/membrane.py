@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
+from problems.model.scene import MadeScene, PrintedOptimum
 from problems.stiffness.operator import Stiffness
+
+from .ladder import matrices
 
 
 def second_difference(size: int, edge: float = 1.0) -> sp.csc_array:
@@ -39,27 +42,42 @@ def nodes(x: Vector, y: Vector) -> Matrix:
     return np.column_stack([X.ravel(), Y.ravel()])
 
 
-def above(
-    K: sp.csc_array, f: Vector, at: Matrix, lowest: Vector, held: NDArray[np.intp] | None = None
+def bounded(
+    K: sp.csc_array, f: Vector, at: Matrix, sign: float, bound: Vector, held: NDArray[np.intp] | None = None
 ) -> ManufacturedProblem:
-    """u ≥ `lowest` at the unknowns `held`, by default all: Aᵀ = −I there, g = −lowest."""
-    return _bounded(K, f, at, -1.0, -lowest, held)
+    """±u ≤ ±`bound` at the unknowns `held`, by default all: a contact each."""
+    rows = np.arange(f.size) if held is None else held
+    A = sp.csc_array((np.full(rows.size, sign), (rows, np.arange(rows.size))), shape=(f.size, rows.size))
+    assembly = Assembly(Stiffness.of(K, nodes=at), A, at, ("membrane",))
+    return ManufacturedProblem(assembly, LoadCase(f, sign * bound))
 
 
-def below(K: sp.csc_array, f: Vector, at: Matrix, highest: Vector) -> ManufacturedProblem:
-    """u ≤ `highest` at all unknowns."""
-    return _bounded(K, f, at, 1.0, highest, None)
+def membrane(
+    title: str,
+    size: int,
+    make: Callable[[], ManufacturedProblem],
+    m: int | None = None,
+    printed: PrintedOptimum | None = None,
+) -> MadeScene:
+    """A rung of `size` unknowns with m contacts, by default one at each unknown, made when needed."""
+    return matrices(title, DeferredProblem((size,), m or size, make, sparse=True), printed=printed)
 
 
-def _bounded(
-    K: sp.csc_array, f: Vector, at: Matrix, sign: float, g: Vector, held: NDArray[np.intp] | None
-) -> ManufacturedProblem:
-    size = K.shape[0]
-    rows = np.arange(size) if held is None else held
-    A = sp.csc_array((np.full(rows.size, sign), (rows, np.arange(rows.size))), shape=(size, rows.size))
-    return ManufacturedProblem(Assembly(Stiffness.of(K, nodes=at), A, at, ("membrane",)), LoadCase(f, g))
+def unit_square(
+    title: str,
+    load: float,
+    sign: float,
+    bound: Callable[[Vector], Matrix],
+    cells: int,
+    edge: float = 1.0,
+    printed: PrintedOptimum | None = None,
+) -> MadeScene:
+    """A rung on the unit square: `load` per area, and ±u ≤ ±`bound` at the nodes of the inner lines."""
+    size, h = cells - 1, 1 / cells
 
+    def make() -> ManufacturedProblem:
+        line: Vector = np.arange(1.0, cells) * h
+        f = np.full(size**2, load * h**2)
+        return bounded(five_point(size, edge), f, nodes(line, line), sign, bound(line).ravel())
 
-def deferred(size: int, make: Callable[[], ManufacturedProblem], m: int | None = None) -> DeferredProblem:
-    """A problem of `size` unknowns in one block, with m contacts, by default one at each unknown."""
-    return DeferredProblem((size,), size if m is None else m, make, sparse=True)
+    return membrane(f"{title}, {cells} × {cells} cells", size**2, make, printed=printed)

@@ -20,10 +20,9 @@ from scipy.sparse.linalg import spsolve
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.ladder import Ladder, Rung
-from problems.manufactured.membrane import above, deferred, five_point, nodes
+from problems.manufactured.ladder import Ladder, Scene
+from problems.manufactured.membrane import bounded, five_point, membrane, nodes
 
-CELLS = (8, 20, 40, 80, 160, 320)
 FREE = float(brentq(lambda a: a**2 * np.log(2 / a) - 1 + a**2, 0.5, 0.9, xtol=1e-15))  # a
 
 
@@ -49,22 +48,16 @@ def alone(cells: int) -> Vector:
     return np.asarray(spsolve(five_point(size), f.ravel()))
 
 
-def _problem(cells: int) -> ManufacturedProblem:
-    line, size, covered = _lines(cells)[1:-1], cells - 1, _covered(cells)
-    at = nodes(line, line)
-    lowest = np.sqrt(1 - (at[covered] ** 2).sum(axis=1)) - alone(cells)[covered]
-    return above(five_point(size), np.zeros(size**2), at, lowest, covered)
-
-
-def _covered(cells: int) -> np.ndarray:
+def _rung(cells: int) -> Scene:
     line = _lines(cells)[1:-1]
-    return np.flatnonzero((nodes(line, line) ** 2).sum(axis=1) < 1)
+    at = nodes(line, line)
+    covered = np.flatnonzero((at**2).sum(axis=1) < 1)
+
+    def make() -> ManufacturedProblem:
+        lowest = np.sqrt(1 - (at[covered] ** 2).sum(axis=1)) - alone(cells)[covered]
+        return bounded(five_point(line.size), np.zeros(len(at)), at, -1.0, lowest, covered)
+
+    return membrane(f"A membrane over a hemisphere, {cells} × {cells} cells", len(at), make, len(covered))
 
 
-def _rung(cells: int) -> Rung:
-    m = len(_covered(cells))
-    title = f"A membrane over a hemisphere, {cells} × {cells} cells"
-    return Rung(title, made=deferred((cells - 1) ** 2, partial(_problem, cells), m))
-
-
-RUNGS: Ladder = {f"{cells}": partial(_rung, cells) for cells in CELLS}
+RUNGS: Ladder = {f"{cells}": partial(_rung, cells) for cells in (8, 20, 40, 80, 160, 320)}

@@ -17,18 +17,16 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
 from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.ladder import Ladder, Rung
-from problems.manufactured.membrane import above, deferred, nodes, second_difference
-from problems.model.scene import PrintedOptimum
+from problems.manufactured.ladder import Ladder
+from problems.manufactured.membrane import bounded, membrane, nodes, second_difference
+from problems.model.scene import PrintedOptimum, Scene
 
 HALF_WIDTH = 10.0  # b
-ECCENTRICITY = 0.1  # ε
-CELLS = (20, 40, 80, 160, 320)
 CUTEST = {10: -0.1789600, 23: -0.1800500, 32: -0.1803000, 75: -0.1805500, 100: -0.1805700, 125: -0.1805800}
 PETSC = {  # inner nodes in x and y, ε, optimum, its digits
-    "8x12": (8, 12, 0.1, -0.183437, 6, "jbearing2_1.out"),
-    "10x16": (10, 16, 0.9, -15.607, 5, "jbearing2_3.out"),
-    "50x50": (50, 50, 0.99, -60.1509, 6, "jbearing2_2.out"),
+    "8x12": (8, 12, 0.1, PrintedOptimum(-0.183437, 6, "PETSc/TAO, jbearing2_1.out")),
+    "10x16": (10, 16, 0.9, PrintedOptimum(-15.607, 5, "PETSc/TAO, jbearing2_3.out")),
+    "50x50": (50, 50, 0.99, PrintedOptimum(-60.1509, 6, "PETSc/TAO, jbearing2_2.out")),
 }
 
 
@@ -45,26 +43,21 @@ def problem(nx: int, ny: int, eccentricity: float) -> ManufacturedProblem:
     x: Vector = hx * np.arange(1.0, nx + 1)
     y: Vector = hy * np.arange(1.0, ny + 1)
     f = np.repeat(hx * hy * eccentricity * np.sin(x), ny)
-    return above(sp.csc_array(K), f, nodes(x, y), np.zeros(nx * ny))
+    return bounded(sp.csc_array(K), f, nodes(x, y), -1.0, np.zeros(nx * ny))
 
 
-def _rung(
-    nx: int, ny: int, eccentricity: float = ECCENTRICITY, printed: PrintedOptimum | None = None
-) -> Rung:
+def _rung(nx: int, ny: int, eccentricity: float = 0.1, printed: PrintedOptimum | None = None) -> Scene:
     title = f"Journal bearing, {nx + 1} × {ny + 1} cells, eccentricity {eccentricity:g}"
-    return Rung(title, made=deferred(nx * ny, partial(problem, nx, ny, eccentricity)), printed=printed)
-
-
-def _petsc(nx: int, ny: int, eccentricity: float, value: float, digits: int, file: str) -> Rung:
-    return _rung(nx, ny, eccentricity, PrintedOptimum(value, digits, f"PETSc/TAO, {file}"))
-
-
-def _cutest(side: int, value: float) -> Rung:
-    return _rung(side - 2, side - 2, printed=PrintedOptimum(value, 5, "CUTEst, JNLBRNG1.SIF"))
+    return membrane(title, nx * ny, partial(problem, nx, ny, eccentricity), printed=printed)
 
 
 RUNGS: Ladder = {
-    **{f"{cells}": partial(_rung, cells - 1, cells - 1) for cells in CELLS},
-    **{f"cutest-{side}": partial(_cutest, side, value) for side, value in CUTEST.items()},
-    **{f"petsc-{name}": partial(_petsc, *given) for name, given in PETSC.items()},
+    **{f"{cells}": partial(_rung, cells - 1, cells - 1) for cells in (20, 40, 80, 160, 320)},
+    **{
+        f"cutest-{side}": partial(
+            _rung, side - 2, side - 2, printed=PrintedOptimum(value, 5, "CUTEst, JNLBRNG1.SIF")
+        )
+        for side, value in CUTEST.items()
+    },
+    **{f"petsc-{name}": partial(_rung, *given) for name, given in PETSC.items()},
 }

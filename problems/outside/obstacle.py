@@ -16,30 +16,22 @@ from functools import partial
 
 import numpy as np
 
-from problems.forms.assembly import Vector
-from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.ladder import Ladder, Rung
-from problems.manufactured.membrane import above, deferred, five_point, nodes
+from problems.forms.assembly import Matrix, Vector
+from problems.manufactured.ladder import Ladder
+from problems.manufactured.membrane import unit_square
 from problems.model.scene import PrintedOptimum
 
-CELLS = (20, 40, 80, 160, 320)
 CUTEST = {4: 0.753659753, 10: 1.397897560, 23: 1.678027027, 32: 1.748270031}  # nodes a side, edges included
 
 
-def _problem(cells: int, edge: float) -> ManufacturedProblem:
-    size, h = cells - 1, 1 / cells
-    line: Vector = np.arange(1.0, size + 1) * h
-    lowest = np.outer(np.sin(3.2 * line), np.sin(3.3 * line)).ravel()
-    return above(five_point(size, edge), np.full(size**2, h**2), nodes(line, line), lowest)
+def _obstacle(line: Vector) -> Matrix:
+    return np.outer(np.sin(3.2 * line), np.sin(3.3 * line))
 
 
-def _rung(cells: int, edge: float = 1.0, printed: PrintedOptimum | None = None) -> Rung:
-    title = f"A membrane on an obstacle, {cells} × {cells} cells"
-    return Rung(title, made=deferred((cells - 1) ** 2, partial(_problem, cells, edge)), printed=printed)
-
+_rung = partial(unit_square, "A membrane on an obstacle", 1.0, -1.0, _obstacle)
 
 RUNGS: Ladder = {
-    **{f"{cells}": partial(_rung, cells) for cells in CELLS},
+    **{f"{cells}": partial(_rung, cells) for cells in (20, 40, 80, 160, 320)},
     **{
         f"cutest-{side}": partial(_rung, side - 1, 0.5, PrintedOptimum(value, 9, "CUTEst, OBSTCLAE.SIF"))
         for side, value in CUTEST.items()

@@ -16,33 +16,26 @@ from functools import partial
 
 import numpy as np
 
-from problems.forms.assembly import Vector
-from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.ladder import Ladder, Rung
-from problems.manufactured.membrane import below, deferred, five_point, nodes
+from problems.forms.assembly import Matrix, Vector
+from problems.manufactured.ladder import Ladder
+from problems.manufactured.membrane import unit_square
 from problems.model.scene import PrintedOptimum
 
 COUPLE = 5.0  # c: twice the angle of twist per length, in units of the yield stress
-CELLS = (20, 40, 80, 160, 320)
 COPS = "COPS 3.0, torsion, nx = ny = 50 (as MadNLP/COPSBenchmark.jl quotes it)"
 CUTEST = {4: -5.1851852e-1, 10: -4.9234185e-1, 22: -4.5608771e-1}  # nodes a side, edges included
 
 
-def _problem(cells: int, edge: float) -> ManufacturedProblem:
-    size, h = cells - 1, 1 / cells
-    line: Vector = np.arange(1.0, size + 1) * h
+def _distance(line: Vector) -> Matrix:
+    """To the nearest edge."""
     to_edge = np.minimum(line, 1 - line)
-    distance = np.minimum.outer(to_edge, to_edge).ravel()
-    return below(five_point(size, edge), np.full(size**2, COUPLE * h**2), nodes(line, line), distance)
+    return np.minimum.outer(to_edge, to_edge)
 
 
-def _rung(cells: int, edge: float = 1.0, printed: PrintedOptimum | None = None) -> Rung:
-    title = f"Elastic–plastic torsion, {cells} × {cells} cells"
-    return Rung(title, made=deferred((cells - 1) ** 2, partial(_problem, cells, edge)), printed=printed)
-
+_rung = partial(unit_square, "Elastic–plastic torsion", COUPLE, 1.0, _distance)
 
 RUNGS: Ladder = {
-    **{f"{cells}": partial(_rung, cells) for cells in CELLS},
+    **{f"{cells}": partial(_rung, cells) for cells in (20, 40, 80, 160, 320)},
     "cops-50x50": partial(_rung, 51, printed=PrintedOptimum(-4.18087e-1, 6, COPS)),
     **{
         f"cutest-{side}": partial(_rung, side - 1, 0.5, PrintedOptimum(value, 8, "CUTEst, TORSION1.SIF"))
