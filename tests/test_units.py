@@ -195,13 +195,14 @@ def test_answers_do_not_depend_on_units(name: str, form: Form, bits: int) -> Non
         if session.batch is not None:
             found += session.solve_batch([first, first])
         answers.append(found)
+    rounded = bits > 0 or name == "proxqp"  # whose rounding depends on where its arrays lie in memory
     for one, two in zip(*answers, strict=True):
         assert one.status == two.status
         assert one.lam is not None
         assert two.lam is not None
-        np.testing.assert_allclose(two.lam * C, one.lam, rtol=0, atol=1e-5 if bits else 0)
+        np.testing.assert_allclose(two.lam * C, one.lam, rtol=0, atol=1e-5 if rounded else 0)
         if one.x is not None and two.x is not None:
-            np.testing.assert_allclose(two.x * S, one.x, rtol=0, atol=1e-8 if bits else 0)
+            np.testing.assert_allclose(two.x * S, one.x, rtol=0, atol=1e-8 if rounded else 0)
     np.testing.assert_allclose(answers[0][0].lam, lam, rtol=0, atol=1e-3)
     if answers[0][0].x is not None:
         np.testing.assert_allclose(answers[0][0].x, x, rtol=0, atol=1e-7)

@@ -11,8 +11,7 @@ and the dual form's Q and p become RQR and Rp/U. All are powers of two, so nothi
         model says to be displacements in mm. In the dual form, which has no x, D = 1
     R   contacts of unit length: max_i D_i|a_ij| R_j between 1/√2 and √2
     U   ℓ/δ, with δ the median of D at the contacts. ℓ, the length of a scaled displacement there, is 1 mm
-        if max |g|, or what loads alone would move, about max |p| or max |f_i|/k_ii, is between 2⁻⁸ and 2⁸ mm;
-        else about the larger of these
+        if max |g|, or the larger of it and max |f_i|/k_ii, is between 2⁻⁸ and 2⁸ mm; else about the latter
 
 So a joint in mm is passed on untouched in a dense form, and its gaps are in mm in every form, where a
 tolerance of τ/ℓ on them means τ mm. D and R belong to the assembly, U to a load case, and to those that are
@@ -66,16 +65,16 @@ class Units:
 
     def of_loads(self, loads: Sequence[LoadCase]) -> Units:
         """With the ℓ of these load cases; 1 if there are neither loads nor gaps."""
-        sizes = [float(abs(v).max(initial=0.0)) for load in loads for v in self._displacements(load)]
-        usual = any(1 / USUAL <= size <= USUAL for size in sizes) or not any(sizes)
-        return replace(self, length=1.0 if usual else float(power_of_two(max(sizes))))
+        size = max((float(abs(self.delta * self.R * load.g).max(initial=0.0)) for load in loads), default=0.0)
+        if not _usual(size):
+            size = max(size, *(self._moved(load) for load in loads))
+        return replace(self, length=1.0 if size == 0 or _usual(size) else float(power_of_two(size)))
 
-    def _displacements(self, load: LoadCase) -> tuple[Vector, ...]:
-        """Gaps, and about what loads alone would move, as of displacements at contacts, mm."""
-        gaps = self.delta * self.R * load.g
-        if self.problem.bounded:
-            return gaps, self.R * load.p
-        return gaps, self.delta * load.f / (self.D * self.problem.assembly.K.diagonal)
+    def _moved(self, load: LoadCase) -> float:
+        """max |f_i|/k_ii, as of displacements at contacts, mm."""
+        if not load.f.any():
+            return 0.0
+        return float(abs(self.delta * load.f / (self.D * self.problem.assembly.K.diagonal)).max())
 
     @property
     def U(self) -> float:
@@ -104,6 +103,10 @@ class Units:
     def answer(self, lam: Any, x: Any) -> tuple[Any, Any]:
         """λ and x in the problem's own units; what is no vector of that length stays, to be refused."""
         return _times(self.U * self.R, lam), _times(self.U * self.D, x)
+
+
+def _usual(size: float) -> bool:
+    return 1 / USUAL <= size <= USUAL
 
 
 def _median(values: Vector) -> float:
