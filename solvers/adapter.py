@@ -3,8 +3,7 @@
 Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms), so an adapter does
 not depend on it; it only tells sparse blocks of P from dense ones. Relative tolerances are 0 if a library has
 them separately, and the absolute ones are the requested tolerance, in the library's own units: N for
-Kx − f + Aλ, mm for Aᵀx − g and Qλ − p, N·mm for the duality gap. The sparse form is handed over in balanced
-units (balanced.py), in which the tolerance is meant as well; the details of the answer say so.
+Kx − f + Aλ, mm for Aᵀx − g and Qλ − p; N·mm for the duality gap (`gap_tolerance`).
 """
 
 from __future__ import annotations
@@ -20,40 +19,30 @@ import scipy.sparse as sp
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector
 
-from .balanced import Units
 from .base import Answer, Problem, Status, WarmStart
+
+GAP_ROUNDING = 1e-13  # PIQP comes down to 3e-14 on some scenes, and waits for 1.5e-14 in vain on others
 
 
 @dataclass(frozen=True)
 class Converted:
-    """P and G in a library's format; G is None if z ≥ 0 are passed as the library's bounds.
-
-    problem : as the library is given it. units : its balanced units; None if it is in those of the scene.
-    """
+    """P and G in a library's format; G is None if z ≥ 0 are passed as the library's bounds."""
 
     problem: Problem
     P: Any
     G: Any = None
-    units: Units | None = None
 
     def vectors(self, load: LoadCase) -> tuple[Vector, Vector | None]:
         """q and h; h is None if bounds replace it."""
-        own = load if self.units is None else self.units.load(load)
-        return self.problem.q(own), self.problem.h(own)
+        return self.problem.q(load), self.problem.h(load)
 
-    def gap_tolerance(self, tolerance: float, load: LoadCase) -> float:
-        """For the duality gap, in the library's units."""
-        return tolerance if self.units is None else self.units.gap_tolerance(tolerance, load)
-
-    def start(self, start: WarmStart, load: LoadCase) -> tuple[Vector | None, Vector]:
-        """(z, multipliers) from which to solve this load case."""
-        own = start if self.units is None else self.units.start(start, load)
-        return self.problem.start(own.lam, own.gap, own.x)
+    def start(self, start: WarmStart) -> tuple[Vector | None, Vector]:
+        """(z, multipliers) from which to solve."""
+        return self.problem.start(start.lam, start.gap, start.x)
 
     def answer(
         self,
         status: Status,
-        load: LoadCase,
         tolerance: float,
         z: Vector,
         multipliers: Vector | None,
@@ -62,14 +51,15 @@ class Converted:
         """The answer of a solution z and the multipliers of its rows, if there are rows."""
         lam, x = self.problem.answer(z, multipliers)
         if lam is None:
-            return self.failed(load, **facts)
-        found = answer(status, tolerance, lam, x, **facts)
-        return found if self.units is None else self.units.answer(found, load)
+            return Answer("failed", None, **facts)
+        return answer(status, tolerance, lam, x, **facts)
 
-    def failed(self, load: LoadCase, **facts: Any) -> Answer:
-        """An answer without forces."""
-        found = Answer("failed", None, **facts)
-        return found if self.units is None else self.units.answer(found, load)
+
+def gap_tolerance(tolerance: float, load: LoadCase) -> float:
+    """For the duality gap, which bounds the error ½(x − x*)ᵀK(x − x*): as many N·mm as the tolerance has mm,
+    but no looser than the tolerance itself, and no tighter for it than rounding allows.
+    """
+    return min(tolerance, max(tolerance / load.energy, GAP_ROUNDING))
 
 
 def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = None, **facts: Any) -> Answer:

@@ -22,7 +22,6 @@ from problems.input.validation import unknown
 
 from .base import Solver
 from .plugin import load_plugin, own_files, solver_class
-from .scaling import Scaled
 
 METHODS, LIBRARIES = "solvers.methods", "solvers.libraries"
 #: The one module for many solvers: all others that qpsolvers finds.
@@ -62,8 +61,7 @@ def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) 
     if faults:
         raise InputError(faults)
     try:
-        made = factory(**options)
-        return Scaled(made) if in_house(name) else made
+        return factory(**options)
     except InputError:
         raise
     except (TypeError, ValueError) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from harness.measurement.solver_session import SolverSession
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
@@ -29,9 +30,9 @@ ACTIVE_SET = ("gi", "newton", "ipm-fast", "quadprog", "daqp", "nnls")
 def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Answer, Vector | None]:
     """The solver's answer, and its displacements where it has any."""
     solver, tolerance = make_solver(name, {}), TOLERANCES.get(name, 1e-9)
-    load = LoadCase(case.f, case.g, prepared.dual_load(case))
-    state = solver.prepare(solver.convert(in_form(prepared, form)))
-    answer = solver.solve(solver.setup(state, load, tolerance), load, tolerance)
+    session = SolverSession(solver, in_form(prepared, form), tolerance)
+    session.open()
+    answer = session.cold(LoadCase(case.f, case.g, prepared.dual_load(case)))
     if answer.lam is None or form != "dual":
         return answer, answer.x
     return answer, prepared.recover(answer.lam, case)

@@ -21,8 +21,7 @@ def package(tmp_path: Path) -> Path:
 
 
 def hash_of(file: Path, package: Path, name: str = "") -> str:
-    scaling = [package / "scaling.py"] if in_house(name) else []
-    return fingerprint([file, *scaling], within=["solvers"], root=package.parent)
+    return fingerprint([file], within=["solvers"], root=package.parent)
 
 
 def change(file: Path, old: str, new: str) -> None:

@@ -13,13 +13,10 @@ from pathlib import Path
 from problems.storage.fingerprint import ROOT, fingerprint
 from solvers.base import Solver
 from solvers.plugin import own_files
-from solvers.scaling import Scaled
 
 
 def code_of(solver: Solver) -> str:
     """The fingerprint of a solver of the package, or of a plug-in."""
-    made = [solver, solver.solver] if isinstance(solver, Scaled) else [solver]
-    files = [Path(inspect.getfile(type(each))) for each in made]
-    if ROOT / "solvers" not in files[0].parents:
-        files = own_files(files[0])
+    file = Path(inspect.getfile(type(solver)))
+    files = [file] if ROOT / "solvers" in file.parents else own_files(file)
     return fingerprint(files, within=["solvers"])

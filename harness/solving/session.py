@@ -6,13 +6,14 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.problem import Problem
+from problems.forms.units import Units
 from solvers.base import Answer, Batch, Solver, WarmStart
 
 from .answers import Refused, checked
@@ -33,6 +34,8 @@ class Solved:
 
 class SolverSession:
     """Convert and prepare once, then solve load cases one by one; answers are kept for warm starts.
+
+    The solver is given the problem in the units of problems/forms/units.py, chosen anew by `cold`.
 
     Parameters
     ----------
@@ -61,11 +64,14 @@ class SolverSession:
         """Convert and prepare. batched : also ask for the solver's way to solve several at once."""
         protect(self.problem)
         with self._step("convert_s"):
-            converted = self.solver.convert(self.problem)
+            self.units = Units.of(self.problem)
+            given = self.units.scaled()
+            protect(given)
+            converted = self.solver.convert(given)
         with self._step("prepare_s"):
             self.state = self.solver.prepare(converted)
-            if batched:
-                self.batch = self.solver.batched(self.state)
+            if batched and (batch := self.solver.batched(self.state)) is not None:
+                self.batch = self._in_units(batch)
         self.opened = True
 
     def nearest(self, load: LoadCase) -> Solved | None:
@@ -77,15 +83,19 @@ class SolverSession:
     def cold(self, load: LoadCase, tolerance: float | None = None) -> Answer:
         """Set up and solve."""
         tolerance = self.tolerance if tolerance is None else tolerance
+        self.units = self.units.of_loads([load])
         with self._step("setup_s"):
-            self.ready = self.solver.setup(self.state, load, tolerance)
-        return self._solve(load, tolerance)
+            given = self.units.load(load), self.units.tolerance(tolerance)
+            self.ready = self.solver.setup(self.state, *given)
+        return self._solve(*given)
 
     def warm(self, load: LoadCase, start: WarmStart) -> Answer:
         """Update for the next load case, and solve."""
         with self._step("setup_s"):
-            self.ready = self.solver.update(self.state, self.ready, load, self.tolerance, start)
-        return self._solve(load, self.tolerance)
+            given = self.units.load(load), self.units.tolerance(self.tolerance)
+            near = WarmStart(self.units.load(start.load), *self.units.start(start.lam, start.gap, start.x))
+            self.ready = self.solver.update(self.state, self.ready, *given, near)
+        return self._solve(*given)
 
     def next(self, load: LoadCase, near: Solved | None, case: int | None = None) -> Answer:
         """Solve, from the nearest answer if there is one; the answer is checked and kept."""
@@ -130,7 +140,24 @@ class SolverSession:
 
     def _solve(self, load: LoadCase, tolerance: float) -> Answer:
         with self._step("solve_s"):
-            return self.solver.solve(self.ready, load, tolerance)
+            answer = self.solver.solve(self.ready, load, tolerance)
+        return _in_own_units(answer, self.units)
+
+    def _in_units(self, batch: Batch) -> Batch:
+        def scaled(loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
+            units = self.units.of_loads(loads)
+            answers = batch([units.load(load) for load in loads], units.tolerance(tolerance))
+            return [_in_own_units(answer, units) for answer in answers]
+
+        return scaled
+
+
+def _in_own_units(answer: Answer, units: Units) -> Answer:
+    """λ and x in the problem's units; anything but an answer stays, to be refused."""
+    if units.own or not isinstance(answer, Answer):
+        return answer
+    lam, x = units.answer(answer.lam, answer.x)
+    return replace(answer, lam=lam, x=x)
 
 
 def protect(problem: Problem) -> None:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.stiffness.banded import BandedBlock
-
 from .assembly import Assembly, Vector
 from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, of_windows
 from .compliance import Compliance, DenseCompliance
@@ -95,9 +93,10 @@ def _along_bands(assembly: Assembly) -> Windows:
         return Windows.of(assembly.contact_nodes, assembly.m)
     places, widest = np.arange(assembly.n), 1
     for block, rows in zip(assembly.K.blocks, assembly.K.slices, strict=True):
-        if isinstance(block, BandedBlock):
-            widest = max(widest, block.width + 1)
-            if block.order is not None:
-                places[rows.start + block.order] = np.arange(rows.start, rows.stop)
+        if block.band is not None:
+            width, order = block.band
+            widest = max(widest, width + 1)
+            if order is not None:
+                places[rows.start + order] = np.arange(rows.start, rows.stop)
     first = places[assembly.A.indices[assembly.A.indptr[:-1]]]
     return Windows(np.argsort(first, kind="stable"), max(1, assembly.m * widest // assembly.n))

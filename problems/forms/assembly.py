@@ -78,11 +78,13 @@ class LoadCase:
 
     f : (n,) nodal forces, N. g : (m,) initial gaps, mm.
     p : (m,) AᵀK⁻¹f − g, mm, the overlap of the parts if contact is ignored; formed by the dual form only.
+    energy : N·mm per unit of the objective, for the tolerance of a duality gap; not 1 in other units only.
     """
 
     f: Vector
     g: Vector
     p: Vector = field(default_factory=lambda: np.zeros(0))
+    energy: float = 1.0
 
 
 def stacked(cases: Sequence[LoadCase]) -> LoadCase:

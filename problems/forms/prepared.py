@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from problems.stiffness.block import scaled
 from problems.stiffness.operator import Stiffness
 
 from .approximate_inverse import ApproximateInverse, of_dense, of_products
@@ -124,10 +125,19 @@ class Prepared:
         like = Prepared(self.coarser()).compliance if self.coarser else Q
         return of_products(self.assembly, Q, like)
 
-    def in_contact_units(self, c: Vector) -> Prepared:
-        """With the columns of A divided by c (m,); K, and its factors, are the same."""
-        A = sp.csc_array(self.assembly.A @ sp.diags_array(1 / c))
-        return Prepared(replace(self.assembly, A=A), Q=lambda: np.asfortranarray(self.Q / c / c[:, None]))
+    def scaled(self, D: Vector, R: Vector) -> Prepared:
+        """With DKD, by the factors of K, and DAR, for powers of two D (n,) and R (m,)."""
+        K = self.assembly.K if (D == 1).all() else self.assembly.K.scaled(D)
+        assembly = replace(self.assembly, K=K, A=scaled(self.assembly.A, D, R))
+        coarser = None
+        if self.coarser is not None:
+            coarse = self.coarser
+
+            def coarser() -> Assembly:
+                similar = coarse()
+                return replace(similar, A=scaled(similar.A, np.ones(similar.n), R))
+
+        return Prepared(assembly, Q=lambda: np.asfortranarray(self.Q * R * R[:, None]), coarser=coarser)
 
     def dual_load(self, load: LoadCase) -> Vector:
         """p = AᵀK⁻¹f − g, (m,), mm: the overlap of the parts if contact is ignored."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -123,7 +124,7 @@ def in_form(prepared: Prepared, form: Form) -> Problem:
 
 def read_only(load: LoadCase) -> LoadCase:
     """The load case as read-only views: a solver cannot write, and the caller's own arrays stay writable."""
-    views = [array.view() for array in (load.f, load.g, load.p)]
-    for view in views:
+    f, g, p = load.f.view(), load.g.view(), load.p.view()
+    for view in (f, g, p):
         view.flags.writeable = False
-    return LoadCase(*views)
+    return replace(load, f=f, g=g, p=p)

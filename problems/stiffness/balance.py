@@ -16,8 +16,12 @@ def balanced_units(diagonal: Vector) -> Vector:
 
     The unknowns of a finite-element model have mixed units (mm, 1, 1/mm); DKD has the digits of K.
     """
-    positive = diagonal > 0
-    return np.exp2(np.where(positive, -np.round(np.log2(np.where(positive, diagonal, 1.0)) / 2), 0.0))
+    return 1 / power_of_two(np.sqrt(np.where(diagonal > 0, diagonal, 1.0)))
+
+
+def power_of_two(sizes: Vector | float) -> Vector:
+    """The nearest to each size > 0: between 1/√2 and √2 of it."""
+    return np.exp2(np.round(np.log2(sizes)))
 
 
 def least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector, steps: int = POWER_STEPS) -> float:

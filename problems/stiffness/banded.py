@@ -45,6 +45,10 @@ class BandedBlock(SparseBlock):
         return [self.L]
 
     @property
+    def band(self) -> tuple[int, Rows | None]:
+        return self.width, self.order
+
+    @property
     def numbers(self) -> int:
         return self.size * (self.width + 1)
 

@@ -30,6 +30,8 @@ class Block(ABC):
     """A block K_i of K, (size, size), N/mm. matrix : by columns (Fortran order), or a csc_array."""
 
     matrix: Any
+    #: Whether it is stored as a dense matrix.
+    dense = False
 
     @property
     def size(self) -> int:
@@ -44,6 +46,11 @@ class Block(ABC):
         """(size,) N/mm."""
         found: Vector = self.matrix.diagonal()
         return found
+
+    @property
+    def band(self) -> tuple[int, Rows | None] | None:
+        """The half-bandwidth, and the unknowns in the order of the band (None: as they are); None without."""
+        return None
 
     @property
     @abstractmethod

@@ -25,6 +25,8 @@ NORM_STEPS = 5  # of the power method, for v
 class DenseBlock(Block):
     """matrix : (size, size) by columns, perhaps memory-mapped."""
 
+    dense = True
+
     def __init__(self, matrix: Matrix) -> None:
         self.matrix = matrix
 

@@ -16,6 +16,7 @@ from .balance import POWER_STEPS, balanced_units, least_eigenvalue
 from .block import Block, Matrix, NotPositiveDefinite, Vector
 from .dense import DenseBlock
 from .local_compliance import LocalCompliance, Rows
+from .scaled import ScaledBlock
 from .sparse import sparse_block
 
 DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
@@ -54,11 +55,11 @@ class Stiffness:
     @property
     def dense(self) -> bool:
         """Whether every block is stored as a dense matrix."""
-        return all(isinstance(block, DenseBlock) for block in self.blocks)
+        return all(block.dense for block in self.blocks)
 
     def as_sparse(self, nodes: Matrix | None = None) -> Stiffness:
         """The same K with sparse blocks; itself, if they are."""
-        if not any(isinstance(block, DenseBlock) for block in self.blocks):
+        if not any(block.dense for block in self.blocks):
             return self
         return Stiffness.of(*map(sp.csc_array, self.matrices), nodes=nodes)
 
@@ -163,9 +164,13 @@ class Stiffness:
         return float((self.absolute_sums(D) * D).max()) / least if least > 0 else np.inf
 
     def scaled(self, D: Vector) -> Stiffness:
-        """DKD, sparse."""
-        pairs = zip(self.as_sparse().blocks, self.slices, strict=True)
-        return Stiffness.of(*(block.balanced(D[rows]) for block, rows in pairs))  # type: ignore[attr-defined]
+        """DKD of sparse blocks, by the factors of K. D (n,) : powers of two."""
+        blocks = [ScaledBlock(block, D[rows]) for block, rows in self._own_rows()]
+
+        def factor(_: Stiffness) -> None:
+            self.factors  # noqa: B018  # made when first asked for
+
+        return Stiffness(blocks, factor)
 
     def compliance(self, A: sp.csc_array) -> Matrix:
         """Q = AᵀK⁻¹A, (m, m), mm/N, by columns."""

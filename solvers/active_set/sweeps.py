@@ -19,7 +19,7 @@ corrects more than further sets; so the limit on the sets of a sweep grows with 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -198,7 +198,7 @@ class Sweeps:
 
 def _none(load: LoadCase) -> LoadCase:
     """No load and no gap: what `gaps` then gives is Qλ."""
-    return LoadCase(*(np.zeros_like(v) for v in (load.f, load.g, load.p)))
+    return replace(load, f=np.zeros_like(load.f), g=np.zeros_like(load.g), p=np.zeros_like(load.p))
 
 
 def _nearest(cases: Sequence[Case], load: LoadCase) -> Case:

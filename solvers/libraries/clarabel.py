@@ -8,7 +8,7 @@ error of 1e-8. Clarabel's equilibration and its regularisation of 1e-8 then cost
 fails, or ends as `AlmostSolved` with an error of about 1e-5 mm). Without the former, and with 1e-12 for the
 latter, it ends as `Solved` within 1e-10 mm on three such problems; on seven smaller ones the largest error
 was 8e-8 mm. The settings were chosen on these problems. The primal form keeps the defaults, and
-so does the sparse one but for the equilibration, which balanced units replace (solvers/balanced.py).
+so does the sparse one but for the equilibration, which its units replace (problems/forms/units.py).
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from typing import Any
 import clarabel
 import numpy as np
 
-from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
-from solvers.balanced import balanced
+from solvers.adapter import Converted, choice, gap_tolerance, is_sparse, rows_for_bounds, upper_triangle
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 from solvers.settings import apply, chosen
 
@@ -43,8 +42,7 @@ class Clarabel(Solver):
         self.settings = chosen("clarabel", settings, clarabel.DefaultSettings())
 
     def convert(self, problem: Problem) -> Converted:
-        problem, units = balanced(problem)
-        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0), units)
+        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         q, h = state.vectors(load)
@@ -59,9 +57,9 @@ class Clarabel(Solver):
         settings.max_iter = 500
         settings.direct_solve_method = self.direct_solve_method
         settings.tol_feas = tolerance
-        settings.tol_gap_abs = state.gap_tolerance(tolerance, load)
+        settings.tol_gap_abs = gap_tolerance(tolerance, load)
         settings.tol_gap_rel = 0.0
-        settings.equilibrate_enable = state.units is None and not state.problem.bounded
+        settings.equilibrate_enable = not (state.problem.bounded or is_sparse(state.problem.blocks))
         if state.problem.bounded:
             settings.static_regularization_constant = 1e-12
         apply(settings, self.settings)
@@ -79,7 +77,6 @@ class Clarabel(Solver):
         result = library.solve()
         return state.answer(
             STATUS.get(str(result.status), "failed"),
-            load,
             tolerance,
             np.array(result.x),
             np.array(result.z),

@@ -69,4 +69,4 @@ class LBfgsB(Solver):
         status: Status = "iteration_limit" if found.status == 1 else "inaccurate"
         if found.success and "PROJECTED GRADIENT" in message:
             status = "solved"
-        return state.answer(status, load, tolerance, found.x, None, iterations=found.nit, details=details)
+        return state.answer(status, tolerance, found.x, None, iterations=found.nit, details=details)

@@ -50,5 +50,5 @@ class Nnls(Solver):
         try:
             lam, _ = nnls(ready.U, b, maxiter=LIMIT * len(b))
         except RuntimeError as error:  # too many iterations
-            return ready.converted.failed(load, details=details | {"message": str(error)})
-        return ready.converted.answer("solved", load, tolerance, lam, None, details=details)
+            return Answer("failed", None, details=details | {"message": str(error)})
+        return ready.converted.answer("solved", tolerance, lam, None, details=details)

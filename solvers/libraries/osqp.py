@@ -1,6 +1,6 @@
 """OSQP: the alternating direction method of multipliers, https://osqp.org.
 
-Stops when ‖Aᵀx − s‖∞ and ‖Kx − f + Aλ‖∞ (primal form; sparse form, in balanced units), or ‖λ − s‖∞ and
+Stops when ‖Aᵀx − s‖∞ and ‖Kx − f + Aλ‖∞ (primal and sparse form), or ‖λ − s‖∞ and
 ‖Qλ − p − w‖∞ (dual form), and the duality gap are below the tolerance. ρ is adapted every 50 iterations and
 never by the clock, so the iteration count does not depend on the machine.
 """
@@ -13,7 +13,6 @@ import numpy as np
 import osqp
 
 from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
-from solvers.balanced import balanced
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 from solvers.settings import chosen
 
@@ -47,8 +46,7 @@ class Osqp(Solver):
         self.polishing = polishing
 
     def convert(self, problem: Problem) -> Converted:
-        problem, units = balanced(problem)
-        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, 1.0), units)
+        return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, 1.0))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         q, h = state.vectors(load)
@@ -71,7 +69,7 @@ class Osqp(Solver):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """OSQP.update and warm_start; the factors and the last ρ are kept."""
         _, library = ready
-        (q, h), (z, multipliers) = state.vectors(load), state.start(start, load)
+        (q, h), (z, multipliers) = state.vectors(load), state.start(start)
         library.update(q=q, **({} if h is None else {"u": h}))
         # OSQP's multipliers of lower bounds are negative.
         library.warm_start(x=z, y=-np.maximum(multipliers, 0.0) if state.problem.bounded else multipliers)
@@ -87,7 +85,6 @@ class Osqp(Solver):
             status = "inaccurate"
         return state.answer(
             status,
-            load,
             tolerance,
             result.x,
             result.y,

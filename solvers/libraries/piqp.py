@@ -13,8 +13,7 @@ import numpy as np
 import piqp
 import scipy.sparse as sp
 
-from solvers.adapter import Converted, choice, dense, is_sparse, upper_triangle
-from solvers.balanced import balanced
+from solvers.adapter import Converted, choice, dense, gap_tolerance, is_sparse, upper_triangle
 from solvers.base import DENSE_FORMS, FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 from solvers.settings import apply, chosen
 
@@ -37,23 +36,22 @@ class Piqp(Solver):
         self.forms = DENSE_FORMS if backend == "dense" else FORMS  # type: ignore[misc]  # of this solver alone
 
     def convert(self, problem: Problem) -> Converted:
-        problem, units = balanced(problem)
         G = problem.G
         if self.backend == "sparse" or is_sparse(problem.blocks):
             rows = None if G is None else sp.csc_matrix(G)
-            return Converted(problem, upper_triangle(problem.blocks), rows, units)
+            return Converted(problem, upper_triangle(problem.blocks), rows)
         return Converted(problem, dense(problem.blocks), None if G is None else G.toarray(order="F"))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         library = piqp.SparseSolver() if sp.issparse(state.P) else piqp.DenseSolver()
         settings = library.settings
         settings.eps_abs = tolerance
-        settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
+        settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
         settings.check_duality_gap = True
         settings.max_iter = 500
         settings.compute_timings = True
-        if state.units is not None:
+        if is_sparse(state.problem.blocks):
             settings.kkt_solver = piqp.sparse_ldlt_ineq_cond
         apply(settings, self.settings)
         q, h = state.vectors(load)
@@ -64,7 +62,7 @@ class Piqp(Solver):
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
         """PIQP's update of the vectors, with the preconditioner kept; it has no warm start."""
         q, h = state.vectors(load)
-        ready[1].settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
+        ready[1].settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
         ready[1].update(c=q, **({} if h is None else {"h_u": h}))
         return ready
 
@@ -74,7 +72,6 @@ class Piqp(Solver):
         result, info = library.result, library.result.info
         return state.answer(
             STATUS.get(status, "failed"),
-            load,
             tolerance,
             result.x,
             result.z_u,

@@ -12,8 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from proxsuite import proxqp
 
-from solvers.adapter import Converted, choice, dense, is_sparse, upper_triangle
-from solvers.balanced import balanced
+from solvers.adapter import Converted, choice, dense, gap_tolerance, is_sparse, upper_triangle
 from solvers.base import DENSE_FORMS, FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
 from solvers.settings import apply, chosen
 
@@ -44,10 +43,9 @@ class ProxQp(Solver):
         self.forms = FORMS if backend == "automatic" else DENSE_FORMS  # type: ignore[misc]  # of this solver alone
 
     def convert(self, problem: Problem) -> Converted:
-        problem, units = balanced(problem)
         G = problem.G
         if is_sparse(problem.blocks):
-            return Converted(problem, upper_triangle(problem.blocks), sp.csc_matrix(G), units)
+            return Converted(problem, upper_triangle(problem.blocks), sp.csc_matrix(G))
         return Converted(problem, dense(problem.blocks), None if G is None else G.toarray())
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
@@ -60,7 +58,7 @@ class ProxQp(Solver):
             library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
         settings = library.settings
         settings.eps_abs = tolerance
-        settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
+        settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
         settings.eps_rel = settings.eps_duality_gap_rel = 0.0
         settings.check_duality_gap = True
         settings.max_iter = 100_000
@@ -81,14 +79,14 @@ class ProxQp(Solver):
         """
         _, library, _ = ready
         q, h = state.vectors(load)
-        library.settings.eps_duality_gap_abs = state.gap_tolerance(tolerance, load)
+        library.settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
         if h is None:
             library.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
             library.update(g=q)
             return state, library, ()
         library.settings.initial_guess = proxqp.InitialGuess.WARM_START
         library.update(g=q, u=h)
-        z, multipliers = state.start(start, load)
+        z, multipliers = state.start(start)
         return state, library, (z, np.zeros(0), multipliers)
 
     def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
@@ -97,7 +95,6 @@ class ProxQp(Solver):
         result, info = library.results, library.results.info
         return state.answer(
             STATUS.get(info.status, "failed"),
-            load,
             tolerance,
             result.x,
             result.z,

@@ -18,8 +18,7 @@ import scipy.sparse as sp
 from qpsolvers.exceptions import QPError
 
 from problems.errors import Fault, InputError
-from solvers.adapter import Converted, dense, is_sparse, sorted_csc
-from solvers.balanced import balanced
+from solvers.adapter import Converted, dense, gap_tolerance, is_sparse, sorted_csc
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
 
 #: Options that set the absolute tolerance, and that of the duality gap. Relative tolerances are 0, iteration
@@ -75,14 +74,13 @@ class QpSolvers(Solver):
             self.forms = FORMS  # type: ignore[misc]  # of this solver alone
 
     def convert(self, problem: Problem) -> Converted:
-        problem, units = balanced(problem)
         G = problem.G
         # Copies, because some of these solvers refuse read-only arrays.
         if self.name in qpsolvers.dense_solvers and not is_sparse(problem.blocks):
             P = np.array(dense(problem.blocks), order="C")
             return Converted(problem, P, None if G is None else G.toarray(order="C"))
         P = sp.block_diag([sp.csc_matrix(block) for block in problem.blocks], format="csc")
-        return Converted(problem, sorted_csc(P), None if G is None else sorted_csc(G), units)
+        return Converted(problem, sorted_csc(P), None if G is None else sorted_csc(G))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         q, h = state.vectors(load)
@@ -94,20 +92,19 @@ class QpSolvers(Solver):
         state, problem = ready
         options = TOLERANCE.get(self.name)
         details: dict[str, Any] = {} if options else {"tolerance": "not taken"}
-        settings = options(tolerance, state.gap_tolerance(tolerance, load)) if options else {}
+        settings = options(tolerance, gap_tolerance(tolerance, load)) if options else {}
         try:
             solution = qpsolvers.solve_problem(problem, self.name, **settings | self.settings)
         except QPError as error:
-            return state.failed(load, details={**details, "message": str(error)})
+            return Answer("failed", None, details={**details, "message": str(error)})
         if solution.x is None or (not state.problem.bounded and (solution.z is None or not solution.z.size)):
-            return state.failed(load, details=details)
+            return Answer("failed", None, details=details)
         facts = solution.extras
         iterations = facts.get("iterations", facts.get("iter", getattr(facts.get("info"), "iter", None)))
         if isinstance(iterations, np.ndarray):  # quadprog: constraints added, constraints dropped
             iterations = int(iterations.sum())
         return state.answer(
             "solved" if solution.found else "failed",
-            load,
             tolerance,
             solution.x,
             solution.z,
