@@ -26,6 +26,7 @@ from problems.errors import InputError
 MANIFEST = "manifest.json"
 READ_ONLY = 0o444  # so that nobody who is given a memory map can write to its file by accident
 
+
 class Manifest(BaseModel):
     """The bytes of each file of an entry, and what else is known."""
 
