@@ -50,13 +50,12 @@ class InstalledFasteners(Positions, ContactEffect, TieEffect):
         return [pair for pair in self.pairs(joint) if pair[1] != TOOL]
 
     def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
-        nodes = self.nearest_nodes(joint)
-        columns = []
-        for first, second in self._tied(joint):
-            for node in nodes:
-                ends = [joint.unknowns(first).start + node, joint.unknowns(second).start + node]
-                columns.append(sp.coo_array(([1.0, -1.0], (ends, [0, 0])), shape=(joint.size[0], 1)))
-        return sp.csc_array(sp.hstack(columns)), np.full(len(columns), self.stiffness)
+        nodes, pairs = self.nearest_nodes(joint), self._tied(joint)
+        starts = np.array([[joint.unknowns(part).start for part in pair] for pair in pairs])
+        ends = (starts[:, None, :] + nodes[:, None]).ravel()
+        r = len(ends) // 2
+        entries = (np.tile([1.0, -1.0], r), (ends, np.arange(r).repeat(2)))
+        return sp.csc_array(sp.coo_array(entries, shape=(joint.size[0], r))), np.full(r, self.stiffness)
 
     def force(self, joint: Joint) -> Vector:
         T, k = self.springs(joint)
