@@ -74,15 +74,20 @@ def test_a_missing_array_is_named(root: Path) -> None:
         cache.load("key")
 
 
-@pytest.mark.parametrize("text", ["", '{"files": {"one.npy"', "{}", None])
-def test_a_damaged_manifest_is_named(root: Path, text: str | None) -> None:
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(b"", b'{"files": {"one.npy"', b"{}", b"[]", b"[" * 100_000, b"1" * 5000, b"\xff", None),
+        *(b'{"files": [], "facts": 1}', b'{"files": {}}'),
+    ],
+)
+def test_a_damaged_manifest_is_named_with_what_to_do(root: Path, content: bytes | None) -> None:
     cache.store("key", ARRAYS, {})
     manifest = root / "key" / cache.MANIFEST
-    if text is None:
-        manifest.unlink()
-    else:
-        manifest.write_text(text)
-    with pytest.raises(InputError, match=r"manifest\.json"):
+    manifest.unlink()
+    if content is not None:
+        manifest.write_bytes(content)
+    with pytest.raises(InputError, match=r"manifest\.json.*delete"):
         cache.load("key")
 
 

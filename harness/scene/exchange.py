@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -99,7 +98,9 @@ def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Pa
                 elif key in of_rank:
                     allowed = f"is in {of_rank[key]} too; say {key}=FILE for the one that counts"
                     faults.append(Fault(str(path), "matrix", key, allowed))
-            data |= {key: _vector(values) if key in ("f", "g") else values for key, values in found.items()}
+            data |= {
+                key: formats.vector(values) if key in ("f", "g") else values for key, values in found.items()
+            }
             of_rank |= dict.fromkeys(found, path)
         origin |= of_rank
     for name, matrix, axis in (("f", "K", 0), ("g", "A", 1)):
@@ -110,10 +111,6 @@ def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Pa
     if faults:
         raise InputError(faults)
     return data, origin
-
-
-def _vector(values: Any) -> Any:
-    return np.ravel(values.toarray() if sp.issparse(values) else values)
 
 
 def _named(found: formats.Data, name: str, path: Path) -> object:

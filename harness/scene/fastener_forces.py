@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.model.effect import Effect, TieEffect, pairs_of
+from problems.model.effect import Effect, TieEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 
@@ -39,7 +39,7 @@ def _of_effect(effect: Effect, joint: Joint, x: Vector) -> Iterator[dict[str, An
         return
     given: Any = effect  # its kind is not imported here, so that no other is
     for force in (getattr(effect, name) for name in PRELOADS if hasattr(effect, name)):
-        for pair in pairs_of(given.between, joint):
+        for pair in given.pairs(joint):
             for node in given.nearest_nodes(joint):
                 yield _entry(effect, list(pair), joint.nodes[node], force)
 

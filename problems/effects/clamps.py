@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Positive
-from problems.model.effect import Between, ForceEffect, pressing_forces, unknown_pair
+from problems.model.effect import ContactEffect, pressing_forces
 from problems.model.joint import Joint
 from problems.model.positions import Positions
 
 
-class Clamps(Positions, ForceEffect):
+class Clamps(Positions, ContactEffect):
     """f += force on the first part of every contact, −= on the second, shared by the nodes under the pad.
 
     clamping_force in N per clamp, spread evenly over the junction nodes within `radius` mm of the clamp's
@@ -26,15 +25,10 @@ class Clamps(Positions, ForceEffect):
     kind: Literal["clamps"]
     clamping_force: Positive
     radius: Positive = 20.0
-    between: Between = None
-
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_pair(self.between, joint)
-        yield from self.misplaced(joint)
 
     def force(self, joint: Joint) -> Vector:
         nodal = np.zeros(joint.node_count)
         for centre in joint.nodes[self.nearest_nodes(joint)]:
             under = np.hypot(*(joint.nodes - centre).T) <= self.radius
             nodal[under] += self.clamping_force / under.sum()
-        return pressing_forces(nodal, self.between, joint)
+        return pressing_forces(nodal, self.pairs(joint), joint)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Positive
-from problems.model.effect import Between, ForceEffect, pressing_forces, unknown_pair
+from problems.model.effect import ContactEffect, pressing_forces
 from problems.model.joint import Joint
 from problems.model.positions import Positions
 
 
-class Fasteners(Positions, ForceEffect):
+class Fasteners(Positions, ContactEffect):
     """f += preload on the first part of every contact, f −= preload on the second, in N.
 
     A temporary fastener, or a rivet while it is being set: a force, no stiffness. It acts on the nearest
@@ -26,13 +25,8 @@ class Fasteners(Positions, ForceEffect):
 
     kind: Literal["fasteners"]
     preload: Positive
-    between: Between = None
-
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_pair(self.between, joint)
-        yield from self.misplaced(joint)
 
     def force(self, joint: Joint) -> Vector:
         nodal = np.zeros(joint.node_count)
         np.add.at(nodal, self.nearest_nodes(joint), self.preload)
-        return pressing_forces(nodal, self.between, joint)
+        return pressing_forces(nodal, self.pairs(joint), joint)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from typing import ClassVar, Literal
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, Positive, Seed
-from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from problems.model.effect import ContactEffect, GapEffect, at_contacts, contacts_of
 from problems.model.joint import Joint, Table
 
 #: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `_square_root`.
@@ -25,7 +24,7 @@ class RandomField(Table):
     seed: Seed
 
 
-class InitialGap(GapEffect):
+class InitialGap(ContactEffect, GapEffect):
     """g = mean + sd · Lx Z Lyᵀ in mm, Z standard normal, at every contact.
 
     The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
@@ -39,20 +38,13 @@ class InitialGap(GapEffect):
     kind: Literal["initial_gap"]
     mean: Finite
     random: RandomField | None = None
-    between: Between = None
-
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_pair(self.between, joint)
 
     def gap(self, joint: Joint) -> Vector:
-        g = np.zeros(joint.size[1])
-        pairs = pairs_of(self.between, joint)
-        for pair in pairs:
-            g[contacts_of(pair, joint)] = self.mean
+        g = at_contacts(self.mean, self.pairs(joint), joint)
         if self.random:
             rng = np.random.default_rng(self.random.seed)
             Lx, Ly = (_square_root(grid, self.random.correlation_length) for grid in (joint.x, joint.y))
-            for pair in pairs:
+            for pair in self.pairs(joint):
                 Z = rng.standard_normal((len(joint.y), len(joint.x)))
                 g[contacts_of(pair, joint)] += self.random.sd * (Ly @ Z @ Lx).ravel()
         return g

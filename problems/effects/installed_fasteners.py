@@ -10,12 +10,12 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import Between, Effect, ForceEffect, Pair, TieEffect, pairs_of, unknown_pair
+from problems.model.effect import ContactEffect, Effect, Pair, TieEffect
 from problems.model.joint import TOOL, Joint
 from problems.model.positions import Positions
 
 
-class InstalledFasteners(Positions, TieEffect):
+class InstalledFasteners(Positions, ContactEffect, TieEffect):
     """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = e_a − e_b.
 
     stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
@@ -29,11 +29,9 @@ class InstalledFasteners(Positions, TieEffect):
     kind: Literal["installed_fasteners"]
     stiffness: Positive = 1e5
     approach: Finite = 0.0
-    between: Between = None
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_pair(self.between, joint)
-        yield from self.misplaced(joint)
+        yield from super().faults(joint)
         if joint.pairs and not self._tied(joint):
             yield "between", self.between, "a contact of two parts; a fastener cannot tie a part to the tool"
 
@@ -41,23 +39,23 @@ class InstalledFasteners(Positions, TieEffect):
         """A hole holds one element: no two ties, nor a tie and a preload, at one node of one contact."""
         mine = set(self.nearest_nodes(joint))
         for other in others:
-            if isinstance(other, Positions) and isinstance(other, ForceEffect):
+            if isinstance(other, Positions):
                 shared = mine & set(other.nearest_nodes(joint))
-                if shared and set(self._tied(joint)) & set(pairs_of(getattr(other, "between", None), joint)):
+                crossed = other.pairs(joint) if isinstance(other, ContactEffect) else joint.pairs
+                if shared and set(self._tied(joint)) & set(crossed):
                     where = [joint.nodes[node].tolist() for node in sorted(shared)]
                     yield "points", where, f"separate nodes: {other.kind} acts at the same nodes"
 
     def _tied(self, joint: Joint) -> list[Pair]:
-        return [pair for pair in pairs_of(self.between, joint) if pair[1] != TOOL]
+        return [pair for pair in self.pairs(joint) if pair[1] != TOOL]
 
     def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
-        nodes = self.nearest_nodes(joint)
-        columns = []
-        for first, second in self._tied(joint):
-            for node in nodes:
-                ends = [joint.unknowns(first).start + node, joint.unknowns(second).start + node]
-                columns.append(sp.coo_array(([1.0, -1.0], (ends, [0, 0])), shape=(joint.size[0], 1)))
-        return sp.csc_array(sp.hstack(columns)), np.full(len(columns), self.stiffness)
+        nodes, pairs = self.nearest_nodes(joint), self._tied(joint)
+        starts = np.array([[joint.unknowns(part).start for part in pair] for pair in pairs])
+        ends = (starts[:, None, :] + nodes[:, None]).ravel()
+        r = len(ends) // 2
+        entries = (np.tile([1.0, -1.0], r), (ends, np.arange(r).repeat(2)))
+        return sp.csc_array(sp.coo_array(entries, shape=(joint.size[0], r))), np.full(r, self.stiffness)
 
     def force(self, joint: Joint) -> Vector:
         T, k = self.springs(joint)

@@ -32,14 +32,10 @@ class LocalThickness(StiffnessEffect):
     def pad(self) -> tuple[float, Range, Range]:
         return self.thickness, self.x, self.y
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
-        for part in joint.part:
-            if part.name == self.part:
-                plate = joint.plate(part)
-                for key, (start, stop), grid in (("x", self.x, plate.x), ("y", self.y, plate.y)):
-                    if not grid[0] <= start < stop <= grid[-1]:
-                        yield key, [start, stop], f"start < stop on the part, {grid[0]:g} … {grid[-1]:g} mm"
+    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+        for key, (start, stop), grid in (("x", self.x, plate.x), ("y", self.y, plate.y)):
+            if not grid[0] <= start < stop <= grid[-1]:
+                yield key, [start, stop], f"start < stop on the part, {grid[0]:g} … {grid[-1]:g} mm"
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
         for other in others:

@@ -12,11 +12,11 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.input.csv_table import rows_from_file
-from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from problems.model.effect import ContactEffect, GapEffect, at_contacts
 from problems.model.joint import Joint
 
 
-class MeasuredGap(GapEffect):
+class MeasuredGap(ContactEffect, GapEffect):
     """g += linear interpolation of the points (x, y, gap) in mm, from `file`, a CSV with these columns.
 
     Linear on the Delaunay triangles of the points; outside their convex hull, the gap of the nearest point.
@@ -27,7 +27,6 @@ class MeasuredGap(GapEffect):
 
     kind: Literal["measured_gap"]
     points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3)]
-    between: Between = None
 
     @model_validator(mode="before")
     @classmethod
@@ -35,7 +34,7 @@ class MeasuredGap(GapEffect):
         return rows_from_file(data, info, "points", ("x", "y", "gap"))
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_pair(self.between, joint)
+        yield from super().faults(joint)
         places = np.array(self.points)[:, :2]
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=1e-9 * np.ptp(places)) < 2:
             yield "points", "all on one line", "at least three points off a line"
@@ -45,9 +44,7 @@ class MeasuredGap(GapEffect):
 
     def conflicts(self, others: Any, joint: Joint) -> Iterator[tuple[str, object, str]]:
         for other in others:
-            if isinstance(other, MeasuredGap) and set(pairs_of(self.between, joint)) & set(
-                pairs_of(other.between, joint)
-            ):
+            if isinstance(other, MeasuredGap) and set(self.pairs(joint)) & set(other.pairs(joint)):
                 yield "between", self.between, "one measured_gap per contact: another one covers this contact"
 
     def gap(self, joint: Joint) -> Vector:
@@ -56,7 +53,4 @@ class MeasuredGap(GapEffect):
         at_nodes = LinearNDInterpolator(places, values)(joint.nodes)
         beyond = np.isnan(at_nodes)
         at_nodes[beyond] = NearestNDInterpolator(places, values)(joint.nodes[beyond])
-        g = np.zeros(joint.size[1])
-        for pair in pairs_of(self.between, joint):
-            g[contacts_of(pair, joint)] = at_nodes
-        return g
+        return at_contacts(at_nodes, self.pairs(joint), joint)

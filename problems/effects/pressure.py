@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
-from problems.model.effect import ForceEffect, unknown_part
+from problems.model.effect import ForceEffect, PartEffect
 from problems.model.joint import Joint
 
 
-class Pressure(ForceEffect):
+class Pressure(PartEffect, ForceEffect):
     """f_i += value · a_i, with a_i the tributary area of node i; value in N/mm² (MPa).
 
     The load acts on the junction nodes only, and the areas sum to that of the junction. A positive pressure
@@ -21,11 +20,7 @@ class Pressure(ForceEffect):
     """
 
     kind: Literal["pressure"]
-    part: str
     value: Finite
-
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_part(self.part, joint)
 
     def force(self, joint: Joint) -> Vector:
         f = np.zeros(joint.size[0])

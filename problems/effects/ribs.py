@@ -11,7 +11,6 @@ from pydantic import Field
 from problems.fem.plate import Plate
 from problems.input.bounded import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
-from problems.model.joint import Joint
 
 
 class Ribs(StiffnessEffect):
@@ -22,14 +21,11 @@ class Ribs(StiffnessEffect):
     I: Positive  # noqa: E741
     J: NotNegative = 0.0
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
-        for part in joint.part:
-            if part.name == self.part:
-                y = joint.plate(part).y
-                for k, line in enumerate(self.lines):
-                    if not y[0] <= line <= y[-1]:
-                        yield f"lines[{k}]", line, f"on the part, {y[0]:g} … {y[-1]:g} mm"
+    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+        south, north = plate.y[[0, -1]]
+        for k, line in enumerate(self.lines):
+            if not south <= line <= north:
+                yield f"lines[{k}]", line, f"on the part, {south:g} … {north:g} mm"
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import ClassVar, Literal
 
-import numpy as np
-
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
-from problems.model.effect import Effect, GapEffect, Pair, contacts_of, unknown_part
+from problems.model.effect import Effect, GapEffect, Pair, PartEffect, at_contacts
 from problems.model.joint import TOOL, Joint
 
 
-class RigidTool(GapEffect):
+class RigidTool(PartEffect, GapEffect):
     """Adds the contact of `part` and the tool at every junction node, x ≤ g, with
 
         g += distance + ½ κ_x (x − x_0)² + ½ κ_y (y − y_0)².
@@ -25,7 +23,6 @@ class RigidTool(GapEffect):
     units: ClassVar = {"distance": "mm", "curvature": "1/mm", "crest": "mm"}
 
     kind: Literal["rigid_tool"]
-    part: str
     distance: Finite = 0.0
     curvature: tuple[Finite, Finite] = (0.0, 0.0)
     crest: tuple[Finite, Finite] | None = None
@@ -34,16 +31,11 @@ class RigidTool(GapEffect):
     def contacts(self) -> tuple[Pair, ...]:
         return ((self.part, TOOL),)
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_part(self.part, joint)
-
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
         if any(isinstance(other, RigidTool) and other.part == self.part for other in others):
             yield "part", self.part, "one rigid_tool per part: another one faces this part"
 
     def gap(self, joint: Joint) -> Vector:
         crest = self.crest or (joint.junction.length / 2, joint.junction.width / 2)
-        g = np.zeros(joint.size[1])
         away = 0.5 * (joint.nodes - crest) ** 2 @ self.curvature
-        g[contacts_of((self.part, TOOL), joint)] = self.distance + away
-        return g
+        return at_contacts(self.distance + away, self.contacts, joint)

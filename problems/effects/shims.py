@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import Between, GapEffect, contacts_of, pairs_of, unknown_pair
+from problems.model.effect import ContactEffect, GapEffect, at_contacts
 from problems.model.joint import Joint
 
 
-class Shims(GapEffect):
+class Shims(ContactEffect, GapEffect):
     """g −= thickness at every contact with x and y in the ranges, borders included; mm.
 
     A shim is rigid. One thicker than the gap holds the parts apart; overlapping shims add up. `between` names
@@ -27,10 +27,9 @@ class Shims(GapEffect):
     thickness: Positive
     x: tuple[Finite, Finite]
     y: tuple[Finite, Finite]
-    between: Between = None
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_pair(self.between, joint)
+        yield from super().faults(joint)
         if not self._covered(joint).any():
             hx, hy = joint.x[1] - joint.x[0], joint.y[1] - joint.y[0]
             allowed = f"ranges that contain a node; nodes are spaced {hx:g} × {hy:g} mm from (0, 0)"
@@ -41,7 +40,4 @@ class Shims(GapEffect):
         return (self.x[0] <= at_x) & (at_x <= self.x[1]) & (self.y[0] <= at_y) & (at_y <= self.y[1])
 
     def gap(self, joint: Joint) -> Vector:
-        g = np.zeros(joint.size[1])
-        for pair in pairs_of(self.between, joint):
-            g[contacts_of(pair, joint)][self._covered(joint)] = -self.thickness
-        return g
+        return at_contacts(np.where(self._covered(joint), -self.thickness, 0.0), self.pairs(joint), joint)

@@ -11,7 +11,6 @@ import scipy.sparse as sp
 from problems.fem.plate import Plate
 from problems.input.bounded import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
-from problems.model.joint import Joint
 
 
 class Stringers(StiffnessEffect):
@@ -27,14 +26,11 @@ class Stringers(StiffnessEffect):
     I: Positive  # noqa: E741
     J: NotNegative = 0.0
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
-        for part in joint.part:
-            if part.name == self.part:
-                y = joint.plate(part).y
-                if max(self.start, y[0]) >= min(self.stop, y[-1]):
-                    allowed = f"a length on the part, {y[0]:g} … {y[-1]:g} mm"
-                    yield "start, stop", [self.start, self.stop], allowed
+    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+        south, north = plate.y[[0, -1]]
+        if max(self.start, south) >= min(self.stop, north):
+            allowed = f"a length on the part, {south:g} … {north:g} mm"
+            yield "start, stop", [self.start, self.stop], allowed
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J

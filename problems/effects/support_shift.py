@@ -31,36 +31,24 @@ class SupportShift(PartLoadEffect):
     shift: Finite
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
-        shifted = [
-            point
-            for other in others
-            if isinstance(other, SupportShift) and other.part == self.part
-            for point in other.points
-        ]
-        supported = [
-            point
-            for other in others
-            if isinstance(other, Supports) and other.part == self.part
-            for point in other.points
-        ]
+        def points(kind: type[SupportShift | Supports]) -> list[tuple[float, float]]:
+            mine = [other for other in others if isinstance(other, kind) and other.part == self.part]
+            return [point for other in mine for point in other.points]
+
+        shifted, supported = points(SupportShift), points(Supports)
         for k, point in enumerate(self.points):
             if point not in supported:
                 allowed = f"a point of a supports effect of part {self.part}, one of {supported}"
                 yield f"points[{k}]", list(point), allowed
             if point in shifted:
-                yield (
-                    f"points[{k}]",
-                    list(point),
-                    "one support_shift per support: another one shifts this support",
-                )
+                allowed = "one support_shift per support: another one shifts this support"
+                yield f"points[{k}]", list(point), allowed
 
     def load(self, model: PartModel) -> Vector:
         f = np.zeros(model.plate.size)
         for effect in model.effects:
             if isinstance(effect, Supports):
-                for point in effect.points:
-                    if point not in self.points:
-                        continue
+                for point in (point for point in effect.points if point in self.points):
                     e = model.plate.evaluate(*point)
                     f += effect.stiffness_per_point * self.shift * e.toarray()[0]
         return f

@@ -11,7 +11,6 @@ from pydantic import Field
 from problems.fem.plate import Plate
 from problems.input.bounded import Finite, Positive
 from problems.model.effect import StiffnessEffect
-from problems.model.joint import Joint
 
 
 class Supports(StiffnessEffect):
@@ -28,15 +27,11 @@ class Supports(StiffnessEffect):
     def held_points(self) -> tuple[tuple[float, float], ...]:
         return self.points
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
-        for part in joint.part:
-            if part.name == self.part:
-                y = joint.plate(part).y
-                for k, (px, py) in enumerate(self.points):
-                    if not (0 <= px <= joint.junction.length and y[0] <= py <= y[-1]):
-                        allowed = f"on the part, 0 … {joint.junction.length:g} × {y[0]:g} … {y[-1]:g} mm"
-                        yield f"points[{k}]", [px, py], allowed
+    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+        length, (south, north) = plate.x[-1], plate.y[[0, -1]]
+        for k, (x, y) in enumerate(self.points):
+            if not (0 <= x <= length and south <= y <= north):
+                yield f"points[{k}]", [x, y], f"on the part, 0 … {length:g} × {south:g} … {north:g} mm"
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         e = sp.vstack([plate.evaluate(x, y) for x, y in self.points])

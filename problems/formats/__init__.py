@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from problems.errors import Fault, InputError
 
@@ -98,5 +99,5 @@ def pyyeti(path: Path) -> Any:
 
 
 def vector(values: Any) -> np.ndarray:
-    """A row or column of a matrix file as a vector."""
-    return np.asarray(values, dtype=float).ravel()
+    """A row or column of a matrix file, dense or sparse, as a vector."""
+    return np.ravel(values.toarray() if sp.issparse(values) else values)

@@ -41,11 +41,8 @@ def write(path: Path, data: Data) -> None:
 
 def read(path: Path) -> Data:
     rows = _rows(path)
-    wide = rows.shape[1] == 5
-    first = rows[:, :2] if wide else np.column_stack([rows[:, 0], np.zeros(len(rows))])
-    second = rows[:, 2:4] if wide else np.column_stack([rows[:, 1], np.zeros(len(rows))])
-    unknowns, place = np.unique(np.vstack([first, second]), axis=0, return_inverse=True)
-    i, j = place.ravel()[: len(rows)], place.ravel()[len(rows) :]
+    unknowns, place = np.unique(np.vstack(np.hsplit(rows[:, :-1], 2)), axis=0, return_inverse=True)
+    i, j = place.reshape(2, -1)
     n = len(unknowns)
     K = sp.csr_array(sp.coo_array((rows[:, -1], (i, j)), shape=(n, n)))
     if sp.tril(K, -1).nnz == 0 or sp.triu(K, 1).nnz == 0:

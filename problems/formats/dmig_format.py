@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from problems.errors import Fault, InputError
-from problems.formats import Data, pyyeti
+from problems.formats import Data, pyyeti, vector
 
 if TYPE_CHECKING:
     import pandas as pd  # slow to import
@@ -82,17 +82,8 @@ def _over(
 ) -> pd.DataFrame:
     """The frame with a row for each entry of the index. Raises InputError naming rows beyond it."""
     if beyond := [row for row in frame.index if row not in index]:
-        raise InputError(
-            [
-                Fault(
-                    str(path),
-                    f"{name}, point {point}, component {component}",
-                    "a row",
-                    f"not among the {what}",
-                )
-                for point, component in beyond
-            ]
-        )
+        keys = [f"{name}, point {point}, component {component}" for point, component in beyond]
+        raise InputError([Fault(str(path), key, "a row", f"not among the {what}") for key in keys])
     return frame.reindex(index, fill_value=0.0)
 
 
@@ -101,4 +92,4 @@ def _vector(
 ) -> np.ndarray:
     if frame.shape[1] != 1:
         raise InputError.one(path, f"columns of {name}", frame.shape[1], "must be 1")
-    return np.asarray(_over(path, name, frame, index, what).to_numpy(), dtype=float).ravel()
+    return vector(_over(path, name, frame, index, what).to_numpy(dtype=float))

@@ -41,6 +41,4 @@ def write_one(path: Path, matrix: object, symmetry: str) -> None:
 
 def read(path: Path) -> Data:
     found = read_mtx(path)
-    if path.stem in "fg":
-        found = vector(found.toarray() if sp.issparse(found) else found)
-    return {path.stem: found}
+    return {path.stem: vector(found) if path.stem in "fg" else found}

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-import scipy.sparse as sp
 
 from problems.formats import Data, pyyeti, vector
 
@@ -26,8 +22,4 @@ def read(path: Path) -> Data:
         warnings.simplefilter("error")  # such as a premature end
         found = pyyeti(path).op4.OP4().dctload(str(path), justmatrix=True, sparse=None)
     data = {name.upper() if name in "ka" else name: matrix for name, matrix in found.items()}
-    return {name: _dense_vector(M) if name in "fg" else M for name, M in data.items()}
-
-
-def _dense_vector(matrix: Any) -> np.ndarray:
-    return vector(matrix.toarray() if sp.issparse(matrix) else matrix)
+    return {name: vector(M) if name in "fg" else M for name, M in data.items()}

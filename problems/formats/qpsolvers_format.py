@@ -31,7 +31,6 @@ def read(path: Path) -> Data:
     found = qpsolvers.Problem.load(str(path))
     for name in ("A", "b", "lb", "ub"):
         if getattr(found, name) is not None:
-            raise InputError.one(
-                path, name, "present", "contact problems have no equality constraints and no bounds on x"
-            )
+            allowed = "contact problems have no equality constraints and no bounds on x"
+            raise InputError.one(path, name, "present", allowed)
     return {"K": found.P, "f": -found.q, "A": found.G.T, "g": found.h}

@@ -26,6 +26,11 @@ class ApproximateInverse:
     M: BandedInverse | None
     diagonal: Vector
 
+    def scaled(self, R: Vector) -> ApproximateInverse:
+        """That of RQR, R (m,)."""
+        M = None if self.M is None else self.M.scaled(1 / R[self.M.order])
+        return ApproximateInverse(M, self.diagonal * R**2)
+
 
 def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse:
     """From Q itself: with a narrow band if e ← e − MQe converges fast, else from one window of all: Q⁻¹.

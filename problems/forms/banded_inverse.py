@@ -54,10 +54,14 @@ class BandedInverse:
             block.T[start : start + len(column)] = entries.take(apart + column * len(self.band))
         return BandFactor.of(S, rows, block)
 
+    def scaled(self, s: Vector) -> BandedInverse:
+        """diag(s) M diag(s)."""
+        below = np.lib.stride_tricks.sliding_window_view(np.pad(s, (0, len(self.band) - 1)), len(self.band))
+        return BandedInverse(self.order, np.asfortranarray(self.band * below.T * s))
+
     def shifted_factor(self, s: Vector) -> BandFactor:
         """The Cholesky factor of I + diag(s) M diag(s)."""
-        below = np.lib.stride_tricks.sliding_window_view(np.pad(s, (0, len(self.band) - 1)), len(self.band))
-        shifted = np.asfortranarray(self.band * below.T * s)
+        shifted = self.scaled(s).band
         shifted[0] += 1.0
         every = np.ones(len(s), dtype=bool)
         return BandFactor.of(every, np.arange(len(s)), shifted)

@@ -54,6 +54,7 @@ class Prepared:
     stages : how the factors of K and Q are made; by default in memory.
     Q : makes Q (m, m), mm/N, in place of the stages.
     coarser : makes an assembly of similar Q whose factors are cheaper, for M; None if there is none.
+    near : makes M ≈ Q⁻¹, in place of this.
     """
 
     def __init__(
@@ -62,8 +63,9 @@ class Prepared:
         stages: Stages | None = None,
         Q: Callable[[], Matrix] | None = None,
         coarser: Callable[[], Assembly] | None = None,
+        near: Callable[[], ApproximateInverse] | None = None,
     ) -> None:
-        self.stages, self.assembly, self.coarser = stages or Stages(), assembly, coarser
+        self.stages, self.assembly, self.coarser, self.near = stages or Stages(), assembly, coarser, near
         if stages is not None:
             K = Stiffness(assembly.K.blocks, lambda _: stages.factor(assembly))
             self.assembly = replace(assembly, K=K)
@@ -119,6 +121,8 @@ class Prepared:
     @cached_property
     def approximate_inverse(self) -> ApproximateInverse:
         """M ≈ Q⁻¹, and about the diagonal of Q. Raises LinAlgError if Q is not positive definite."""
+        if self.near is not None:
+            return self.near()
         Q = self.compliance
         if isinstance(Q, DenseCompliance):
             return of_dense(Q, self.assembly.contact_nodes)
@@ -129,15 +133,11 @@ class Prepared:
         """With DKD, by the factors of K, and DAR, for powers of two D (n,) and R (m,)."""
         K = self.assembly.K if (D == 1).all() else self.assembly.K.scaled(D)
         assembly = replace(self.assembly, K=K, A=scaled(self.assembly.A, D, R))
-        coarser = None
-        if self.coarser is not None:
-            coarse = self.coarser
-
-            def coarser() -> Assembly:
-                similar = coarse()
-                return replace(similar, A=scaled(similar.A, np.ones(similar.n), R))
-
-        return Prepared(assembly, Q=lambda: np.asfortranarray(self.Q * R * R[:, None]), coarser=coarser)
+        return Prepared(
+            assembly,
+            Q=lambda: np.asfortranarray(self.Q * R * R[:, None]),
+            near=lambda: self.approximate_inverse.scaled(R),
+        )
 
     def dual_load(self, load: LoadCase) -> Vector:
         """p = AᵀK⁻¹f − g, (m,), mm: the overlap of the parts if contact is ignored."""

@@ -14,8 +14,8 @@ import scipy.sparse as sp
 PARTS = ("data", "indices", "indptr", "shape")
 
 
-def write(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Arrays and sparse matrices by name."""
+def packed(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """Arrays by name, of sparse matrices their parts."""
     found: dict[str, Any] = {}
     for name, M in arrays.items():
         if sp.issparse(M):
@@ -23,8 +23,19 @@ def write(path: Path, arrays: Mapping[str, Any]) -> None:
             found |= {f"{name}_{part}": np.asarray(getattr(columns, part)) for part in PARTS}
         else:
             found[name] = M
+    return found
+
+
+def unpacked(arrays: Mapping[str, Any], name: str) -> sp.csc_array:
+    """The sparse matrix of that name among packed arrays."""
+    data, indices, indptr, shape = (np.array(arrays[f"{name}_{part}"]) for part in PARTS)
+    return sp.csc_array((data, indices, indptr), shape=tuple(shape.tolist()))
+
+
+def write(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Arrays and sparse matrices by name."""
     with path.open("wb") as file:
-        np.savez(file, **found)
+        np.savez(file, **packed(arrays))
 
 
 def read(path: Path, names: Sequence[str]) -> dict[str, Any]:
@@ -38,8 +49,7 @@ def read(path: Path, names: Sequence[str]) -> dict[str, Any]:
             if name in archive.files:
                 found[name] = archive[name]
             elif all(f"{name}_{part}" in archive.files for part in PARTS):
-                data, indices, indptr, shape = (archive[f"{name}_{part}"] for part in PARTS)
-                found[name] = sp.csc_array((data, indices, indptr), shape=tuple(shape.tolist()))
+                found[name] = unpacked(archive, name)
         of_scipy = {"format", "shape", "data"} <= set(archive.files)
     if not found and of_scipy:
         found[path.stem] = sp.load_npz(path)

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import scipy.io
-import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase
 from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
-from . import user_matrices
+from . import sparse_npz, user_matrices
 
-PARTS = ("data", "indices", "indptr")
 SMALL = 2000  # unknowns up to which a K is solved in the dense forms
 
 
@@ -35,15 +32,18 @@ def stored_matrices(
     def made() -> cache.Entry:
         start = time.perf_counter()
         assembly, load = user_matrices.read_matrices(files, sparse)
-        arrays, facts = _packed(assembly, load, sparse)
-        return arrays, facts | {"seconds": time.perf_counter() - start}
+        arrays = {f"K{k}": matrix for k, matrix in enumerate(assembly.K.matrices)}
+        arrays |= {"A": assembly.A, "f": load.f, "g": load.g}
+        if assembly.nodes is not None:
+            arrays["nodes"] = assembly.nodes
+        facts = {"parts": assembly.parts, "notes": assembly.notes, "seconds": time.perf_counter() - start}
+        return sparse_npz.packed(arrays), facts
 
     arrays, facts = cache.load_or_make(key, made)
-    nodes = arrays.get("nodes")
-    parts, notes = tuple(facts["parts"]), tuple(facts["notes"])
-    blocks = [_matrix(arrays, "K")] if sparse else [arrays[f"K{k}"] for k in range(len(parts))]
-    A = _matrix(arrays, "A", facts["shape"])
-    assembly = Assembly(Stiffness.of(*blocks, nodes=nodes), A, nodes, parts, notes)
+    nodes, names = arrays.get("nodes"), [f"K{k}" for k in range(len(facts["parts"]))]
+    K = Stiffness.of(*(sparse_npz.unpacked(arrays, k) if sparse else arrays[k] for k in names), nodes=nodes)
+    A = sparse_npz.unpacked(arrays, "A")
+    assembly = Assembly(K, A, nodes, tuple(facts["parts"]), tuple(facts["notes"]))
     return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
 
 
@@ -57,20 +57,3 @@ def holds_sparse(files: dict[str, Path]) -> bool:
         return bool(layout == "coordinate" and rows > SMALL)
     except Exception:  # zipfile, pickle and mminfo raise their own kinds; whoever reads it says what is wrong
         return False
-
-
-def _packed(assembly: Assembly, load: LoadCase, sparse: bool) -> cache.Entry:
-    arrays: dict[str, Any] = {f"A_{part}": getattr(assembly.A, part) for part in PARTS}
-    arrays |= {"f": load.f, "g": load.g}
-    if assembly.nodes is not None:
-        arrays["nodes"] = assembly.nodes
-    if sparse:
-        arrays |= {f"K_{part}": getattr(assembly.K.matrix, part) for part in PARTS}
-    else:
-        arrays |= {f"K{k}": block.matrix for k, block in enumerate(assembly.K.blocks)}
-    return arrays, {"parts": assembly.parts, "shape": assembly.A.shape, "notes": assembly.notes}
-
-
-def _matrix(arrays: Any, name: str, shape: Any = None) -> sp.csc_array:
-    data, indices, indptr = (np.array(arrays[f"{name}_{part}"]) for part in PARTS)
-    return sp.csc_array((data, indices, indptr), shape=shape or (len(indptr) - 1,) * 2)

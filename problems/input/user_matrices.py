@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from problems.errors import Fault, InputError
-from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.stiffness.operator import Stiffness, dense_blocks
 
 from . import sparse_npz
@@ -49,53 +49,25 @@ def checked(
 
     where : the file or the argument that each comes from. Raises InputError with all faults.
     """
-    faults = [Fault(where.get(key, "matrices"), key, None, "is missing") for key in "KAfg" if key not in data]
-    if faults:
-        raise InputError(faults)
-    for key, values in data.items():
-        if values.dtype.kind not in "fiub" or (key in "KA" and values.ndim != 2):
-            found = f"{values.dtype} array of shape {values.shape}"
-            faults.append(
-                Fault(where.get(key, "matrices"), key, found, "real numbers; K and A must be matrices")
-            )
-    if faults:
-        raise InputError(faults)
+
+    def refuse(faults: Iterable[tuple[str, str, object, str]]) -> None:
+        """Raise InputError, if there are faults: matrix, key, value, what is allowed."""
+        found = [Fault(where.get(matrix, "matrices"), *fault) for matrix, *fault in faults]  # type: ignore
+        if found:
+            raise InputError(found)
+
+    refuse((key, key, None, "is missing") for key in "KAfg" if key not in data)
+    refuse(_wrong_kinds(data))
     K, A = (sp.csr_array(data[key], dtype=float) for key in "KA")
     f, g = (np.asarray(data[key], dtype=float).ravel() for key in "fg")
     nodes = np.asarray(data["nodes"], dtype=float) if "nodes" in data else None
-
-    n, m = K.shape[0], A.shape[1]
-    if n == 0:
-        raise InputError.one(where["K"], "K.shape", K.shape, "at least one unknown")
-    shapes = {"K": (K.shape, (n, n)), "A": (A.shape, (n, m)), "f": (f.shape, (n,)), "g": (g.shape, (m,))}
-    if nodes is not None:
-        shapes["nodes"] = (nodes.shape, (n, 2))
-    for key, (found, wanted) in shapes.items():
-        if found != wanted:
-            faults.append(Fault(where[key], f"{key}.shape", found, f"must be {wanted}"))
-    for key, values in {"K": K.data, "A": A.data, "f": f, "g": g}.items():
-        if not np.isfinite(values).all():
-            faults.append(Fault(where[key], key, "NaN or infinity", "every entry must be finite"))
-    if nodes is not None and not (abs(nodes) <= LARGEST).all():
-        faults.append(Fault(where["nodes"], "nodes", "NaN or too far away", f"mm, at most {LARGEST:g}"))
-    if faults:
-        raise InputError(faults)
-    untouched = np.flatnonzero(abs(A).sum(axis=0) == 0)
-    if untouched.size:
-        raise InputError.one(where["A"], f"A[:, {untouched[0]}]", 0.0, "each contact must involve an unknown")
-    allowed = f"must be between {1 / SCALE:g} and {SCALE:g}: choose another unit of"
-    if not 1 / SCALE <= (size := float(abs(K).max())) <= SCALE:
-        faults.append(Fault(where["K"], "max|K|", size, f"{allowed} force"))
-    sizes = abs(A).max(axis=0).toarray().ravel() if m else np.zeros(0)
-    if (wrong := np.flatnonzero(~((sizes >= 1 / SCALE) & (sizes <= SCALE)))).size:
-        j = wrong[0]
-        faults.append(Fault(where["A"], f"max|A[:, {j}]|", float(sizes[j]), f"{allowed} this contact's gap"))
-    if faults:
-        raise InputError(faults)
+    refuse([("K", "K.shape", K.shape, "at least one unknown")] if K.shape[0] == 0 else [])
+    refuse(_wrong_entries(K, A, f, g, nodes))
+    refuse(_wrong_units(K, A))
     skew = abs(K - K.T).max()
-    asymmetry = skew / max(abs(K).max(), np.finfo(float).tiny)
-    if asymmetry > SYMMETRY:
-        raise InputError.one(where["K"], "max|K − Kᵀ| / max|K|", float(asymmetry), f"must be ≤ {SYMMETRY:g}")
+    asymmetry = float(skew / abs(K).max())
+    allowed = f"must be ≤ {SYMMETRY:g}"
+    refuse([("K", "max|K − Kᵀ| / max|K|", asymmetry, allowed)] if asymmetry > SYMMETRY else [])
     notes = []
     if rounded := [key for key in "KAfg" if not _fits(data[key])]:
         notes.append(f"Numbers of {', '.join(rounded)} that float64 cannot hold were rounded to the nearest")
@@ -104,10 +76,48 @@ def checked(
         K = sp.csr_array(K / 2 + K.T / 2)
         notes.append(f"K, asymmetric by {skew:.1e} N/mm, was replaced by (K + Kᵀ)/2")
     A = sp.csc_array(A)
-    refuse_dependent(A, where["A"])
+    refuse_dependent(A, where.get("A", "matrices"))
     made = Stiffness.of(*([sp.csc_array(K)] if sparse else dense_blocks(K)), nodes=nodes)
     names = tuple(f"part {k + 1}" for k in range(len(made.blocks)))
     return Assembly(made, A, nodes, names, tuple(notes)), LoadCase(f, g)
+
+
+Faults = Iterator[tuple[str, str, object, str]]
+
+
+def _wrong_kinds(data: Mapping[str, Any]) -> Faults:
+    for key, values in data.items():
+        if values.dtype.kind not in "fiub" or (key in "KA" and values.ndim != 2):
+            found = f"{values.dtype} array of shape {values.shape}"
+            yield key, key, found, "real numbers; K and A must be matrices"
+
+
+def _wrong_entries(K: sp.csr_array, A: sp.csr_array, f: Vector, g: Vector, nodes: Matrix | None) -> Faults:
+    n, m = K.shape[0], A.shape[1]
+    shapes = {"K": (K.shape, (n, n)), "A": (A.shape, (n, m)), "f": (f.shape, (n,)), "g": (g.shape, (m,))}
+    if nodes is not None:
+        shapes["nodes"] = (nodes.shape, (n, 2))
+    for key, (found, wanted) in shapes.items():
+        if found != wanted:
+            yield key, f"{key}.shape", found, f"must be {wanted}"
+    for key, values in {"K": K.data, "A": A.data, "f": f, "g": g}.items():
+        if not np.isfinite(values).all():
+            yield key, key, "NaN or infinity", "every entry must be finite"
+    if nodes is not None and not (abs(nodes) <= LARGEST).all():
+        yield "nodes", "nodes", "NaN or too far away", f"mm, at most {LARGEST:g}"
+
+
+def _wrong_units(K: sp.csr_array, A: sp.csr_array) -> Faults:
+    sizes = abs(A).max(axis=0).toarray().ravel() if A.shape[1] else np.zeros(0)
+    if (untouched := np.flatnonzero(sizes == 0)).size:
+        yield "A", f"A[:, {untouched[0]}]", 0.0, "each contact must involve an unknown"
+        return
+    allowed = f"must be between {1 / SCALE:g} and {SCALE:g}: choose another unit of"
+    if not 1 / SCALE <= (size := float(abs(K).max())) <= SCALE:
+        yield "K", "max|K|", size, f"{allowed} force"
+    if (wrong := np.flatnonzero(~((sizes >= 1 / SCALE) & (sizes <= SCALE)))).size:
+        j = wrong[0]
+        yield "A", f"max|A[:, {j}]|", float(sizes[j]), f"{allowed} this contact's gap"
 
 
 def _fits(given: Any) -> bool:
@@ -125,10 +135,8 @@ def _fits(given: Any) -> bool:
 def _read_npz(path: Path) -> dict[str, Any]:
     try:
         return sparse_npz.read(path, (*"KAfg", "nodes"))
-    except (OSError, ValueError, EOFError, KeyError) as error:
-        raise InputError.one(path, "file", str(error), "a readable .npz with K, A, f, g") from error
     except Exception as error:  # zipfile and pickle raise their own kinds
-        raise InputError.one(path, "file", repr(error), "a readable .npz with K, A, f, g") from error
+        raise InputError.one(path, "file", str(error), "a readable .npz with K, A, f, g") from error
 
 
 def _read_mtx(path: Path, key: str) -> Any:
@@ -139,13 +147,11 @@ def _read_mtx(path: Path, key: str) -> Any:
         raise InputError.one(path, key, str(error), "a readable Matrix Market file") from error
 
 
-Kind = Callable[[bytes], float]  # int or float
 CHUNK = 2**20  # bytes of lines that are checked at once
-#: Most lines of most files: two indices and a decimal number, or a number alone.
-PLAIN = {
-    "coordinate": re.compile(rb"(?:\d++ ++\d++ ++[-+]?+\d++(?:\.\d*+)?+(?:[eE][-+]?+\d++)?+\n)++"),
-    "array": re.compile(rb"(?:[-+]?+\d++(?:\.\d*+)?+(?:[eE][-+]?+\d++)?+\n)++"),
-}
+INTEGER = rb"[-+]?+\d++"
+REAL = rb"(?:[-+]?+(?:\d++\.?+\d*+|\.\d++)(?:[eE][-+]?+\d++)?+|[-+]?+(?i:nan|inf(?:inity)?+))"
+#: The number of an entry, by the field in the header.
+NUMBER = {"real": [REAL], "double": [REAL], "complex": [REAL, REAL], "integer": [INTEGER], "pattern": []}
 
 
 def read_mtx(path: Path) -> Any:
@@ -159,42 +165,31 @@ def read_mtx(path: Path) -> Any:
         rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
         if symmetry != "general" and rows != columns:
             raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
+        words = NUMBER[field]
         if layout == "array":
             entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
-        _refuse_wrong_lines(path, entries, layout, field)
+        else:
+            words = [INTEGER, INTEGER, *words]
+        _refuse_wrong_lines(path, entries, rb"[ \t]++".join(words))
         return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))
     except OverflowError as error:
         raise ValueError(str(error)) from error
 
 
-def _refuse_wrong_lines(path: Path, entries: int, layout: str, field: str) -> None:
-    """Raise ValueError unless the lines after the sizes are `entries` entries, with indices if sparse."""
-    values: dict[str, list[Kind]] = {"pattern": [], "integer": [int], "complex": [float, float]}
-    kinds = ([int, int] if layout == "coordinate" else []) + values.get(field, [float])
-    found, before = -1, 0  # the size line is none
+def _refuse_wrong_lines(path: Path, entries: int, entry: bytes) -> None:
+    """Raise ValueError unless the lines after the sizes are `entries` times `entry`, or empty."""
+    line = rb"[ \t]*+(?:%b)?+[ \t\r]*+\n" % entry
+    one, many = re.compile(line), re.compile(rb"(?:%b)*+" % line)
     with path.open("rb") as file:
+        before = 1 + next(k for k, text in enumerate(file) if text.strip() and not text.startswith(b"%"))
+        found = 0
         while lines := file.readlines(CHUNK):
-            if found >= 0 and field == "real" and PLAIN[layout].fullmatch(b"".join(lines)):
-                found, before = found + len(lines), before + len(lines)
-                continue
-            for number, line in enumerate(lines, start=before + 1):
-                words = line.split()
-                if not words or line.startswith(b"%"):
-                    continue
-                found += 1
-                if found:
-                    _refuse_wrong_line(number, line, words, kinds)
+            lines[-1] = lines[-1].removesuffix(b"\n") + b"\n"
+            if not many.fullmatch(b"".join(lines)):
+                number, wrong = next((k, text) for k, text in enumerate(lines) if not one.fullmatch(text))
+                text = wrong[:LONGEST_LINE].decode(errors="replace").rstrip()
+                raise ValueError(f"line {before + number + 1}: {text!r}; each line must hold one entry")
+            found += sum(map(bool, map(bytes.strip, lines)))
             before += len(lines)
     if found != entries:
         raise ValueError(f"truncated: {found} of {entries} entries")
-
-
-def _refuse_wrong_line(number: int, line: bytes, words: list[bytes], kinds: list[Kind]) -> None:
-    try:
-        for kind, word in zip(kinds, words, strict=True):
-            kind(word)
-        if b"_" in line:
-            raise ValueError
-    except ValueError:
-        text = line[:LONGEST_LINE].decode(errors="replace").rstrip()
-        raise ValueError(f"line {number}: {text!r}; each line must hold one entry") from None

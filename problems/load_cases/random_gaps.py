@@ -75,25 +75,16 @@ def random_gaps(
     found = list(scene.effects_of(InitialGap))
     if len(found) > 1:
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
-    own = found[0].random if found else None
-    from_scene = {
-        "mean": found[0].mean if found else None,
-        "sd": own.sd if own else None,
-        "correlation_length": own.correlation_length if own else None,
-    }
-    from_options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    given = from_scene | {key: value for key, value in from_options.items() if value is not None}
-    missing = [
-        Fault(where, key, None, f"is not in the scene: give --{key.replace('_', '-')}, in mm")
-        for key, value in given.items()
-        if value is None
-    ]
-    if missing:
-        raise InputError(missing)
+    table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
+    options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
+    own = {"mean": table.get("mean")} | (table.get("random") or {})
+    given = own | {key: value for key, value in options.items() if value is not None}
+    if missing := [key for key in options if given.get(key) is None]:
+        allowed = "is not in the scene: give --{}, in mm"
+        raise InputError([Fault(where, key, None, allowed.format(key.replace("_", "-"))) for key in missing])
     random = {"sd": given["sd"], "correlation_length": given["correlation_length"], "seed": 0}
-    table = (found[0].model_dump() if found else {"kind": "initial_gap"}) | {"mean": given["mean"]}
     try:
-        field = InitialGap.model_validate(table | {"random": random})
+        field = InitialGap.model_validate(table | {"mean": given["mean"], "random": random})
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = [effect for effect in scene.effects if effect not in found]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
@@ -79,9 +78,8 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
                 continue
             faults += [Fault(f"--sweep {step.name}", *fault) for fault in effect.faults(scene.joint)]
     names = [step.name for step in steps]
-    faults += [
-        Fault("--sweep", name, names, "is swept twice") for name in set(names) if names.count(name) > 1
-    ]
+    twice = {name for name in names if names.count(name) > 1}
+    faults += [Fault("--sweep", name, names, "is swept twice") for name in twice]
     if faults:
         raise InputError(faults)
     count = prod(len(step.values) for step in steps)
@@ -150,8 +148,7 @@ def _values(text: str) -> tuple[float, ...]:
 
 def _changed(effect: Any, step: Step, value: float) -> Any:
     """The effect with one number changed, validated as on reading."""
-    table = copy.deepcopy(effect.model_dump())
-    inner = table
+    table = inner = effect.model_dump()
     for key in step.keys[:-1]:
         inner = inner[key]
     inner[step.keys[-1]] = value

@@ -5,9 +5,12 @@ Its module is imported only when a scene names it.
 
     StiffnessEffect   to the stiffness of one part, before condensation
     ForceEffect       forces on the junction nodes
+    Positions         (positions.py) forces at points of the junction
     PartLoadEffect    (part_load.py) a load anywhere on one part, condensed onto its junction nodes
     GapEffect         to the initial gap; it may add the contact that it acts on
     TieEffect         springs between the junction nodes of two parts, and their installation forces
+
+One that acts on a part is a PartEffect as well, one that acts on contacts a ContactEffect.
 """
 
 from __future__ import annotations
@@ -69,10 +72,36 @@ class Effect(Table):
         yield from ()
 
 
-class StiffnessEffect(Effect):
-    """Adds a term to the stiffness of one part, before condensation."""
+class PartEffect(Effect):
+    """Acts on one part."""
 
     part: str
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from super().faults(joint)
+        yield from unknown_part(self.part, joint)
+
+
+class ContactEffect(Effect):
+    """Acts on the contact `between`, by default on all."""
+
+    between: Between = None
+
+    def pairs(self, joint: Joint) -> tuple[Pair, ...]:
+        """The contacts that it acts on."""
+        return joint.pairs if self.between is None else (self.between,)
+
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from super().faults(joint)
+        if not joint.pairs:
+            needs = f"needs a contact, but {joint.part[0].name} is the only part"
+            yield "between", self.between, f'{needs}: add a part, a rigid_tool or "tool" in contacts'
+        elif self.between is not None and self.between not in joint.pairs:
+            yield "between", list(self.between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
+
+
+class StiffnessEffect(PartEffect):
+    """Adds a term to the stiffness of one part, before condensation."""
 
     @property
     def held_points(self) -> tuple[tuple[float, float], ...]:
@@ -89,7 +118,14 @@ class StiffnessEffect(Effect):
         """(plate.size, plate.size) term in N/mm, coupling only neighbouring grid lines y = const."""
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from unknown_part(self.part, joint)
+        yield from super().faults(joint)
+        for part in joint.part:
+            if part.name == self.part:
+                yield from self.misfits(joint.plate(part))
+
+    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+        """(key, value, what is allowed) for each parameter that does not fit the part."""
+        yield from ()
 
 
 class ForceEffect(Effect):
@@ -120,37 +156,28 @@ class TieEffect(ForceEffect):
         """T (n, r), one column per spring with its direction, and k (r,) in N/mm."""
 
 
-def pairs_of(between: Pair | None, joint: Joint) -> tuple[Pair, ...]:
-    """The contacts that an effect acts on."""
-    return joint.pairs if between is None else (between,)
-
-
 def contacts_of(pair: Pair, joint: Joint) -> slice:
     """The contacts of a pair, as a slice of g and λ."""
     start = joint.pairs.index(pair) * joint.node_count
     return slice(start, start + joint.node_count)
 
 
-def pressing_forces(nodal: Vector, between: Pair | None, joint: Joint) -> Vector:
-    """f (n,) for nodal forces (node_count,), N, that press the two parts of each contact together."""
+def at_contacts(values: Vector | float, pairs: Sequence[Pair], joint: Joint) -> Vector:
+    """g (m,) with these values, (node_count,), at the contacts of each pair, and 0 at the others."""
+    g = np.zeros(joint.size[1])
+    for pair in pairs:
+        g[contacts_of(pair, joint)] = values
+    return g
+
+
+def pressing_forces(nodal: Vector, pairs: Sequence[Pair], joint: Joint) -> Vector:
+    """f (n,) for nodal forces (node_count,), N, that press the two parts of each pair together."""
     f = np.zeros(joint.size[0])
-    for first, second in pairs_of(between, joint):
+    for first, second in pairs:
         f[joint.unknowns(first)] += nodal
         if second != TOOL:
             f[joint.unknowns(second)] -= nodal
     return f
-
-
-def unknown_pair(between: Pair | None, joint: Joint) -> Iterator[tuple[str, object, str]]:
-    """The faults of `between`, for an effect that acts on contacts."""
-    if not joint.pairs:
-        only = joint.part[0].name
-        allowed = (
-            f'needs a contact, but {only} is the only part: add a part, a rigid_tool or "tool" in contacts'
-        )
-        yield "between", between, allowed
-    elif between is not None and between not in joint.pairs:
-        yield "between", list(between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
 
 
 def unknown_part(part: str, joint: Joint) -> Iterator[tuple[str, object, str]]:

@@ -1,4 +1,4 @@
-"""Positions of fastening elements: points on the junction, each moved to its nearest node."""
+"""Effects at positions: points on the junction, each moved to its nearest node."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, NotNegative
 from problems.input.csv_table import rows_from_file
 
+from .effect import ForceEffect
 from .joint import Joint, Table
 
 
@@ -24,8 +25,8 @@ class Pattern(Table):
     edge: NotNegative = 0.0
 
 
-class Positions(Table):
-    """`points`, a list of (x, y) in mm; or `file`, a CSV with columns x and y; or a `pattern`."""
+class Positions(ForceEffect):
+    """Forces at `points`, a list of (x, y) in mm; or `file`, a CSV with columns x and y; or a `pattern`."""
 
     points: tuple[tuple[Finite, Finite], ...] = ()
     pattern: Pattern | None = None
@@ -50,8 +51,8 @@ class Positions(Table):
         X, Y = np.meshgrid(x, y)
         return np.column_stack([X.ravel(), Y.ravel()])
 
-    def misplaced(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """(key, value, what is allowed) for points that are not on the junction."""
+    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
+        yield from super().faults(joint)
         length, width = joint.junction.length, joint.junction.width
         if pattern := self.pattern:
             spread = [size for size, n in ((length, pattern.columns), (width, pattern.rows)) if n > 1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .block import Block, Matrix, SparseBlock, Vector, scaled
-from .local_compliance import BlockPart, Rows
+from .local_compliance import Rows
 
 
 class ScaledBlock(SparseBlock):
@@ -61,9 +60,6 @@ class ScaledBlock(SparseBlock):
 
     def compliance(self, A: sp.csc_array) -> Matrix:
         return self.base.compliance(self._in_base_units(A))
-
-    def local_compliance(self, A: sp.csc_array, windows: Sequence[Rows], single: bool) -> BlockPart | None:
-        return self.base.local_compliance(self._in_base_units(A), windows, single)
 
     def _in_base_units(self, A: sp.csc_array) -> sp.csc_array:
         """D⁻¹A, with which Aᵀ(DKD)⁻¹A is that of K."""

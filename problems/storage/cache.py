@@ -1,8 +1,6 @@
 """Arrays on disk under a hash of their data and code; opened memory-mapped, written atomically.
 
-An entry is a folder with one read-only .npy per array and a manifest. The manifest holds each file's SHA-256,
-the facts, and a hash of both. Each process verifies a file when it opens it first, and again if the file has
-changed since.
+An entry is a folder with one read-only .npy per array and a manifest: the size of each file, and the facts.
 """
 
 from __future__ import annotations
@@ -13,7 +11,6 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,11 +19,20 @@ import numpy as np
 import platformdirs
 from filelock import FileLock
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from problems.errors import InputError
 
 MANIFEST = "manifest.json"
 READ_ONLY = 0o444  # so that nobody who is given a memory map can write to its file by accident
+
+
+class Manifest(BaseModel):
+    """The bytes of each file of an entry, and what else is known."""
+
+    files: dict[str, int]
+    facts: dict[str, Any]
+
 
 #: Arrays by name, and facts that JSON can hold.
 Entry = tuple[Mapping[str, NDArray[Any]], dict[str, Any]]
@@ -65,12 +71,8 @@ def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -
     try:
         for name, array in arrays.items():
             np.save(work / f"{name}.npy", array)
-        files = sorted(work.iterdir())
-        sizes = {path.name: path.stat().st_size for path in files}
-        manifest = {"files": sizes, "sha256": dict(zip(sizes, _hashes(files), strict=True)), "facts": facts}
-        manifest = json.loads(json.dumps(manifest))
-        path = work / MANIFEST
-        path.write_text(json.dumps(manifest | {"hash": digest(manifest)}, indent=1))
+        sizes = {path.name: path.stat().st_size for path in sorted(work.iterdir())}
+        (work / MANIFEST).write_text(json.dumps({"files": sizes, "facts": facts}, indent=1))
         for path in work.iterdir():
             path.chmod(READ_ONLY)
         target = root() / key
@@ -83,71 +85,30 @@ def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -
 
 
 def load(key: str) -> Entry | None:
-    """The entry's arrays, memory-mapped and read-only, and its facts; None if there is none, or one without
-    hashes, of an older version.
+    """The entry's arrays, memory-mapped and read-only, and its facts; None if there is none.
 
-    Raises InputError if a file is missing or is not what was written.
+    Raises InputError if a file is missing, cut off or another one.
     """
     folder = root() / key
     if not folder.exists():
         return None
-    manifest = _manifest(folder)
-    if "hash" not in manifest:
-        return None
-    paths = []
-    for name, size in manifest["files"].items():
-        paths.append(folder / name)
-        found = paths[-1].stat().st_size if paths[-1].is_file() else None
-        if found != size:
-            raise InputError.one(paths[-1], "bytes", found, f"must be {size}; {_repair(folder)}")
-    _verify(paths, manifest["sha256"])
-    return {path.stem: np.load(path, mmap_mode="r") for path in paths}, manifest["facts"]
-
-
-def _manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     try:
         if not path.is_file():
             raise OSError("no regular file")
-        manifest = json.loads(path.read_text())
-        known = {name: manifest[name] for name in ("files", "sha256", "facts") if name in manifest}
-        whole = "hash" in manifest and digest(known) == manifest["hash"]
-        older = manifest.keys() == {"files", "facts"}
-    except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
+        manifest = Manifest.model_validate(json.loads(path.read_bytes()))
+        arrays = {}
+        for name, size in manifest.files.items():
+            path = folder / name
+            found = path.stat().st_size if path.is_file() else None
+            if found != size:
+                raise InputError.one(path, "bytes", found, f"must be {size}; {_repair(folder)}")
+            arrays[path.stem] = np.load(path, mmap_mode="r")
+    except InputError:
+        raise
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError.one(path, "content", str(error), _repair(folder)) from error
-    if not (whole or older):
-        raise InputError.one(path, "content", "not what was written", _repair(folder))
-    return dict(manifest)
-
-
-#: The files that this process has verified, with their state then.
-_verified: dict[Path, tuple[int, ...]] = {}
-
-
-def _verify(paths: list[Path], wanted: Mapping[str, str]) -> None:
-    """Raise InputError if a file is not what was written; what has not changed since is not read again."""
-    states = {path: _state(path) for path in paths}
-    unknown = [path for path in paths if _verified.get(path) != states[path]]
-    for path, found in zip(unknown, _hashes(unknown), strict=True):
-        if found != wanted[path.name]:
-            raise InputError.one(path, "SHA-256", found[:12], _repair(path.parent))
-        _verified[path] = states[path]
-
-
-def _state(path: Path) -> tuple[int, ...]:
-    found = path.stat()
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
-
-
-def _hashes(paths: list[Path]) -> list[str]:
-    """The SHA-256 of files, two at a time: hashing releases the interpreter's lock."""
-    with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(_sha256, paths))
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return arrays, manifest.facts
 
 
 def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:
