@@ -16,7 +16,7 @@ from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer
-from solvers.interior_point.newton_system import SYSTEMS
+from solvers.interior_point.preconditioner import SYSTEMS
 from solvers.interior_point.schemes import NewtonSteps, Point, algorithm_2, algorithm_3, mehrotra
 from solvers.interior_point.start import algorithm_5
 from solvers.methods.ipm import Ipm
@@ -222,7 +222,7 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(system
 
 def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a step it does not call itself solved, and says what held it up."""
-    monkeypatch.setattr("solvers.interior_point.newton_system.CG_LIMIT", 0)
+    monkeypatch.setattr("solvers.interior_point.schemes.CG_LIMIT", 0)
     answer = solved(definite(40, 0), np.ones(40))
     assert answer.status == "inaccurate"
     assert answer.details["restarts"] == 2

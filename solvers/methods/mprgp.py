@@ -34,7 +34,7 @@ PRECONDITIONERS = ("band", "face", "none")
 
 @dataclass(frozen=True)
 class _Ready:
-    """diagonal : of Q, or about that. metric : makes a load case's own. start : a solved case, if there is one."""
+    """diagonal : of Q, or about that. metric : makes a load case's own. start : a solved case, if any."""
 
     problem: Problem
     Q: Compliance
