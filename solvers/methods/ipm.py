@@ -26,7 +26,9 @@ from solvers.settings import require
 STALLED = 10  # iterations without progress before a restart, or the end
 RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
 CONTACT_COMPLIANCE = 0.1  # mm/N
-FEASIBILITY = 1e-3  # mm/√(N·mm)
+FEASIBILITY = 1e-3  # mm/√(N·mm): the error due to μ is proportional to √μ as well
+RHO, LEAST_GAP = 0.1, 0.01  # of STP1 and STP2: residual allowed, of λᵀy; smallest gap, mm
+MAX_ITERATIONS = 200  # per start or restart
 
 STARTS = ("algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra")
 ORDERINGS = ("lexicographic", "open_last")
@@ -45,9 +47,9 @@ class _Ready:
 class Ipm(Solver):
     """Primal–dual interior point.
 
-    Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ feasibility with
-    s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance; the paper tests μ alone, because it solves its
-    systems exactly. Feasibility is not required below the rounding of Qλ − p, which is at most
+    Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ 1e-3 √ε_μ mm with s1 = y − (Qλ − p).
+    ε_μ, in N·mm, is the tolerance; the paper tests μ alone, because it solves its systems exactly.
+    Feasibility is not required below the rounding of Qλ − p, which is at most
     4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). In addition each contact must be closed or open:
     min(y_i, q_ii λ_i) / max_j |a_ji| at most that or √(0.1 mm/N · ε_μ). A contact that touches without a
     force is off by √(μ q_ii), more than ε_μ guarantees if the contact is compliant; and a gap of y_i is
@@ -67,11 +69,8 @@ class Ipm(Solver):
     ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by increasing D.
     theta : fraction of the step to the boundary, in (0, 1).
     sigma : centring parameter of algorithm_2, in [0, 1].
-    rho : residual allowed by stp1 and stp2, as a fraction of λᵀy. epsilon : smallest gap of stp2, mm.
     cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
-    feasibility : error allowed in y = Qλ − p for inexact systems, mm. By default 1e-3 √ε_μ: the error due
-        to μ is proportional to √μ as well.
-    max_iterations : of the scheme, per start or restart. max_cg : of the conjugate gradients, in total.
+    max_cg : limit on the iterations of the conjugate gradients, in total.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
@@ -82,11 +81,7 @@ class Ipm(Solver):
     ordering: str = "lexicographic"
     theta: float = 0.995
     sigma: float = 0.1
-    rho: float = 0.1
-    epsilon: float = 0.01
     cg_tolerance: float = 1e-3
-    feasibility: float | None = None
-    max_iterations: int = 200
     max_cg: float = np.inf
 
     def __post_init__(self) -> None:
@@ -100,11 +95,7 @@ class Ipm(Solver):
             ordering=(self.ordering in orderings, f"must be one of {ORDERINGS}, open_last with V only"),
             theta=(0 < self.theta < 1, "must lie in (0, 1)"),
             sigma=(0 <= self.sigma <= 1, "must lie in [0, 1]"),
-            rho=(self.rho > 0, "must be positive"),
-            epsilon=(self.epsilon > 0, "must be positive, mm"),
             cg_tolerance=(0 < self.cg_tolerance < 1, "must lie in (0, 1)"),
-            feasibility=(self.feasibility is None or self.feasibility > 0, "must be positive, mm"),
-            max_iterations=(self.max_iterations >= 1, "must be at least 1"),
             max_cg=(self.max_cg >= 1, "must be at least 1"),
         )
 
@@ -161,9 +152,9 @@ class Ipm(Solver):
     def _start(self, problem: Problem, load: LoadCase, details: dict[str, Any]) -> Start:
         match self.start:
             case "stp1":
-                return stp1(problem.Q, load.p, self.rho)
+                return stp1(problem.Q, load.p, RHO)
             case "stp2":
-                return stp2(problem.Q, load.p, self.rho, self.epsilon)
+                return stp2(problem.Q, load.p, RHO, LEAST_GAP)
             case "mehrotra":
                 return mehrotra_start(problem.Q, load.p)
         try:
@@ -179,7 +170,7 @@ class Ipm(Solver):
     ) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8: status, cause and the last finite point."""
         smallest, stalled = np.inf, 0
-        for _ in range(self.max_iterations):  # step 4
+        for _ in range(MAX_ITERATIONS):  # step 4
             measure = self._measure(newton, point, tolerance, units)
             if measure <= 1:
                 return "solved", "", point
@@ -198,7 +189,7 @@ class Ipm(Solver):
             if not (np.isfinite(values) & (values > 0)).all():
                 return "failed", "λ or y is no longer finite and positive", point
             point = following
-        return "iteration_limit", f"max_iterations = {self.max_iterations}", point
+        return "iteration_limit", f"{MAX_ITERATIONS} iterations", point
 
     @np.errstate(over="ignore")
     def _measure(self, newton: NewtonSteps, point: Point, tolerance: float, units: Vector) -> float:
@@ -207,9 +198,8 @@ class Ipm(Solver):
         rounding = largest_rounding(np.diag(newton.Q), newton.p, point.lam)
         undecided = float((np.minimum(y, force) / units).max())
         spread = float(np.sqrt((force * y / units**2).mean()))
-        feasibility = self.feasibility or FEASIBILITY * np.sqrt(tolerance)
         return max(
             point.mu / tolerance,
-            point.infeasibility / max(feasibility, rounding),
+            point.infeasibility / max(FEASIBILITY * np.sqrt(tolerance), rounding),
             max(undecided, spread) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
         )
