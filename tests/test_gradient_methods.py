@@ -9,8 +9,8 @@ import pytest
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.verification.judge import conditioned_limit
-from problems.forms.assembly import LoadCase, Vector
 from problems.forms import compliance
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.banded_inverse import banded_inverse
 from problems.forms.compliance import DenseCompliance
 from problems.forms.prepared import Prepared

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from small import make_load, make_prepared, solve_by_nnls
 from test_gi import by_nnls, definite
 
@@ -22,17 +21,10 @@ from solvers.interior_point.start import algorithm_5
 from solvers.methods.ipm import Ipm
 
 
-class Given:
-    """A problem that is known by its Q alone, its contacts written in mm."""
-
-    def __init__(self, Q: np.ndarray) -> None:
-        self.Q = Q
-        self.assembly = SimpleNamespace(A=sp.eye_array(len(Q), format="csc"))
-
-
 def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = 1e-14, **options: Any) -> Answer:
     solver = Ipm(**options)
-    return solver.solve(solver.prepare(Given(Q)), LoadCase(np.zeros(0), np.zeros(0), p), tolerance)  # type: ignore[arg-type]
+    ready = solver.prepare(SimpleNamespace(Q=Q))  # type: ignore[arg-type]
+    return solver.solve(ready, LoadCase(np.zeros(0), np.zeros(0), p), tolerance)
 
 
 def newton(Q: np.ndarray, p: np.ndarray, sigma: float = 0.3) -> tuple[NewtonSteps, Point]:

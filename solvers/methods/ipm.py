@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import banded_inverse
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, failed
 from solvers.interior_point.banded import Banded
@@ -36,11 +35,8 @@ ORDERINGS = ("lexicographic", "open_last")
 
 @dataclass(frozen=True)
 class _Ready:
-    """units : (m,) max_j |a_ji|, the change in the gap of contact i per 1 mm of displacement."""
-
     problem: Problem
     system: NewtonSystem
-    units: Vector
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
@@ -51,10 +47,9 @@ class Ipm(Solver):
     ε_μ, in N·mm, is the tolerance; the paper tests μ alone, because it solves its systems exactly.
     Feasibility is not required below the rounding of Qλ − p, which is at most
     4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). In addition each contact must be closed or open:
-    min(y_i, q_ii λ_i) / max_j |a_ji| at most that or √(0.1 mm/N · ε_μ). A contact that touches without a
-    force is off by √(μ q_ii), more than ε_μ guarantees if the contact is compliant; and a gap of y_i is
-    y_i / max_j |a_ji| of displacement, whatever the unit of the contact. For the same reason the root mean
-    square of √(q_ii λ_i y_i) / max_j |a_ji| has that limit; with q_ii ≤ 0.1 mm/N, ε_μ implies it.
+    min(y_i, q_ii λ_i) at most that or √(0.1 mm/N · ε_μ). A contact that touches without a force is off by
+    √(μ q_ii), more than ε_μ guarantees if the contact is compliant. For the same reason the root mean square
+    of √(q_ii λ_i y_i) has that limit; with q_ii ≤ 0.1 mm/N, ε_μ implies it.
 
     If the iteration stalls, because the error of inexact systems in s1 outlasts y or because a step ended
     too close to the boundary, it restarts with a smaller cg_tolerance and theta (details: restarts).
@@ -101,13 +96,12 @@ class Ipm(Solver):
 
     def prepare(self, data: Problem) -> _Ready | Answer:
         """The factors of Q; a failed answer if Q is not positive definite."""
-        units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
         try:
             if self.preconditioner == "band":
                 M = banded_inverse(data.Q, data.assembly.contact_nodes)
-                return _Ready(data, Banded(data.Q, M), units)
+                return _Ready(data, Banded(data.Q, M))
             kind = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
-            return _Ready(data, kind(data.Q), units)
+            return _Ready(data, kind(data.Q))
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
 
@@ -129,13 +123,13 @@ class Ipm(Solver):
             "corrections": start.corrections,
             "multiplications": start.multiplications,
         }
-        status, cause, point = self._iterate(newton, first, tolerance, ready.units)
+        status, cause, point = self._iterate(newton, first, tolerance)
         for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
             if status != "inaccurate":
                 break
             newton.cg_tolerance = min(newton.cg_tolerance, cg_tolerance)
             newton.theta = min(newton.theta, theta)
-            status, cause, point = self._iterate(newton, first, tolerance, ready.units)
+            status, cause, point = self._iterate(newton, first, tolerance)
             details["restarts"] = restart
         if newton.unconverged:
             details["cg_unconverged"] = newton.unconverged
@@ -165,13 +159,11 @@ class Ipm(Solver):
             details["start_instead"] = f"mehrotra, because {error}"
             return mehrotra_start(problem.Q, load.p)
 
-    def _iterate(
-        self, newton: NewtonSteps, point: Point, tolerance: float, units: Vector
-    ) -> tuple[Status, str, Point]:
+    def _iterate(self, newton: NewtonSteps, point: Point, tolerance: float) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8: status, cause and the last finite point."""
         smallest, stalled = np.inf, 0
         for _ in range(MAX_ITERATIONS):  # step 4
-            measure = self._measure(newton, point, tolerance, units)
+            measure = self._measure(newton, point, tolerance)
             if measure <= 1:
                 return "solved", "", point
             stalled = 0 if measure < smallest else stalled + 1
@@ -192,12 +184,12 @@ class Ipm(Solver):
         return "iteration_limit", f"{MAX_ITERATIONS} iterations", point
 
     @np.errstate(over="ignore")
-    def _measure(self, newton: NewtonSteps, point: Point, tolerance: float, units: Vector) -> float:
+    def _measure(self, newton: NewtonSteps, point: Point, tolerance: float) -> float:
         """The largest ratio of a quantity of the stopping rule to what it may be."""
         force, y = np.diag(newton.Q) * point.lam, point.y
         rounding = largest_rounding(np.diag(newton.Q), newton.p, point.lam)
-        undecided = float((np.minimum(y, force) / units).max())
-        spread = float(np.sqrt((force * y / units**2).mean()))
+        undecided = float(np.minimum(y, force).max())
+        spread = float(np.sqrt((force * y).mean()))
         return max(
             point.mu / tolerance,
             point.infeasibility / max(FEASIBILITY * np.sqrt(tolerance), rounding),

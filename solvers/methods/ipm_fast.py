@@ -28,7 +28,6 @@ RHO = 10.0  # with 0.1 the start is up to a hundred times as large, and far from
 REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: per iteration, the error in y = Qλ − p shrinks by that or by 1 − α
 MAX_ITERATIONS = 100
 STALLED = 10
-LIMIT = {"cause": f"{MAX_ITERATIONS} iterations"}
 IDENTIFICATION_RATIO = 1e-4  # of the initial μ: above, a contact may look closed before it has moved
 UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 
@@ -47,7 +46,7 @@ class FastIpm(Solver):
     of its initial value and at most m/4 contacts are undecided, or when the interior point ends; its status
     is the answer's. The interior point ends when the natural residual max|min(q_ii λ_i, (Qλ − p)_i)| is at
     most the tolerance, mm, or has not decreased for 10 iterations. Iterations are Newton matrices, inner
-    iterations the contact sets of the finish.
+    iterations the finish's products with Q.
 
     Options
     -------
@@ -103,7 +102,7 @@ class FastIpm(Solver):
             done = residual <= tolerance or stalled == STALLED
             if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
                 answer = ready.finish.solve_from(ratio > 1, point.lam, load, tolerance)
-                details |= {key: value for key, value in answer.details.items() if key != "products"}
+                details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             if residual <= tolerance:
                 return Answer("solved", point.lam, iterations=k, details=details)
@@ -113,4 +112,5 @@ class FastIpm(Solver):
             point = mehrotra(newton, point)
             if not np.isfinite(point.mu):
                 return failed("λ or y overflowed", k)
-        return Answer("iteration_limit", point.lam, iterations=MAX_ITERATIONS, details=details | LIMIT)
+        details["cause"] = f"{MAX_ITERATIONS} iterations"
+        return Answer("iteration_limit", point.lam, iterations=MAX_ITERATIONS, details=details)
