@@ -18,7 +18,7 @@ from problems.stiffness.operator import Stiffness
 from solvers.active_set.block_pivoting import MAX_STALE_PASSES, block_pivoting
 from solvers.active_set.bordered_factor import BorderedFactor
 from solvers.active_set.contact_sets import ContactSets, trial_of
-from solvers.linear_algebra.inverse import inverse_with_factor
+from solvers.linear_algebra.inverse import BLOCK, inverse_with_factor
 from solvers.methods.newton import ActiveSetNewton
 
 
@@ -33,7 +33,7 @@ def subset(rng: np.random.Generator, size: int, share: float) -> np.ndarray:
     return rng.random(size) < share
 
 
-@pytest.mark.parametrize("size", [1, 2, 70])
+@pytest.mark.parametrize("size", [1, BLOCK, BLOCK + 1, 2 * BLOCK + 3])
 def test_the_inverse_is_full_and_symmetric(size: int) -> None:
     Q = definite(size, seed=size)
     inverse, U = inverse_with_factor(Q)

@@ -65,8 +65,8 @@ def test_words_and_layout_do_not_count(package: Path) -> None:
     change(package / "linear_algebra/inverse.py", 'f"dpotri returned {info}"', 'f"dpotri says {info}"')
     change(
         package / "linear_algebra/inverse.py",
-        "def inverse_with_factor(Q: Matrix) -> tuple[Matrix, Matrix]:",
-        "def inverse_with_factor(Q: Any) -> Any:",
+        "def mirror(upper: Matrix) -> None:",
+        "def mirror(upper: Any) -> Any:",
     )
     assert changed(package, added) == set()
 
