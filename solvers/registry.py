@@ -75,19 +75,16 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
         return "sha256:" + hashlib.sha256(b"".join(contents)).hexdigest()[:12]
     if in_house(name):
         return __version__
+    if name in modules():
+        distribution = _class_of(name).distribution
+    else:
+        from .libraries.qpsolvers import DISTRIBUTIONS
+
+        distribution = DISTRIBUTIONS.get(name)
     try:
-        return version(_distribution(name))
+        return version(distribution or name)
     except PackageNotFoundError:
         return "unknown"
-
-
-def _distribution(name: str) -> str:
-    """The name of the distribution that has the solver."""
-    if name in modules():
-        return _class_of(name).distribution or name
-    from .libraries.qpsolvers import DISTRIBUTIONS
-
-    return DISTRIBUTIONS.get(name, name)
 
 
 def _found_by_qpsolvers() -> list[str]:

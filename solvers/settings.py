@@ -1,4 +1,4 @@
-"""Settings of a library that a user may choose beside the adapter's options, as OSQP's scaling."""
+"""Options of a method, and settings of a library that a user may choose beside them, as OSQP's scaling."""
 
 from __future__ import annotations
 
@@ -11,6 +11,14 @@ from problems.input.validation import unknown
 #: Beginnings of what the adapters decide: accuracy, limits, output.
 STOPPING = ("eps", "tol", "reduced_tol", "max_iter", "check_du", "time", "compute_timings")
 DECIDED = (*STOPPING, "verbose", "max_threads", "num_threads", "warm_start", "initial_guess")
+
+
+def require(solver: str, options: Mapping[str, object], **rules: tuple[bool, str]) -> None:
+    """Raises InputError, all faults at once. rules : by option, whether its value is allowed, and what is."""
+    wrong = {key: allowed for key, (holds, allowed) in rules.items() if not holds}
+    faults = [Fault(solver, key, options[key], allowed) for key, allowed in wrong.items()]
+    if faults:
+        raise InputError(faults)
 
 
 def chosen(solver: str, given: Mapping[str, object], settings: object) -> dict[str, Any]:

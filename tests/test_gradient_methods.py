@@ -9,16 +9,17 @@ import pytest
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.verification.judge import conditioned_limit
+from problems.forms import compliance
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.banded_inverse import banded_inverse
+from problems.forms.compliance import DenseCompliance
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.scene import read_scene
 from solvers.active_set import parametric_path
 from solvers.active_set.parametric_path import ParametricPath
 from solvers.base import Answer, WarmStart
-from solvers.gradient_projection import metric, proportioning
-from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
+from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
 from solvers.gradient_projection.proportioning import Proportioning
 from solvers.methods import projected_newton
 from solvers.registry import make_solver
@@ -59,18 +60,19 @@ def test_each_variant_agrees_with_nnls(name: str, options: dict[str, Any], kind:
     np.testing.assert_allclose(prepared.recover(answer.lam, load), x, rtol=0, atol=1e-8)
 
 
-def metrics(prepared: Prepared) -> dict[str, Metric]:
+def metrics(prepared: Prepared) -> dict[str, Diagonal]:
     Q = prepared.Q
     M, d = banded_inverse(Q, None), np.diag(Q).copy()
-    alpha = step_length(Q, d)
-    return {"band": Band(M, d), "face": Face(M, d, alpha), "none": Diagonal(d, alpha)}
+    alpha = step_length(prepared.compliance, d)
+    return {"band": Band(d, 1.0, M), "face": Face(d, alpha, M), "none": Diagonal(d, alpha)}
 
 
 @pytest.mark.parametrize("kind", ["band", "face", "none"])
 def test_no_step_increases_the_objective(kind: str) -> None:
     prepared, load = strips(400)
     Q, p = prepared.Q, load.p
-    case = Proportioning(Q, p, np.diag(Q).copy(), metrics(prepared)[kind], np.zeros_like(p), -p)
+    metric = metrics(prepared)[kind]
+    case = Proportioning(prepared.compliance, p, metric.diagonal, metric, lambda lam: Q @ lam - p, 0 * p, -p)
     before = 0.0
     for _ in range(200):
         if not case._step():
@@ -91,7 +93,7 @@ def test_the_preconditioner_of_a_face_is_the_inverse_of_that_block() -> None:
     F = np.random.default_rng(0).random(300) < 0.6
     expected = np.zeros(300)
     expected[F] = np.linalg.solve(np.linalg.inv(whole)[np.ix_(F, F)], load.p[F])
-    found = Band(M, np.diag(prepared.Q).copy()).precondition(F, load.p)
+    found = Band(np.diag(prepared.Q).copy(), 1.0, M).precondition(F, load.p)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * abs(expected).max())
 
 
@@ -99,7 +101,7 @@ def test_the_step_length_is_below_two_over_the_largest_eigenvalue() -> None:
     Q = make_strips(200).Q
     root = np.sqrt(np.diag(Q))
     largest = np.linalg.eigvalsh(Q / root / root[:, None])[-1]
-    assert 1.5 < step_length(Q, np.diag(Q).copy()) * largest < 2
+    assert 1.5 < step_length(DenseCompliance(Q), np.diag(Q).copy()) * largest < 2
 
 
 @pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
@@ -107,7 +109,7 @@ def test_the_products_that_are_told_are_those_made(
     name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = []
-    for module in (metric, proportioning, parametric_path, projected_newton):
+    for module in (compliance, parametric_path, projected_newton):
         original = module.product  # type: ignore[attr-defined]
 
         def counted(Q: Any, v: Vector, original: Any = original) -> Vector:

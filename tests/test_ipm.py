@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from small import make_load, make_prepared, solve_by_nnls
 from test_gi import by_nnls, definite
 
@@ -16,23 +15,16 @@ from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer
-from solvers.interior_point.newton_system import SYSTEMS
+from solvers.interior_point.preconditioner import SYSTEMS
 from solvers.interior_point.schemes import NewtonSteps, Point, algorithm_2, algorithm_3, mehrotra
 from solvers.interior_point.start import algorithm_5
 from solvers.methods.ipm import Ipm
 
 
-class Given:
-    """A problem that is known by its Q alone, its contacts written in mm."""
-
-    def __init__(self, Q: np.ndarray) -> None:
-        self.Q = Q
-        self.assembly = SimpleNamespace(A=sp.eye_array(len(Q), format="csc"))
-
-
 def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = 1e-14, **options: Any) -> Answer:
     solver = Ipm(**options)
-    return solver.solve(solver.prepare(Given(Q)), LoadCase(np.zeros(0), np.zeros(0), p), tolerance)  # type: ignore[arg-type]
+    ready = solver.prepare(SimpleNamespace(Q=Q))  # type: ignore[arg-type]
+    return solver.solve(ready, LoadCase(np.zeros(0), np.zeros(0), p), tolerance)
 
 
 def newton(Q: np.ndarray, p: np.ndarray, sigma: float = 0.3) -> tuple[NewtonSteps, Point]:
@@ -173,19 +165,22 @@ def test_a_looser_tolerance_takes_fewer_iterations_and_vouches_for_less() -> Non
     assert counts == sorted(set(counts))
 
 
-def test_no_feasibility_is_asked_for_below_rounding() -> None:
+def test_no_feasibility_is_asked_for_below_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solvers.methods.ipm.FEASIBILITY", 1e-10)
     Q = definite(20, 6, condition=1e3)
     p = 1e12 * np.random.default_rng(6).standard_normal(20)
-    answer = solved(Q, p, tolerance=1.0, feasibility=1e-10)
+    answer = solved(Q, p, tolerance=1.0)
     assert answer.status == "solved"
     assert answer.lam is not None
     size = abs(p).max() + abs(Q).max() * answer.lam.sum()
     assert 1e-10 < answer.details["infeasibility"] < 1e-15 * size
 
 
-def test_too_few_iterations_are_said() -> None:
-    answer = solved(definite(25, 0), np.ones(25), max_iterations=2)
+def test_too_few_iterations_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("solvers.methods.ipm.MAX_ITERATIONS", 2)
+    answer = solved(definite(25, 0), np.ones(25))
     assert answer.status == "iteration_limit"
+    assert answer.details["cause"] == "2 iterations"
     assert answer.iterations == 2
 
 
@@ -222,7 +217,7 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(system
 
 def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a step it does not call itself solved, and says what held it up."""
-    monkeypatch.setattr("solvers.interior_point.newton_system.CG_LIMIT", 0)
+    monkeypatch.setattr("solvers.interior_point.schemes.CG_LIMIT", 0)
     answer = solved(definite(40, 0), np.ones(40))
     assert answer.status == "inaccurate"
     assert answer.details["restarts"] == 2
@@ -233,15 +228,8 @@ def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(
     ("option", "value"),
     [
-        *(("theta", 0.0), ("theta", 1.0), ("cg_tolerance", 0.0), ("cg_tolerance", 1.0), ("feasibility", 0.0)),
-        *(
-            ("sigma", -0.1),
-            ("sigma", 1.1),
-            ("rho", 0.0),
-            ("epsilon", 0.0),
-            ("max_cg", 0),
-            ("max_iterations", 0),
-        ),
+        *(("theta", 0.0), ("theta", 1.0), ("cg_tolerance", 0.0), ("cg_tolerance", 1.0)),
+        *(("sigma", -0.1), ("sigma", 1.1), ("max_cg", 0)),
         *(("start", "nowhere"), ("scheme", "algorithm_9"), ("preconditioner", "W"), ("ordering", "best")),
     ],
 )

@@ -7,8 +7,7 @@ import pytest
 from small import make_load, make_prepared
 from test_gi import definite
 
-from solvers.interior_point.infeasible_start import mehrotra_start, stp1, stp2
-from solvers.interior_point.start import NoStart, algorithm_4, algorithm_5
+from solvers.interior_point.start import NoStart, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
 
 
 def with_negative_rows(size: int = 12) -> np.ndarray:

@@ -14,8 +14,7 @@ two band products and a band solution.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,54 +31,32 @@ POWER_STEPS = 30  # products for λmax, once per assembly
 MAX_SETS = 200  # contact sets per projection with M
 
 
-class Metric(Protocol):
-    """alpha : ᾱ. sets : contact sets tried in this load case."""
+@dataclass
+class Diagonal:
+    """B = diag(Q)/ᾱ. diagonal : of Q. alpha : ᾱ = 1.9/λmax(diag(Q)⁻¹Q). sets : contact sets tried
+    in this load case."""
 
+    diagonal: Vector
     alpha: float
-    sets: int
+    sets: int = field(default=0, init=False)
 
     def precondition(self, F: Set, r: Vector) -> Vector:
         """B_FF⁻¹ r_F, zero off F."""
-
-    def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
-        """d with λ + d ≥ 0. expanding : whether the face is to shrink, or else to grow."""
-
-
-class Diagonal:
-    """B = diag(Q)/ᾱ, ᾱ = 1.9/λmax(diag(Q)⁻¹Q)."""
-
-    def __init__(self, diagonal: Vector, alpha: float) -> None:
-        self.diagonal, self.alpha, self.sets = diagonal, alpha, 0
-
-    def precondition(self, F: Set, r: Vector) -> Vector:
         return np.where(F, r, 0.0) / self.diagonal
 
     def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
+        """d with λ + d ≥ 0. expanding : whether the face is to shrink, or else to grow."""
         part = np.where(lam > 0, y if expanding else 0.0, 0.0 if expanding else np.minimum(y, 0.0))
         step: Vector = np.maximum(lam - self.alpha * part / self.diagonal, 0.0) - lam
         return step
 
 
-class Face(Diagonal):
-    """The same, but for the preconditioner, which is that of Band."""
-
-    def __init__(self, M: BandedInverse, diagonal: Vector, alpha: float) -> None:
-        super().__init__(diagonal, alpha)
-        self.band = Band(M, diagonal)
-
-    def precondition(self, F: Set, r: Vector) -> Vector:
-        return self.band.precondition(F, r)
-
-
 @dataclass
-class Band:
-    """B = M⁻¹. diagonal : of Q."""
+class Face(Diagonal):
+    """The same, but with M⁻¹ in the preconditioner. factor : of M off the face, kept from one to the next."""
 
     M: BandedInverse
-    diagonal: Vector
-    alpha: float = 1.0
-    sets: int = 0
-    factor: BandFactor | None = None
+    factor: BandFactor | None = field(default=None, init=False)
 
     def precondition(self, F: Set, r: Vector) -> Vector:
         order = self.M.order
@@ -91,6 +68,10 @@ class Band:
         z[order] = v - self.M.product(self.factor.solve(v))
         z[~F] = 0.0
         return z
+
+
+class Band(Face):
+    """B = M⁻¹, ᾱ = 1."""
 
     def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
         order = self.M.order

@@ -15,17 +15,17 @@ it, as is one that only frees contacts.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from problems.forms.assembly import LoadCase, Vector
+from problems.forms.assembly import Vector
 from problems.forms.compliance import Compliance
-from problems.forms.prepared import Prepared
 from solvers.active_set.bordered_factor import Set
 from solvers.kkt import kkt_residual, rounding_of
 
-from .metric import Metric
+from .metric import Diagonal
 
 RESIDUAL_TARGET = 0.1  # of the tolerance
 RECOMPUTED = 50  # steps after which y is computed anew
@@ -36,13 +36,15 @@ STALLED = 5  # computations anew that have not halved the KKT residual: what is 
 class Proportioning:
     """A load case: λ (m,) N and y = Qλ − p (m,) mm.
 
-    products : with Q. before : the last conjugate direction, Q times it, and its face.
+    gaps : computes y of λ anew. products : with Q. before : the last conjugate direction, Q times it, and its
+    face.
     """
 
     Q: Compliance
     p: Vector
     diagonal: Vector
-    metric: Metric
+    metric: Diagonal
+    gaps: Callable[[Vector], Vector]
     lam: Vector
     y: Vector
     products: int = 0
@@ -61,7 +63,8 @@ class Proportioning:
             since += 1
             if moved and since < RECOMPUTED:
                 continue
-            self.y, self.before, since = self._gap(), None, 0
+            self.y, self.before, since = self.gaps(self.lam), None, 0
+            self.products += 1
             residual = kkt_residual(self.lam, self.y)
             stalled = 0 if moved or residual < best[0] / 2 else stalled + 1
             best = min(best, (residual, self.lam, self.y), key=lambda each: each[0])
@@ -118,22 +121,6 @@ class Proportioning:
         self.lam, self.y = np.maximum(self.lam + length * d, 0.0), self.y + length * change
         return True
 
-    def _gap(self) -> Vector:
-        """y of λ, computed anew."""
-        return self._times_Q(self.lam) - self.p
-
     def _times_Q(self, v: Vector) -> Vector:
         self.products += 1
         return self.Q @ v
-
-
-@dataclass(kw_only=True)
-class SparseProportioning(Proportioning):
-    """A load case of the sparse form. load : with p."""
-
-    prepared: Prepared
-    load: LoadCase
-
-    def _gap(self) -> Vector:
-        self.products += 1
-        return self.prepared.gaps(self.lam[:, None], [self.load])[:, 0]

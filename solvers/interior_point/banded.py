@@ -13,32 +13,27 @@ from __future__ import annotations
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
-from problems.forms.banded_inverse import BandedInverse, BandFactor
-from problems.forms.product import product
-from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
+from problems.forms.banded_inverse import BandedInverse
+from solvers.linear_algebra.conjugate_gradients import Solved, conjugate_gradients
 
-from .newton_system import CG_LIMIT, FactoredPerD, Solved
+from .newton_system import NewtonSystem
 
 
-class Banded(FactoredPerD):
+class Banded(NewtonSystem):
     """Conjugate gradients until rᵀP⁻¹r ≤ tolerance² bᵀP⁻¹b with r = b − (Q + D) v."""
 
     def __init__(self, Q: Matrix, M: BandedInverse) -> None:
         super().__init__(Q)
         self.M = M
 
-    def factor_for(self, D: Vector) -> None:
+    def update(self, D: Vector) -> int:
         self.S = np.sqrt(D[self.M.order])
-        self.factor: BandFactor = self.M.shifted_factor(self.S)
+        self.factor = self.M.shifted_factor(self.S)
+        return 1
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
         self.take(D)
-        limit = min(limit, CG_LIMIT * len(b))
-        cg = conjugate_gradients(self._multiply, b, tolerance, limit, self._precondition)
-        return Solved(cg.z, cg.iterations, cg.converged)
-
-    def _multiply(self, v: Vector) -> Vector:
-        return product(self.Q, v) + self.D * v
+        return conjugate_gradients(self.times_H, b, tolerance, limit, self._precondition)
 
     def _precondition(self, r: Vector) -> Vector:
         z = np.empty_like(r)

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from problems.forms.assembly import Matrix, Vector
 
-from .infeasible_start import stp2
 from .newton_system import Direct
 from .schemes import NewtonSteps, mehrotra
+from .start import stp2
 
 ITERATIONS = 60
 SMALLEST_MU = 1e-20  # of the first μ: signs do not change any more
@@ -21,17 +21,15 @@ def identified_set(Q: Matrix, p: Vector) -> NDArray[np.bool_]:
 
     Raises LinAlgError where Q is not positive definite.
     """
-    system = Direct(Q)
-    system.begin()
-    newton = NewtonSteps(Q, p, system, THETA, 0.0, 1.0, np.inf)
+    newton = NewtonSteps(Q, p, Direct(Q), THETA, 0.0, 1.0, np.inf)
     start = stp2(Q, p, RHO, LEAST_GAP)
     point = newton.at(start.lam, start.y)
-    found, first = np.diag(Q) * point.lam > point.y, point.mu
+    smallest = SMALLEST_MU * point.mu
     for _ in range(ITERATIONS):
-        point = mehrotra(newton, point)
-        if not (np.isfinite(point.lam).all() and np.isfinite(point.y).all()):
+        following = mehrotra(newton, point)
+        if not np.isfinite(following.mu):
             break
-        found = np.diag(Q) * point.lam > point.y
-        if point.mu <= SMALLEST_MU * first:
+        point = following
+        if point.mu <= smallest:
             break
-    return found
+    return np.diag(Q) * point.lam > point.y

@@ -16,6 +16,9 @@ from problems.forms.product import product
 
 from .newton_system import NewtonSystem
 
+#: The most CG iterations per system, in units of m.
+CG_LIMIT = 10
+
 
 class CgExhausted(Exception):
     """The limit on CG iterations has been reached."""
@@ -73,7 +76,7 @@ class NewtonSteps:
     def direction(self, point: Point, s3: Vector, kind: str) -> tuple[Vector, Vector]:
         """(Δλ, Δy) of Algorithm 2, step 1, where (14) reads (Q + D) Δλ = s1 + Λ⁻¹s3 with D = YΛ⁻¹."""
         lam, y = point.lam, point.y
-        limit = int(min(self.cg_left, 2**31))
+        limit = int(min(self.cg_left, CG_LIMIT * len(lam)))
         solved = self.system.solve(y / lam, point.s1 + s3 / lam, self.cg_tolerance, limit)
         self.counts[kind].append(solved.iterations)
         self.cg_left -= solved.iterations

@@ -11,10 +11,10 @@ from problems.forms.assembly import Vector
 
 
 @dataclass(frozen=True)
-class CgResult:
-    """z, the iterations spent, and whether ‖b − Hz‖ ≤ tolerance·‖b‖ was reached (recursive residual)."""
+class Solved:
+    """The solution v, the iterations spent on it, and whether the tolerance was met."""
 
-    z: Vector
+    v: Vector
     iterations: int
     converged: bool
 
@@ -25,29 +25,29 @@ def conjugate_gradients(
     tolerance: float,
     max_iterations: int,
     precondition: Callable[[Vector], Vector] = lambda r: r,
-) -> CgResult:
-    """Solve Hz = b from z = 0 until ‖r‖ ≤ tolerance·‖b‖ with ‖r‖² = rᵀP⁻¹r, the 2-norm by default.
+) -> Solved:
+    """Solve Hv = b from v = 0 until ‖r‖ ≤ tolerance·‖b‖ with ‖r‖² = rᵀP⁻¹r, the 2-norm by default.
 
-    precondition : r → P⁻¹r. Stops unconverged after max_iterations, or at a direction without positive
-    curvature, which for a positive definite H means that rounding dominates.
+    r = b − Hv is the recursive residual. precondition : r → P⁻¹r. Stops unconverged after max_iterations, or
+    at a direction without positive curvature, which for a positive definite H means that rounding dominates.
     """
-    z = np.zeros_like(b)
+    v = np.zeros_like(b)
     r = b.copy()
     s = precondition(r)
-    v = s.copy()
+    d = s.copy()
     rho = float(r @ s)
     target = tolerance**2 * rho
     for k in range(max_iterations):
         if rho <= target:
-            return CgResult(z, k, True)
-        Hv = multiply(v)
-        curvature = float(v @ Hv)
+            return Solved(v, k, True)
+        Hd = multiply(d)
+        curvature = float(d @ Hd)
         if not curvature > 0:
-            return CgResult(z, k, False)
+            return Solved(v, k, False)
         alpha = rho / curvature
-        z += alpha * v
-        r -= alpha * Hv
+        v += alpha * d
+        r -= alpha * Hd
         s = precondition(r)
         rho, before = float(r @ s), rho
-        v = s + (rho / before) * v
-    return CgResult(z, max_iterations, rho <= target)
+        d = s + (rho / before) * d
+    return Solved(v, max_iterations, rho <= target)

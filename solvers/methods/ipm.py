@@ -7,53 +7,49 @@ V = U + √D (eq. 15), from the start of Algorithm 5. Each option changes one in
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar
 
 import numpy as np
 
-from problems.errors import Fault, InputError
-from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import banded_inverse
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, failed
 from solvers.interior_point.banded import Banded
-from solvers.interior_point.infeasible_start import mehrotra_start, stp1, stp2
-from solvers.interior_point.newton_system import SYSTEMS, NewtonSystem, OpenLast
+from solvers.interior_point.newton_system import NewtonSystem
+from solvers.interior_point.preconditioner import SYSTEMS, OpenLast
 from solvers.interior_point.schemes import SCHEMES, CgExhausted, NewtonSteps, Point
-from solvers.interior_point.start import NoStart, Start, algorithm_4, algorithm_5
+from solvers.interior_point.start import NoStart, Start, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
+from solvers.kkt import largest_rounding
+from solvers.settings import require
 
 STALLED = 10  # iterations without progress before a restart, or the end
 RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
 CONTACT_COMPLIANCE = 0.1  # mm/N
-FEASIBILITY = 1e-3  # mm/√(N·mm)
-EPS = float(np.finfo(float).eps)
+FEASIBILITY = 1e-3  # mm/√(N·mm): the error due to μ is proportional to √μ as well
+RHO, LEAST_GAP = 0.1, 0.01  # of STP1 and STP2: residual allowed, of λᵀy; smallest gap, mm
+MAX_ITERATIONS = 200  # per start or restart
 
-StartName = Literal["algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra"]
-Ordering = Literal["lexicographic", "open_last"]
+STARTS = ("algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra")
+ORDERINGS = ("lexicographic", "open_last")
 
 
 @dataclass(frozen=True)
 class _Ready:
-    """units : (m,) max_j |a_ji|, the change in the gap of contact i per 1 mm of displacement."""
-
     problem: Problem
     system: NewtonSystem
-    units: Vector
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
 class Ipm(Solver):
     """Primal–dual interior point.
 
-    Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ feasibility with
-    s1 = y − (Qλ − p). ε_μ, in N·mm, is the tolerance; the paper tests μ alone, because it solves its
-    systems exactly. Feasibility is not required below the rounding of Qλ − p, which is at most
+    Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ 1e-3 √ε_μ mm with s1 = y − (Qλ − p).
+    ε_μ, in N·mm, is the tolerance; the paper tests μ alone, because it solves its systems exactly.
+    Feasibility is not required below the rounding of Qλ − p, which is at most
     4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). In addition each contact must be closed or open:
-    min(y_i, q_ii λ_i) / max_j |a_ji| at most that or √(0.1 mm/N · ε_μ). A contact that touches without a
-    force is off by √(μ q_ii), more than ε_μ guarantees if the contact is compliant; and a gap of y_i is
-    y_i / max_j |a_ji| of displacement, whatever the unit of the contact. For the same reason the root mean
-    square of √(q_ii λ_i y_i) / max_j |a_ji| has that limit; with q_ii ≤ 0.1 mm/N, ε_μ implies it.
+    min(y_i, q_ii λ_i) at most that or √(0.1 mm/N · ε_μ). A contact that touches without a force is off by
+    √(μ q_ii), more than ε_μ guarantees if the contact is compliant. For the same reason the root mean square
+    of √(q_ii λ_i y_i) has that limit; with q_ii ≤ 0.1 mm/N, ε_μ implies it.
 
     If the iteration stalls, because the error of inexact systems in s1 outlasts y or because a step ended
     too close to the boundary, it restarts with a smaller cg_tolerance and theta (details: restarts).
@@ -68,67 +64,46 @@ class Ipm(Solver):
     ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by increasing D.
     theta : fraction of the step to the boundary, in (0, 1).
     sigma : centring parameter of algorithm_2, in [0, 1].
-    rho : residual allowed by stp1 and stp2, as a fraction of λᵀy. epsilon : smallest gap of stp2, mm.
     cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
-    feasibility : error allowed in y = Qλ − p for inexact systems, mm. By default 1e-3 √ε_μ: the error due
-        to μ is proportional to √μ as well.
-    max_iterations : of the scheme, per start or restart. max_cg : of the conjugate gradients, in total.
+    max_cg : limit on the iterations of the conjugate gradients, in total.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
 
-    start: StartName = "algorithm_5"
+    start: str = "algorithm_5"
     scheme: str = "algorithm_3"
     preconditioner: str = "V"
-    ordering: Ordering = "lexicographic"
+    ordering: str = "lexicographic"
     theta: float = 0.995
     sigma: float = 0.1
-    rho: float = 0.1
-    epsilon: float = 0.01
     cg_tolerance: float = 1e-3
-    feasibility: float | None = None
-    max_iterations: int = 200
     max_cg: float = np.inf
 
     def __post_init__(self) -> None:
-        choices: dict[str, Collection[str]] = {
-            "start": get_args(StartName),
-            "scheme": SCHEMES,
-            "preconditioner": (*SYSTEMS, "band"),
-            "ordering": get_args(Ordering),
-        }
-        rules = [
-            (key, getattr(self, key) in known, f"one of {', '.join(known)}") for key, known in choices.items()
-        ]
-        rules += [
-            ("ordering", self.ordering != "open_last" or self.preconditioner == "V", "open_last is for V"),
-            ("theta", 0 < self.theta < 1, "must lie in (0, 1)"),
-            ("sigma", 0 <= self.sigma <= 1, "must lie in [0, 1]"),
-            ("rho", self.rho > 0, "must be positive"),
-            ("epsilon", self.epsilon > 0, "must be positive, mm"),
-            ("cg_tolerance", 0 < self.cg_tolerance < 1, "must lie in (0, 1)"),
-            ("feasibility", self.feasibility is None or self.feasibility > 0, "must be positive, mm"),
-            ("max_iterations", self.max_iterations >= 1, "must be at least 1"),
-            ("max_cg", self.max_cg >= 1, "must be at least 1"),
-        ]
-        faults = [
-            Fault("ipm", key, getattr(self, key), allowed) for key, holds, allowed in rules if not holds
-        ]
-        if faults:
-            raise InputError(faults)
+        systems, orderings = (*SYSTEMS, "band"), ORDERINGS if self.preconditioner == "V" else ORDERINGS[:1]
+        require(
+            "ipm",
+            vars(self),
+            start=(self.start in STARTS, f"must be one of {STARTS}"),
+            scheme=(self.scheme in SCHEMES, f"must be one of {(*SCHEMES,)}"),
+            preconditioner=(self.preconditioner in systems, f"must be one of {systems}"),
+            ordering=(self.ordering in orderings, f"must be one of {ORDERINGS}, open_last with V only"),
+            theta=(0 < self.theta < 1, "must lie in (0, 1)"),
+            sigma=(0 <= self.sigma <= 1, "must lie in [0, 1]"),
+            cg_tolerance=(0 < self.cg_tolerance < 1, "must lie in (0, 1)"),
+            max_cg=(self.max_cg >= 1, "must be at least 1"),
+        )
 
     def prepare(self, data: Problem) -> _Ready | Answer:
         """The factors of Q; a failed answer if Q is not positive definite."""
-        units = np.asarray(abs(data.assembly.A).max(axis=0).toarray(), dtype=float).ravel()
         try:
-            return _Ready(data, self._system(data), units)
+            if self.preconditioner == "band":
+                M = banded_inverse(data.Q, data.assembly.contact_nodes)
+                return _Ready(data, Banded(data.Q, M))
+            kind = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
+            return _Ready(data, kind(data.Q))
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
-
-    def _system(self, data: Problem) -> NewtonSystem:
-        if self.preconditioner == "band":
-            return Banded(data.Q, banded_inverse(data.Q, data.assembly.contact_nodes))
-        return (OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner])(data.Q)
 
     def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
@@ -142,14 +117,19 @@ class Ipm(Solver):
         except (NoStart, np.linalg.LinAlgError) as error:
             return failed(str(error), iterations=0)
         first = newton.at(start.lam, start.y)  # step 3
-        details["start"] = _start_details(start, first)
-        status, cause, point = self._iterate(newton, first, tolerance, ready.units)
+        details["start"] = {
+            "mu": first.mu,
+            "infeasibility_mm": float(abs(first.s1).max()),
+            "corrections": start.corrections,
+            "multiplications": start.multiplications,
+        }
+        status, cause, point = self._iterate(newton, first, tolerance)
         for restart, (cg_tolerance, theta) in enumerate(RESTARTS, start=1):
             if status != "inaccurate":
                 break
             newton.cg_tolerance = min(newton.cg_tolerance, cg_tolerance)
             newton.theta = min(newton.theta, theta)
-            status, cause, point = self._iterate(newton, first, tolerance, ready.units)
+            status, cause, point = self._iterate(newton, first, tolerance)
             details["restarts"] = restart
         if newton.unconverged:
             details["cg_unconverged"] = newton.unconverged
@@ -166,9 +146,9 @@ class Ipm(Solver):
     def _start(self, problem: Problem, load: LoadCase, details: dict[str, Any]) -> Start:
         match self.start:
             case "stp1":
-                return stp1(problem.Q, load.p, self.rho)
+                return stp1(problem.Q, load.p, RHO)
             case "stp2":
-                return stp2(problem.Q, load.p, self.rho, self.epsilon)
+                return stp2(problem.Q, load.p, RHO, LEAST_GAP)
             case "mehrotra":
                 return mehrotra_start(problem.Q, load.p)
         try:
@@ -179,20 +159,11 @@ class Ipm(Solver):
             details["start_instead"] = f"mehrotra, because {error}"
             return mehrotra_start(problem.Q, load.p)
 
-    def _iterate(
-        self, newton: NewtonSteps, point: Point, tolerance: float, units: Vector
-    ) -> tuple[Status, str, Point]:
+    def _iterate(self, newton: NewtonSteps, point: Point, tolerance: float) -> tuple[Status, str, Point]:
         """Algorithm 3, steps 4 to 8: status, cause and the last finite point."""
-        feasibility = self.feasibility or FEASIBILITY * np.sqrt(tolerance)
         smallest, stalled = np.inf, 0
-        for _ in range(self.max_iterations):  # step 4
-            rounding = _rounding(newton, point.lam)
-            measure = max(
-                point.mu / tolerance,
-                point.infeasibility / max(feasibility, rounding),
-                _undecided(newton, point, units) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
-                _gap(newton, point, units) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
-            )
+        for _ in range(MAX_ITERATIONS):  # step 4
+            measure = self._measure(newton, point, tolerance)
             if measure <= 1:
                 return "solved", "", point
             stalled = 0 if measure < smallest else stalled + 1
@@ -206,38 +177,21 @@ class Ipm(Solver):
                 return "iteration_limit", f"max_cg = {self.max_cg:g} CG iterations reached", point
             except np.linalg.LinAlgError as error:
                 return "inaccurate", f"Q + D is no longer positive definite: {error}", point
-            if not _is_inside(following):
+            values = np.concatenate([following.lam, following.y])
+            if not (np.isfinite(values) & (values > 0)).all():
                 return "failed", "λ or y is no longer finite and positive", point
             point = following
-        return "iteration_limit", f"max_iterations = {self.max_iterations}", point
+        return "iteration_limit", f"{MAX_ITERATIONS} iterations", point
 
-
-def _start_details(start: Start, point: Point) -> dict[str, float]:
-    return {
-        "mu": point.mu,
-        "infeasibility_mm": float(abs(point.s1).max()),
-        "corrections": start.corrections,
-        "multiplications": start.multiplications,
-    }
-
-
-def _undecided(newton: NewtonSteps, point: Point, units: Vector) -> float:
-    """max min(y_i, q_ii λ_i) / max_j |a_ji|: the largest distance from being closed or open, mm."""
-    return float((np.minimum(point.y, np.diag(newton.Q) * point.lam) / units).max())
-
-
-@np.errstate(over="ignore")
-def _gap(newton: NewtonSteps, point: Point, units: Vector) -> float:
-    """√(Σ q_ii λ_i y_i / m) / max_j |a_ji|: μ as a displacement, mm."""
-    return float(np.sqrt((np.diag(newton.Q) * point.lam * point.y / units**2).mean()))
-
-
-def _rounding(newton: NewtonSteps, lam: Vector) -> float:
-    """Bound on the rounding error of Qλ − p, mm."""
-    root = np.sqrt(np.diag(newton.Q))
-    return 4 * EPS * float((abs(newton.p) + root * (root @ lam)).max())
-
-
-def _is_inside(point: Point) -> bool:
-    values: Vector = np.concatenate([point.lam, point.y])
-    return bool(np.isfinite(values).all() and (values > 0).all())
+    @np.errstate(over="ignore")
+    def _measure(self, newton: NewtonSteps, point: Point, tolerance: float) -> float:
+        """The largest ratio of a quantity of the stopping rule to what it may be."""
+        force, y = np.diag(newton.Q) * point.lam, point.y
+        rounding = largest_rounding(np.diag(newton.Q), newton.p, point.lam)
+        undecided = float(np.minimum(y, force).max())
+        spread = float(np.sqrt((force * y).mean()))
+        return max(
+            point.mu / tolerance,
+            point.infeasibility / max(FEASIBILITY * np.sqrt(tolerance), rounding),
+            max(undecided, spread) / max(np.sqrt(CONTACT_COMPLIANCE * tolerance), rounding),
+        )

@@ -1,9 +1,8 @@
 """A fast primal–dual interior-point method on the dual form; each ingredient can be switched off.
 
 Mehrotra's predictor–corrector (one matrix, two right-hand sides per iteration) from the start STP2; Newton
-systems by conjugate gradients with a banded M ≈ Q⁻¹, or, where Q does not decay along the joint, factored in
-single precision and refined in double; and, once most closed contacts are separated from open ones, an exact
-finish on the active set it identified. The paper's method is `ipm`.
+systems by conjugate gradients with a banded M ≈ Q⁻¹; and, once most closed contacts are separated from open
+ones, an exact finish on the active set it identified. The paper's method is `ipm`.
 """
 
 from __future__ import annotations
@@ -13,14 +12,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from problems.errors import Fault, InputError
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, failed
 from solvers.interior_point.banded import Banded
-from solvers.interior_point.infeasible_start import stp2
 from solvers.interior_point.newton_system import Direct, NewtonSystem
-from solvers.interior_point.schemes import NewtonSteps, Point, mehrotra
+from solvers.interior_point.schemes import NewtonSteps, mehrotra
 from solvers.interior_point.single_precision import SinglePrecision
-from solvers.interior_point.start import NoStart, algorithm_5
+from solvers.interior_point.start import NoStart, algorithm_5, stp2
+from solvers.settings import require
 
 from .newton import DualState
 
@@ -30,18 +28,17 @@ RHO = 10.0  # with 0.1 the start is up to a hundred times as large, and far from
 REFINEMENT = 1e-2  # ‖b − Hv‖ ≤ 1e-2 ‖b‖: per iteration, the error in y = Qλ − p shrinks by that or by 1 − α
 MAX_ITERATIONS = 100
 STALLED = 10
-LIMIT = {"cause": f"{MAX_ITERATIONS} iterations"}
 IDENTIFICATION_RATIO = 1e-4  # of the initial μ: above, a contact may look closed before it has moved
 UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 
 
 @dataclass(frozen=True)
 class _Ready:
-    problem: Problem
     system: NewtonSystem
     finish: DualState
 
 
+@dataclass(kw_only=True, frozen=True, eq=False)
 class FastIpm(Solver):
     """Interior point with an exact finish on the active set it identified.
 
@@ -49,7 +46,7 @@ class FastIpm(Solver):
     of its initial value and at most m/4 contacts are undecided, or when the interior point ends; its status
     is the answer's. The interior point ends when the natural residual max|min(q_ii λ_i, (Qλ − p)_i)| is at
     most the tolerance, mm, or has not decreased for 10 iterations. Iterations are Newton matrices, inner
-    iterations the contact sets of the finish.
+    iterations the finish's products with Q.
 
     Options
     -------
@@ -60,23 +57,23 @@ class FastIpm(Solver):
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
 
-    def __init__(
-        self, *, finish: bool = True, single: bool = True, start_at_gaps: bool = True, band: bool = True
-    ) -> None:
-        given = {"finish": finish, "single": single, "start_at_gaps": start_at_gaps, "band": band}
-        wrong = {key: value for key, value in given.items() if value not in (True, False)}
-        if wrong:
-            raise InputError([Fault("ipm-fast", k, v, "must be true or false") for k, v in wrong.items()])
-        self.finish, self.single, self.start_at_gaps, self.band = finish, single, start_at_gaps, band
+    finish: bool = True
+    single: bool = True
+    start_at_gaps: bool = True
+    band: bool = True
+
+    def __post_init__(self) -> None:
+        rules = {key: (isinstance(value, bool), "must be true or false") for key, value in vars(self).items()}
+        require("ipm-fast", vars(self), **rules)
 
     def prepare(self, data: Problem) -> _Ready | Answer:
-        """M, or else Q⁻¹ and Q in single precision; a failed answer if Q is not positive definite."""
+        """M, and what the systems need; a failed answer if Q is not positive definite."""
         finish = DualState.of(data)
         if isinstance(finish, Answer):
             return finish
         if self.band and (M := finish.sweeps.M):
-            return _Ready(data, Banded(data.Q, M), finish)
-        return _Ready(data, SinglePrecision(data.Q) if self.single else Direct(data.Q), finish)
+            return _Ready(Banded(data.Q, M), finish)
+        return _Ready((SinglePrecision if self.single else Direct)(data.Q), finish)
 
     def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
         if isinstance(ready, Answer):
@@ -87,7 +84,7 @@ class FastIpm(Solver):
             return failed(str(error))
 
     def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
-        Q, p, system = ready.problem.Q, load.p, ready.system
+        Q, p, system = ready.system.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()
         newton = NewtonSteps(Q, p, system, THETA, 0.0, REFINEMENT, np.inf)
@@ -105,17 +102,15 @@ class FastIpm(Solver):
             done = residual <= tolerance or stalled == STALLED
             if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
                 answer = ready.finish.solve_from(ratio > 1, point.lam, load, tolerance)
-                details |= {key: value for key, value in answer.details.items() if key != "products"}
+                details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
+            if residual <= tolerance:
+                return Answer("solved", point.lam, iterations=k, details=details)
             if done:
-                return self._ended(point, k, residual <= tolerance, details)
+                details["cause"] = f"rounding: optimal to {residual:.1e} mm only"
+                return Answer("inaccurate", point.lam, iterations=k, details=details)
             point = mehrotra(newton, point)
             if not np.isfinite(point.mu):
-                return Answer("failed", None, iterations=k, details=details | {"cause": "λ or y overflowed"})
-        return Answer("iteration_limit", point.lam, iterations=MAX_ITERATIONS, details=details | LIMIT)
-
-    def _ended(self, point: Point, iterations: int, solved: bool, details: dict[str, Any]) -> Answer:
-        if solved:
-            return Answer("solved", point.lam, iterations=iterations, details=details)
-        cause = f"rounding: optimal to {details['natural_residual_mm']:.1e} mm only"
-        return Answer("inaccurate", point.lam, iterations=iterations, details=details | {"cause": cause})
+                return failed("λ or y overflowed", k)
+        details["cause"] = f"{MAX_ITERATIONS} iterations"
+        return Answer("iteration_limit", point.lam, iterations=MAX_ITERATIONS, details=details)

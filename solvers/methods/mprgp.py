@@ -18,17 +18,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from problems.errors import Fault, InputError
 from problems.forms.assembly import Vector
-from problems.forms.banded_inverse import BandedInverse
 from problems.forms.compliance import Compliance
-from problems.forms.prepared import Prepared
 from problems.stiffness.block import NotPositiveDefinite
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, WarmStart, failed
 from solvers.dense_dual import first_point
-from solvers.gradient_projection.metric import Band, Diagonal, Face, Metric, step_length
-from solvers.gradient_projection.proportioning import Proportioning, SparseProportioning
+from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
+from solvers.gradient_projection.proportioning import Proportioning
 from solvers.kkt import kkt_residual, largest_rounding
+from solvers.settings import require
 from solvers.sparse_dual import with_p, with_x
 
 PRECONDITIONERS = ("band", "face", "none")
@@ -36,28 +34,16 @@ PRECONDITIONERS = ("band", "face", "none")
 
 @dataclass(frozen=True)
 class _Ready:
-    """diagonal : of Q, or about that. metric : makes a load case's own. prepared : of the sparse form."""
+    """diagonal : of Q, or about that. metric : makes a load case's own. start : a solved case, if any."""
 
+    problem: Problem
     Q: Compliance
     diagonal: Vector
-    metric: Callable[[], Metric]
-    prepared: Prepared | None = None
+    metric: Callable[[], Diagonal]
     start: WarmStart | None = None
 
-    def proportioning(self, load: LoadCase, metric: Metric) -> Proportioning:
-        """load : with p."""
-        if self.prepared is None:
-            point = first_point(self.start, load)
-            return Proportioning(self.Q, load.p, self.diagonal, metric, *point)
-        start = self.start
-        if start is not None:
-            start = replace(start, load=with_p(self.prepared, [start.load])[0])
-        point = first_point(start, load)
-        return SparseProportioning(
-            self.Q, load.p, self.diagonal, metric, *point, prepared=self.prepared, load=load
-        )
 
-
+@dataclass(kw_only=True, frozen=True, eq=False)
 class Mprgp(Solver):
     """MPRGP with Γ = 1, from λ = 0 or a warm start.
 
@@ -76,17 +62,16 @@ class Mprgp(Solver):
 
     forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
 
-    def __init__(self, *, preconditioner: str = "band", max_products: int = 100_000) -> None:
-        faults = []
-        if preconditioner not in PRECONDITIONERS:
-            faults.append(
-                Fault("mprgp", "preconditioner", preconditioner, f"must be one of {PRECONDITIONERS}")
-            )
-        if max_products < 1:
-            faults.append(Fault("mprgp", "max_products", max_products, "must be at least 1"))
-        if faults:
-            raise InputError(faults)
-        self.preconditioner, self.max_products = preconditioner, max_products
+    preconditioner: str = "band"
+    max_products: int = 100_000
+
+    def __post_init__(self) -> None:
+        require(
+            "mprgp",
+            vars(self),
+            preconditioner=(self.preconditioner in PRECONDITIONERS, f"must be one of {PRECONDITIONERS}"),
+            max_products=(self.max_products >= 1, "must be at least 1"),
+        )
 
     def prepare(self, data: Problem) -> _Ready | Answer:
         """M and ᾱ, by 30 products, as the option needs them.
@@ -99,18 +84,17 @@ class Mprgp(Solver):
             return failed(f"K is not positive definite: {error}")
         except np.linalg.LinAlgError as error:
             return failed(f"Q is not positive definite: {error}")
-        if near.M is None:
+        Q, diagonal, M = data.prepared.compliance, near.diagonal, near.M
+        if M is None:
             return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
-        Q, sparse = data.prepared.compliance, "x" in data.needs
-        metric = self._metric(Q, near.diagonal, near.M)
-        return _Ready(Q, near.diagonal, metric, data.prepared if sparse else None)
-
-    def _metric(self, Q: Compliance, diagonal: Vector, M: BandedInverse | None) -> Callable[[], Metric]:
-        if M is None or self.preconditioner == "none":
-            return partial(Diagonal, diagonal, step_length(Q, diagonal))
-        if self.preconditioner == "band":
-            return partial(Band, M, diagonal)
-        return partial(Face, M, diagonal, step_length(Q, diagonal))
+        metric: Callable[[], Diagonal]
+        if self.preconditioner == "none":
+            metric = partial(Diagonal, diagonal, step_length(Q, diagonal))
+        elif self.preconditioner == "face":
+            metric = partial(Face, diagonal, step_length(Q, diagonal), M)
+        else:
+            metric = partial(Band, diagonal, 1.0, M)
+        return _Ready(data, Q, diagonal, metric)
 
     def update(
         self, state: _Ready | Answer, ready: object, load: LoadCase, tolerance: float, start: WarmStart
@@ -127,9 +111,16 @@ class Mprgp(Solver):
             return failed(str(error))
 
     def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+        prepared, sparse, start = ready.problem.prepared, "x" in ready.problem.needs, ready.start
+        given = with_p(prepared, [load])[0] if sparse else load
+        if sparse and start is not None:
+            start = replace(start, load=with_p(prepared, [start.load])[0])
+
+        def gaps(lam: Vector) -> Vector:
+            return prepared.gaps(lam[:, None], [given])[:, 0]
+
         metric = ready.metric()
-        given = load if ready.prepared is None else with_p(ready.prepared, [load])[0]
-        case = ready.proportioning(given, metric)
+        case = Proportioning(ready.Q, given.p, ready.diagonal, metric, gaps, *first_point(start, given))
         enough = case.solve(tolerance, self.max_products)
         residual = kkt_residual(case.lam, case.y)
         solved = residual <= max(tolerance, largest_rounding(ready.diagonal, given.p, case.lam))
@@ -141,4 +132,4 @@ class Mprgp(Solver):
             details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
         steps = sum(case.steps.values())
         answer = Answer(status, case.lam, iterations=steps, inner_iterations=metric.sets, details=details)
-        return answer if ready.prepared is None else with_x(ready.prepared, [answer], [load], tolerance)[0]
+        return with_x(prepared, [answer], [load], tolerance)[0] if sparse else answer

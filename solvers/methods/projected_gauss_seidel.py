@@ -10,22 +10,24 @@ which converges for 0 < ω < 2, by a factor of about 1 − 1/cond(Q) per sweep: 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.linalg import blas
 
-from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Answer, LoadCase
 from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
 from solvers.kkt import kkt_residual, kkt_status, rounding_of
+from solvers.settings import require
 
 CHECKED = 10  # sweeps after which y is computed anew
 SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slower is as good as never
 
 
+@dataclass(kw_only=True, frozen=True, eq=False)
 class ProjectedGaussSeidel(DenseDualSolver):
     """Projected Gauss–Seidel, from λ = 0 or a warm start.
 
@@ -39,15 +41,16 @@ class ProjectedGaussSeidel(DenseDualSolver):
     max_sweeps : limit on the sweeps.
     """
 
-    def __init__(self, *, relaxation: float = 1.5, max_sweeps: int = 1_000_000) -> None:
-        where, faults = "projected-gauss-seidel", []
-        if not 0 < relaxation < 2:
-            faults.append(Fault(where, "relaxation", relaxation, "must be between 0 and 2"))
-        if max_sweeps < 1:
-            faults.append(Fault(where, "max_sweeps", max_sweeps, "must be at least 1"))
-        if faults:
-            raise InputError(faults)
-        self.relaxation, self.max_sweeps = relaxation, max_sweeps
+    relaxation: float = 1.5
+    max_sweeps: int = 1_000_000
+
+    def __post_init__(self) -> None:
+        require(
+            "projected-gauss-seidel",
+            vars(self),
+            relaxation=(0 < self.relaxation < 2, "must be between 0 and 2"),
+            max_sweeps=(self.max_sweeps >= 1, "must be at least 1"),
+        )
 
     def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
