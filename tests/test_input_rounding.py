@@ -131,7 +131,7 @@ def test_the_bound_holds_for_the_problem_as_it_was_taken(
         (K,) = made.assembly.K.matrices
         assert (K == K.T).all()
         known = best_of_candidates(made, load)
-        assert known.route.startswith("proven")
+        assert known.bound_mm < np.inf
         assert error_of(known.x, made.assembly, load) <= Fraction(known.bound_mm)
 
 
