@@ -153,7 +153,7 @@ def _problem(of: Row) -> Row:
     return {
         "scene": of["scene"], "title": "made up", "n": of["n"], "m": of["m"], "active": of["active"],
         "cond_K": COND.get(of["n"], 1e6), "lambda_min": 1.0, "lambda_max": 1e6, "build_s": build,
-        "reference_s": 1.0, "reference_bound_mm": 1e-14, "reference_route": "refined active set",
+        "reference_s": 1.0, "reference_bound_mm": 1e-14, "reference_route": "newton, refined",
     }  # fmt: skip
 
 

@@ -48,8 +48,8 @@ def allowed(name: str, prepared: Prepared, case: LoadCase, x: Vector, lam: Vecto
     """max|x − x*|, mm, that cond(K) and the solver's tolerance τ explain.
 
     100 cond(K) 2⁻⁵³ max(|x|, |K⁻¹f|), x being what is left of K⁻¹f − K⁻¹Aλ; and besides
-    (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and sᵀλ ≤ τ(m + Σλ): the bound that
-    harness/verification/certificate.py derives. PIQP looks at λ ≥ 0 in a scaling of its own and was seen
+    (‖r‖₂/√κ + √(sᵀλ))/√κ, κ = λmin(K), with ‖r‖₂ ≤ τ√n and sᵀλ ≤ τ(m + Σλ): ‖x − x*‖²_K is at most
+    (x − x*)ᵀr + sᵀλ. PIQP looks at λ ≥ 0 in a scaling of its own and was seen
     to leave −3.5τ; a λ ≥ −10τ adds s*ᵀ10τ to sᵀλ, for (s* − s)ᵀ(λ* − λ) then is at most sᵀλ − s*ᵀλ.
     Clarabel's τ is a share of the data where that is above 1.
     """

@@ -116,7 +116,7 @@ def _problem(scene: str, n: int, active: int) -> dict[str, Any]:
         "scene": scene, "title": "Initial gap of 0.6 mm, pressed by fasteners", "n": n, "m": n // 2,
         "active": active, "cond_K": COND[n], "lambda_min": 1.0, "lambda_max": COND[n],
         "build_s": {"condense": 15.0 * n / 4386, "factor": 5.0 * n / 4386}, 
-        "reference_bound_mm": 3e-12, "reference_route": "active set, refined",
+        "reference_bound_mm": 3e-12, "reference_route": "newton, refined",
     }  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
 
 PAIRS = [{"pair": ["a", "b"], "start": 0, "stop": 2}, {"pair": ["b", "tool"], "start": 2, "stop": 4}]
 CASES = 12
@@ -85,7 +86,7 @@ def drawn(rng: np.random.Generator) -> Drawn:
     exact = [
         Fraction(g[j]) - sum((Fraction(A[i, j]) * moved[i] for i in range(n)), Fraction()) for j in range(m)
     ]
-    return Drawn(Assembly((np.eye(n),), sp.csc_array(A)), g, x, error_mm, exact)
+    return Drawn(Assembly(Stiffness.of(np.eye(n)), sp.csc_array(A)), g, x, error_mm, exact)
 
 
 def test_pass_and_fail_are_those_of_the_exact_gaps() -> None:
@@ -109,7 +110,7 @@ def test_pass_and_fail_are_those_of_the_exact_gaps() -> None:
 
 def test_the_error_of_a_gap_is_no_wider_than_its_terms() -> None:
     """‖a‖₁ e, or three roundings of |g| + |a|ᵀ|x| for one entry."""
-    of = GapError.of(Assembly((np.eye(1),), sp.csc_array([[3.0]])))
+    of = GapError.of(Assembly(Stiffness.of(np.eye(1)), sp.csc_array([[3.0]])))
     assert of(np.array([1.0]), np.array([0.0]), 1e-3) == pytest.approx(3e-3, rel=0.011)
     assert of(np.array([6.0]), np.array([2.0]), 0.0) == pytest.approx(3 * 2.0**-53 * 12, rel=0.011)
     assert of(np.array([6.0]), np.array([2.0]), np.inf) == np.inf

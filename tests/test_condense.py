@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from harness.verification.principal_pivoting import contact_set
 from joints import dof, make_joint, make_scene
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
+from small import solve_by_nnls
 
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
@@ -155,10 +155,7 @@ def strip() -> Prepared:
 def pressed(strip: Prepared, q: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Deflection and contact force of each node line under q N/mm."""
     load = LoadCase(np.full(strip.assembly.n, q * H / 2), np.full(strip.assembly.m, GAP))
-    active = contact_set(strip.Q, strip.dual_load(load))
-    p, lam = strip.dual_load(load), np.zeros(strip.assembly.m)
-    lam[active] = np.linalg.solve(strip.Q[np.ix_(active, active)], p[active])
-    x = strip.recover(lam, load)
+    x, lam = solve_by_nnls(strip, load)
     assert (lam >= 0).all()
     assert (load.g - strip.assembly.A.T @ x >= -1e-9).all()
     return x.reshape(-1, 2).mean(axis=1), lam.reshape(-1, 2).sum(axis=1)
@@ -212,10 +209,4 @@ def test_two_equal_parts_are_one_part_on_a_tool_at_half_the_gap() -> None:
 
 
 def solve(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    made = prepared(scene)
-    load = load_case(scene)
-    p = made.dual_load(load)
-    active = contact_set(made.Q, p)
-    lam = np.zeros(len(p))
-    lam[active] = np.linalg.solve(made.Q[np.ix_(active, active)], p[active])
-    return made.recover(lam, load), lam
+    return solve_by_nnls(prepared(scene), load_case(scene))

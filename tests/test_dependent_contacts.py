@@ -131,5 +131,6 @@ def test_contacts_that_the_rounding_of_Q_makes_dependent_are_said() -> None:
     A[range(50, N), range(50, N)] += 2.0**-19
     load = LoadCase(np.ones(N), np.zeros(N))
     scene = own_matrices((K + K.T) / 2, A, load.f, load.g)
-    with pytest.raises(InputError, match=r"Q = AᵀK⁻¹A .* must be positive definite"):
-        list(solve_series(scene, [load], form="dual"))
+    (result,) = solve_series(scene, [load], form="dual")
+    assert result.row["status"] == "failed"
+    assert "Q is not positive definite" in result.row["message"]

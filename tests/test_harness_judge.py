@@ -65,7 +65,7 @@ def test_a_pulling_force_in_balance_is_a_residual() -> None:
 @pytest.mark.parametrize(("gap", "moved", "mismatch"), [(1.5e-7, 0.9e-7, 0), (2.5e-7, 1.6e-7, 1)])
 def test_a_gap_below_twice_the_limit_may_be_closed(gap: float, moved: float, mismatch: int) -> None:
     """A spring of 1 N/mm before a tool, at rest in the reference; the answer moves it to below the limit."""
-    prepared = Prepared(Assembly((np.eye(1),), sp.csc_array([[1.0]])))
+    prepared = Prepared(Assembly(Stiffness.of(np.eye(1)), sp.csc_array([[1.0]])))
     load = LoadCase(np.zeros(1), np.array([gap]))
     reference = Reference(np.zeros(1), np.zeros(1), np.array([False]), 1e-15, "by hand")
     found = judge(prepared, load, reference, np.array([moved]), np.zeros(1), 1e-7)

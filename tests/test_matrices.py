@@ -107,15 +107,16 @@ def test_interleaved_blocks_become_one(tmp_path: Path) -> None:
         ([100, 700, 100, 600], [100, 700, 700]),  # no larger than the largest body
     ],
 )
-def test_blocks_of_different_sizes(bodies: list[int], blocks: list[int], tmp_path: Path) -> None:
+def test_blocks_of_different_sizes(bodies: list[int], blocks: list[int]) -> None:
     K = sp.csr_array(sp.block_diag([np.ones((size, size)) + np.eye(size) for size in bodies]))
     n = K.shape[0]
     data = {"K": K, "A": sp.eye_array(n, 1), "f": np.zeros(n), "g": np.zeros(1)}
-    made, _ = checked(data, {})
+    where = dict.fromkeys("KAfg", "mine")
+    made, _ = checked(data, where)
     assert [len(block) for block in made.K.matrices] == blocks
     assert len(made.parts) == len(blocks)
     assert (sp.block_diag(made.K.matrices) != K).nnz == 0
-    (whole,) = checked(data, {}, sparse=True)[0].K.matrices
+    (whole,) = checked(data, where, sparse=True)[0].K.matrices
     assert (whole != K).nnz == 0
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from harness.planning import road
 from harness.planning.road import chosen_form
+from problems.full_model.joint_model import JointModel
 from problems.scene import read_scene
 from solvers.base import FORMS
 
@@ -14,7 +15,7 @@ SCENE = read_scene("11308/4300")
 
 @pytest.fixture(autouse=True)
 def _new_assembly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(road, "built", lambda scene: False)
+    monkeypatch.setattr(JointModel, "built", False)
     monkeypatch.setattr(road, "physical_memory_mib", lambda: 1 << 20)
 
 

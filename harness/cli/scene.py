@@ -23,7 +23,7 @@ def solve(
     *,
     out: Annotated[Path, option("DIR", "Output directory.")],
     solver: Annotated[
-        str | None, option("NAME", "A solver by name.  [default: the active-set method of the references]")
+        str | None, option("NAME", "A solver by name.  [default: in-house methods, until one is proven]")
     ] = None,
     tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
     form: Annotated[

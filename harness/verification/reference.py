@@ -94,8 +94,8 @@ def best_of_candidates(
             break
     if best is None:  # no method gave an answer
         (best,), route = proof.proven([load], [np.zeros(prepared.assembly.m)]), "no forces"
-    said = "proven" if np.isfinite(best.bound_mm) else UNPROVEN
-    return Reference(best.x.hi, best.lam.hi, best.active, best.bound_mm, f"{said}: {route}{stopped}")
+    said = "" if np.isfinite(best.bound_mm) else f"{UNPROVEN}: "
+    return Reference(best.x.hi, best.lam.hi, best.active, best.bound_mm, f"{said}{route}{stopped}")
 
 
 def proof_of(prepared: Prepared) -> Proof:
