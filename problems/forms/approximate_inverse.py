@@ -41,11 +41,7 @@ def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse:
     windows = Windows.of(nodes, m)
     if (WINDOW_LINES + 1) * windows.across <= WIDEST_WINDOW * m:
         M = of_windows(windows, Q.local(windows.contacts(), False))
-        e, sizes = np.random.default_rng(0).standard_normal(m), []
-        for _ in range(STEPS):
-            e[M.order] -= M.product((Q @ e)[M.order])
-            sizes.append(float(np.linalg.norm(e)))
-        if sizes[-1] <= CONTRACTION * sizes[-2]:
+        if _contracts(M, Q):
             return ApproximateInverse(M, diagonal)
     return ApproximateInverse(
         of_windows(Windows(np.arange(m), m), lambda _: np.array(Q.Q, order="F")), diagonal
@@ -56,8 +52,8 @@ def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> Approxim
     """From local blocks of `like`, a Q of the same contacts: in single precision, in double where some block
     is not positive definite in that. Of few contacts without coordinates M = Q⁻¹.
 
-    No M where K has no band, and of many contacts all over an area, where M takes longer than some
-    factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is indefinite.
+    No M where K has no band, where M is no good, and of many contacts all over an area, where M takes longer
+    than some factorisations of K; the diagonal then is Σ_i a_ij²/k_ii. Raises LinAlgError if Q is indefinite.
     """
     m, windows = assembly.m, _along_bands(assembly)
     few = m <= FEW
@@ -69,7 +65,18 @@ def of_products(assembly: Assembly, Q: Compliance, like: Compliance) -> Approxim
             with suppress(np.linalg.LinAlgError):
                 found = _from_windows(like, windows, single=True)
         found = found or _from_windows(like, windows, single=False)
-    return found or ApproximateInverse(None, assembly.A.power(2).T @ (1 / assembly.K.diagonal))
+    if found and found.M and _contracts(found.M, Q):
+        return found
+    return ApproximateInverse(None, assembly.A.power(2).T @ (1 / assembly.K.diagonal))
+
+
+def _contracts(M: BandedInverse, Q: Compliance) -> bool:
+    """Whether e ← e − MQe converges fast."""
+    e, sizes = np.random.default_rng(0).standard_normal(len(M.order)), []
+    for _ in range(STEPS):
+        e[M.order] -= M.product((Q @ e)[M.order])
+        sizes.append(float(np.linalg.norm(e)))
+    return sizes[-1] <= CONTRACTION * sizes[-2]
 
 
 def _from_windows(Q: Compliance, windows: Windows, single: bool) -> ApproximateInverse | None:
