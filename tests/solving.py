@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from harness.measurement.solver_session import SolverSession
 
+from harness.solving.session import SolverSession
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form

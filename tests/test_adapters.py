@@ -11,12 +11,12 @@ import pytest
 import qpsolvers
 import scipy.linalg as sla
 import scipy.sparse as sp
-from harness.measurement.solver_session import SolverSession
 from proxsuite import proxqp
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 from solving import TESTED
 
 from harness.conformance.check import run
+from harness.solving.session import SolverSession
 from problems.forms.problem import in_form
 from solvers.adapter import answer, dense, upper_triangle
 from solvers.base import DENSE_FORMS, FORMS, Form

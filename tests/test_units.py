@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from harness.measurement.solver_session import SolverSession
 from small import make_load, make_prepared, solve_by_nnls
 from solving import CASES, SLOW, TESTED, TOLERANCES
 
+from harness.solving.session import SolverSession
 from harness.verification.reference import reference
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase, Vector

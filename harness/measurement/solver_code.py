@@ -1,8 +1,7 @@
 """The fingerprint in each row of the code that can change a solver's answer or its time.
 
-The code is the solver's own file and what it imports from the package `solvers`, directly or indirectly,
-never another solver's; and of a plug-in, what it imports of the user's own. The version of the library is a
-field of its own.
+The code is the solver's own file and what it imports from the package `solvers`, directly or indirectly;
+and of a plug-in, what it imports of the user's own. The version of the library is a field of its own.
 """
 
 from __future__ import annotations
