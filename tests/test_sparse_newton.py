@@ -23,7 +23,6 @@ from problems.scene import read_scene, scene_names
 from problems.stiffness.banded import BandedBlock
 from problems.stiffness.general import GeneralBlock
 from problems.stiffness.operator import Stiffness
-from solvers.active_set import sparse_newton
 from solvers.base import Answer
 from solvers.registry import make_solver
 
@@ -65,7 +64,6 @@ def test_a_scene_of_the_gallery(name: str) -> None:
     out_of_balance = data.assembly.K.multiply(answer.x) + data.assembly.A @ answer.lam - load.f
     assert abs(out_of_balance).max() <= 1e-9 * data.assembly.K.norm * abs(answer.x).max()
     assert answer.details["closed"] == pytest.approx(known.active.sum(), abs=2)  # weakly active ones
-    assert answer.details.get("factorisations") is None  # settled by sweeps
 
 
 def cases(data: Prepared, seed: int, count: int) -> list[LoadCase]:
@@ -118,39 +116,18 @@ def test_a_warm_start_saves_contact_sets() -> None:
     assert warm.inner_iterations < cold.inner_iterations
 
 
-@pytest.mark.parametrize("forced", ["one sweep", "no band"])
 @pytest.mark.parametrize("dense", SMALL)
-def test_what_sweeps_do_not_settle_is_settled_by_sets(
-    dense: Prepared, forced: str, monkeypatch: pytest.MonkeyPatch
+def test_without_m_the_sets_are_solved_by_factorisations_of_k(
+    dense: Prepared, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if forced == "one sweep":
-        monkeypatch.setattr(sparse_newton, "MAX_SWEEPS", 1)
-    else:
-        monkeypatch.setattr(Stiffness, "local_compliance", lambda *_: None)
-    monkeypatch.setattr(approximate_inverse, "FEW", -1)  # else M is exact, and one sweep enough
-    by_sets = 0
-    for load in cases(dense, 6, 3):
-        session = session_of(dense)
-        assert (session.batch is None) == (forced == "no band")
-        answers = [session.next(load, None), session.next(load, session.nearest(load))]
-        answers += session.solve_batch([load, load]) if session.batch else []
-        for answer in answers:
-            check(answer, *solve_by_nnls(dense, load))
-            by_sets += "factorisations" in answer.details
-    assert by_sets
-
-
-@pytest.mark.parametrize("name", ["gallery/heavy-sheet-on-tool", "gallery/sheet-over-former"])
-def test_sets_alone_solve_a_scene(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Stiffness, "local_compliance", lambda *_: None)
-    scene = read_scene(name)
-    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    (load,) = cases(dense, 6, 1)
+    check(session_of(dense).next(load, None), *solve_by_nnls(dense, load))  # few: M = Q⁻¹
+    monkeypatch.setattr(approximate_inverse, "FEW", -1)
+    blocks = [sp.csc_array(K) for K in dense.assembly.K.matrices]
+    data = Prepared(Assembly(Stiffness.of(*blocks), dense.assembly.A))
     answer = session_of(data).next(load, None)
-    known = best_of_candidates(data, load)
-    assert answer.status == "solved"
-    assert answer.x is not None
-    assert answer.details["factorisations"] >= 1
-    assert abs(data.assembly.at_junction(answer.x - known.x)).max() <= LIMIT_MM
+    check(answer, *solve_by_nnls(dense, load))
 
 
 @pytest.mark.parametrize("with_nodes", [False, True])

@@ -6,25 +6,33 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from problems.forms.assembly import Vector
 
-from .bordered_factor import Set
-from .contact_sets import TrialSolution
-
-MAX_STALE_PASSES = 50  # passes without a new smallest count of wrong signs, before single exchanges
-MAX_SINGLE_EXCHANGES = 100  # of these without one, before it gives up: there may be exponentially many
+MAX_STALE_PASSES = 10  # passes without a new smallest count of wrong signs, before steps of descent
 ROUNDING_FACTOR = 10.0  # times the observed rounding: a value closer to zero has no wrong sign
+
+Set = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class TrialSolution:
+    """λ (m,) N, zero off the set, y (m,) mm, and the estimated rounding error on the active set, mm."""
+
+    lam: Vector
+    y: Vector
+    rounding: float
 
 
 @dataclass(frozen=True)
 class PivotingResult:
-    """The contact set, its λ and y, the sets tried, and whether every sign is right."""
+    """The contact set, its λ and y, the sets tried, the steps of descent, and whether every sign is right."""
 
     C: Set
     trial: TrialSolution
     passes: int
-    single_exchanges: int
+    descents: int
     converged: bool
 
 
@@ -41,25 +49,35 @@ def block_pivoting(
 
     Each pass exchanges every index with a wrong sign. A pass without a new smallest count of these only opens
     contacts, as long as a force is negative, and closes contacts once none is (as Hungerländer and Rendl 2015
-    reach a feasible point): this stops the oscillation that a few forces on a stiff part cause. After fifty
-    such passes only the last wrong index is exchanged, until there is a new smallest count: finite for Q
-    positive definite, in exact arithmetic (Júdice and Pires 1994), but exponential at worst, so that a
-    hundred without one end it: `single_exchanges` then are at least as many, and it has not converged.
+    reach a feasible point): this stops the oscillation that a few forces on a stiff part cause. After ten
+    such passes λ ≥ 0 moves towards the forces of each set, until the first of them is zero and opens; once
+    none is negative, every wrong index closes (Lawson and Hanson 1974 close one). The objective decreases, so
+    that no set comes back: for Q positive definite this ends, in exact arithmetic.
     """
-    fewest, stale, single_exchanges = len(C) + 1, 0, 0
+    fewest, stale, descents, lam = len(C) + 1, 0, 0, np.zeros(len(C))
     for k in range(1, passes + 1):
         trial = at(C)
         wrong = wrong_signs(C, trial, compliance, tolerance)
-        count = int(wrong.sum())
-        if not count or k == passes or stale > MAX_STALE_PASSES + MAX_SINGLE_EXCHANGES:
+        count, negative = int(wrong.sum()), wrong & C
+        if not count or k == passes:
             break
         fewest, stale = (count, 0) if count < fewest else (fewest, stale + 1)
-        if stale > MAX_STALE_PASSES:
-            single_exchanges += 1
-            last = np.flatnonzero(wrong)[-1]
-            wrong = np.zeros(len(C), dtype=bool)
-            wrong[last] = True
-        elif stale and (wrong & C).any():
-            wrong &= C
-        C = C ^ wrong
-    return PivotingResult(C, trial, k, single_exchanges, not count)
+        if not descents and stale <= MAX_STALE_PASSES:
+            C = C ^ (negative if stale and negative.any() else wrong)
+            continue
+        descents += 1
+        if descents > 1 and negative.any():
+            lam = _towards(trial.lam, lam, negative)
+            C = C & ~(negative & (lam == 0))
+        else:
+            lam, C = np.maximum(trial.lam, 0.0), C ^ wrong
+    return PivotingResult(C, trial, k, descents, not count)
+
+
+def _towards(aim: Vector, lam: Vector, negative: Set) -> Vector:
+    """From λ ≥ 0 towards `aim` until the first of its negative entries is zero, exactly."""
+    share = np.full(len(lam), np.inf)
+    share[negative] = lam[negative] / (lam - aim)[negative]
+    found: Vector = np.maximum(lam + share.min() * (aim - lam), 0.0)
+    found[share == share.min()] = 0.0
+    return found

@@ -19,7 +19,26 @@ from scipy.linalg import blas, lapack
 
 from problems.forms.assembly import Matrix, Vector
 
-Set = NDArray[np.bool_]
+from .block_pivoting import Set
+
+#: A border wider than this fraction of the base costs about as much as a new factorisation.
+MAX_BORDER = 1 / 8
+
+
+class Principal:
+    """G_SS u_S = b_S for a sequence of sets S, refactored when S differs too much from the base."""
+
+    def __init__(self, G: Matrix) -> None:
+        self.G = G
+        self.factor = BorderedFactor(G, np.zeros(len(G), dtype=bool))
+        self.factorisations = 0
+
+    def move_to(self, S: Set) -> None:
+        if self.factor.changes(S) <= MAX_BORDER * self.factor.rows.size:
+            self.factor.move_to(S)
+        else:
+            self.factor = BorderedFactor(self.G, S)
+            self.factorisations += 1
 
 
 class BorderedFactor:

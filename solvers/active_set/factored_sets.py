@@ -29,8 +29,7 @@ from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
 from solvers.base import LoadCase
 
-from .bordered_factor import Set
-from .contact_sets import TrialSolution
+from .block_pivoting import Set, TrialSolution
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
 PASSES = 2

@@ -31,15 +31,13 @@ from solvers.base import Answer, LoadCase, Status, WarmStart
 from solvers.kkt import kkt_residual, largest_rounding
 
 from .banded_sets import BandedSets
-from .block_pivoting import ROUNDING_FACTOR, block_pivoting, wrong_signs
-from .bordered_factor import Set
-from .contact_sets import TrialSolution
+from .block_pivoting import ROUNDING_FACTOR, Set, TrialSolution, block_pivoting, wrong_signs
 from .factored_sets import FactoredSets, approached_set
 
 MAX_SWEEPS = 200
-FIRST_SETS = 5  # contact sets in the first sweep
+FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
 TARGET = 0.02  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
-STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve |y_C|, at an |y_C| that can be rounding
+STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve the residual, at one that can be rounding
 STEP_RANGE = 0.5, 2.0  # on an unchanged set; beyond it, a step is rounding
 
 
@@ -48,8 +46,8 @@ class Case:
     """A load case during the sweeps, its vectors in the order of M.
 
     C : its contact set. trial : λ (m,) N, y (m,) mm, and |y_C|. factor : of M on the open contacts. before :
-    the last step and Q times it, if the set was the one before. stalled : sweeps in succession that did not
-    halve |y_C|. settled : no sign is wrong, and |y_C| is small enough.
+    the last step and Q times it, if the set was the one before. residual : max(|y_C|, max(−y)). stalled :
+    sweeps in succession that did not halve it. settled : no sign is wrong, and it is small enough.
     """
 
     load: LoadCase
@@ -57,6 +55,7 @@ class Case:
     trial: TrialSolution
     factor: BandFactor | None = None
     before: tuple[Vector, Vector] | None = None
+    residual: float = np.inf
     stalled: int = 0
     settled: bool = False
     sweeps: int = 0
@@ -161,7 +160,7 @@ class Sweeps:
         else:
             sets = BandedSets(self.M, case.trial, case.factor)
         floor = largest_rounding(compliance, case.load.p[self.order], case.trial.lam)
-        found = block_pivoting(sets.at, case.C, compliance, floor, FIRST_SETS + case.sweeps // 2)
+        found = block_pivoting(sets.at, case.C, compliance, floor, int(FIRST_SETS * GROWTH**case.sweeps))
         unchanged = not (case.C ^ found.C).any()
         case.C, case.factor, case.sets = found.C, sets.factor, case.sets + found.passes
         lam = found.trial.lam
@@ -183,11 +182,12 @@ class Sweeps:
             lam, y = case.trial.lam + share * step, case.trial.y + share * change
             case.before = step, change
         missed = float(abs(y[case.C]).max(initial=0.0))
-        case.stalled = case.stalled + 1 if missed > case.trial.rounding / 2 else 0
+        residual = max(missed, float(-y.min(initial=0.0)))
+        case.stalled = case.stalled + 1 if residual > case.residual / 2 else 0
         case.trial, case.sweeps = TrialSolution(lam, y, missed), case.sweeps + 1
+        case.residual = residual
         floor = largest_rounding(compliance, case.load.p[order], lam)
         right = not wrong_signs(case.C, case.trial, compliance, floor).any()
-        residual = max(missed, float(-y.min(initial=0.0)))
         enough = TARGET * tolerance
         if case.stalled:
             enough = max(tolerance, ROUNDING_FACTOR * floor)

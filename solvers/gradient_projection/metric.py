@@ -22,9 +22,7 @@ from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.compliance import Compliance
 from solvers.active_set.banded_sets import BandedSets
-from solvers.active_set.block_pivoting import block_pivoting
-from solvers.active_set.bordered_factor import Set
-from solvers.active_set.contact_sets import TrialSolution
+from solvers.active_set.block_pivoting import Set, TrialSolution, block_pivoting
 
 STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
 POWER_STEPS = 30  # products for λmax, once per assembly

@@ -22,7 +22,7 @@ import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.forms.compliance import Compliance
-from solvers.active_set.bordered_factor import Set
+from solvers.active_set.block_pivoting import Set
 from solvers.kkt import kkt_residual, rounding_of
 
 from .metric import Diagonal

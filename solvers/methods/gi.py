@@ -21,16 +21,12 @@ from numpy.typing import NDArray
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
-from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
 from solvers.active_set.growing_factor import GrowingFactor
-from solvers.active_set.solve import solve_from, solve_or_identify
+from solvers.active_set.principal_sets import solve_from
 from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, Solver, failed
-from solvers.interior_point.identify import identified_set
 from solvers.kkt import kkt_status
 from solvers.linear_algebra.inverse import inverse_with_factor
-
-FINISHING_SETS = 1000
 
 
 @dataclass(frozen=True)
@@ -111,8 +107,7 @@ def _finished(
     """Block pivoting from the final set of the pivots, if rounding in Q⁻¹ made them inaccurate."""
     closed = np.ones(len(load.p), dtype=bool)
     closed[result.active] = False
-    sets = ContactSets(ready.problem.Q, load.p, lambda: ready.G)
-    answer = solve_or_identify(closed, sets, tolerance, FINISHING_SETS, identified_set)
+    answer = solve_from(closed, ready.problem.Q, load.p, tolerance)
     details |= {"finishing_sets": answer.iterations, "kkt_residual_mm": answer.details["kkt_residual_mm"]}
     if answer.status == "solved":
         details.pop("cause", None)
@@ -135,8 +130,7 @@ def _certain(
     closed[result.active] = True
     if result.status != "solved" or not (s[~closed] < 0).any():
         return result.u
-    sets = ContactSets(ready.G, -slacks(np.zeros(len(s)))[0])
-    answer = solve_from(closed, sets, tolerance, FINISHING_SETS)
+    answer = solve_from(closed, ready.G, -slacks(np.zeros(len(s)))[0], tolerance)
     if answer.lam is None or _violation(slacks(answer.lam)[0], answer.lam) > _violation(s, result.u):
         return result.u
     details["finishing_sets"] = answer.iterations

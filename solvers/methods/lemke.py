@@ -16,14 +16,11 @@ import numpy as np
 
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
-from solvers.active_set.contact_sets import ContactSets
 from solvers.active_set.parametric_path import ParametricPath
-from solvers.active_set.solve import solve_from
+from solvers.active_set.principal_sets import solve_from
 from solvers.base import Answer, LoadCase, WarmStart, failed
 from solvers.dense_dual import DenseDual, DenseDualSolver
 from solvers.kkt import kkt_status
-
-FINISHING_SETS = 1000
 
 
 class Lemke(DenseDualSolver):
@@ -64,7 +61,7 @@ class Lemke(DenseDualSolver):
         if arrived and (status != "solved" or (path.lam < 0).any()):
             closed = np.zeros(len(p), dtype=bool)
             closed[path.C] = True
-            answer = solve_from(closed, ContactSets(Q, p), tolerance, FINISHING_SETS)
+            answer = solve_from(closed, Q, p, tolerance)
             details = {**answer.details, "finishing_sets": answer.iterations}
             return replace(answer, iterations=path.pivots, details=details)
         details["kkt_residual_mm"] = residual

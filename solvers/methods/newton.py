@@ -20,7 +20,7 @@ import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.stiffness.block import NotPositiveDefinite
-from solvers.active_set.bordered_factor import Set
+from solvers.active_set.block_pivoting import Set
 from solvers.active_set.sweeps import Sweeps
 from solvers.base import Answer, Batch, Form, LoadCase, Problem, Solver, WarmStart, failed
 from solvers.sparse_dual import with_p, with_x

@@ -26,7 +26,7 @@ import numpy as np
 from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
-from solvers.active_set.contact_sets import Principal
+from solvers.active_set.bordered_factor import Principal
 from solvers.base import Answer, LoadCase, failed
 from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
 from solvers.kkt import kkt_residual, kkt_status, rounding_of

@@ -1,0 +1,273 @@
+"""A banded M ≈ Q⁻¹, and contact sets with it, corrected by products with Q: cold, warm and batched."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from harness.measurement.solver_session import SolverSession
+from small import make_load, make_prepared, solve_by_nnls
+from strip import write_strip
+
+from harness.conformance.known_problems import contact_rows
+from problems.build import load_case, prepared
+from problems.forms.approximate_inverse import of_dense
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.banded_inverse import BandedInverse, banded_inverse, order_along_joint
+from problems.forms.compliance import DenseCompliance
+from problems.forms.prepared import Prepared, dual_alone
+from problems.forms.problem import in_form
+from problems.load_cases.random_gaps import random_gaps
+from problems.manufactured.ladder import make_rung
+from problems.scene import read_scene
+from problems.stiffness.operator import Stiffness
+from solvers.active_set import sweeps
+from solvers.active_set.sweeps import Sweeps
+from solvers.base import Answer
+from solvers.registry import make_solver
+
+TOLERANCE = 1e-10
+LINES, ACROSS = 110, 4
+
+
+def full(M: BandedInverse) -> np.ndarray:
+    return np.column_stack([M.product(e) for e in np.eye(len(M.order))])
+
+
+def chain(m: int) -> np.ndarray:
+    """The stiffness of m masses in a row, each held to the next and to the ground."""
+    rng = np.random.default_rng(m)
+    k = rng.uniform(1, 3, m)
+    return np.diag(rng.uniform(0.1, 1, m) + k + np.r_[0, k[:-1]]) - np.diag(k[:-1], 1) - np.diag(k[:-1], -1)
+
+
+def decaying() -> np.ndarray:
+    """exp(−distance/3) between the contacts of a joint, numbered line by line."""
+    nodes = np.array([(i, j) for i in range(LINES) for j in range(ACROSS)], dtype=float)
+    distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
+    return np.asfortranarray(np.exp(-distance / 3))
+
+
+def rotated(m: int, condition: float, seed: int) -> np.ndarray:
+    """Every contact acts on all others alike, whatever their distance."""
+    W, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((m, m)))
+    Q = (W * np.geomspace(1.0, condition, m)) @ W.T
+    return np.asfortranarray((Q + Q.T) / 2)
+
+
+def session_of(data: Prepared, form: str, tolerance: float = TOLERANCE) -> SolverSession:
+    made = SolverSession(make_solver("newton", {}), in_form(data, form), tolerance)
+    made.open(batched=True)
+    return made
+
+
+def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = TOLERANCE) -> Answer:
+    return session_of(dual_alone(Q), "dual", tolerance).next(LoadCase(p * 0, -p, p), None)
+
+
+def residual(Q: np.ndarray, p: np.ndarray, lam: np.ndarray | None) -> float:
+    assert lam is not None
+    assert lam.min() >= 0
+    y = Q @ lam - p
+    return max(float(-y.min()), float(abs(y[lam > 0]).max(initial=0.0)))
+
+
+def test_where_forces_act_on_neighbours_alone_m_is_the_inverse() -> None:
+    K = chain(40)
+    shuffled = np.random.default_rng(0).permutation(40)
+    Q = np.asfortranarray(np.linalg.inv(K)[np.ix_(shuffled, shuffled)])
+    M = banded_inverse(Q, np.column_stack([7.0 * shuffled, np.zeros(40)]))
+    np.testing.assert_array_equal(shuffled[M.order], np.arange(40))
+    np.testing.assert_allclose(full(M), K, atol=1e-12)
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(9, 4), (4, 9), (12, 1), (6, 6)])
+def test_contacts_stand_in_lines_across_the_joint(nx: int, ny: int) -> None:
+    x, y = np.meshgrid(10.0 * np.arange(nx), 10.0 * np.arange(ny))
+    nodes = np.column_stack([x.ravel(), y.ravel()])[np.random.default_rng(0).permutation(nx * ny)]
+    order, across = order_along_joint(nodes, len(nodes))
+    assert across == min(nx, ny)
+    assert (np.diff(nodes[order, 0 if nx >= ny else 1]) >= 0).all()
+    both, twice = order_along_joint(np.vstack([nodes, nodes]), 2 * len(nodes))  # two contacts at each place
+    assert twice == 2 * across
+    assert sorted(both) == list(range(2 * len(nodes)))
+
+
+@pytest.mark.parametrize(("dx", "across"), [(0.6, 5), (1.0, 5), (0.15, 15)])
+def test_lines_a_little_closer_than_wide_are_lines_still(dx: float, across: int) -> None:
+    x, y = np.meshgrid(dx * np.arange(40), np.arange(5.0))
+    assert order_along_joint(np.column_stack([x.ravel(), y.ravel()]), 200)[1] == across
+    assert order_along_joint(np.zeros((7, 2)), 7)[1] == 7  # all in one place
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
+def test_a_band_factor_solves_with_the_principal_submatrix(share: float, tmp_path: Path) -> None:
+    data = prepared(read_scene(str(write_strip(tmp_path))))
+    M = banded_inverse(data.Q, data.assembly.contact_nodes)
+    dense, rng = full(M), np.random.default_rng(2)
+    assert len(M.band) - 2 < 44  # a band, not all of it
+    S, b = rng.random(45) < share, rng.standard_normal(45)
+    wanted = np.zeros(45)
+    wanted[S] = np.linalg.solve(dense[np.ix_(S, S)], b[S])
+    np.testing.assert_allclose(M.factor(S).solve(b), wanted, rtol=1e-10, atol=1e-12)
+
+
+def test_m_has_a_narrow_band_where_q_decays_alone() -> None:
+    Q = decaying()
+    v = np.random.default_rng(2).standard_normal(len(Q))
+    for given, narrow in ((Q, True), (rotated(len(Q), 1e4, 1), False), (Q + 100 * np.outer(v, v), False)):
+        M = of_dense(DenseCompliance(np.asfortranarray(given)), None).M
+        assert M is not None
+        assert (len(M.band) < len(Q) / 4) == narrow
+        if not narrow:
+            np.testing.assert_allclose(full(M) @ given, np.eye(len(Q)), atol=1e-8)
+
+
+def test_an_indefinite_q_fails() -> None:
+    Q = decaying()
+    Q[:, 7] = Q[7, :] = 0.0
+    Q[7, 7] = -1.0
+    for name in ("newton", "ipm-fast"):
+        solver = make_solver(name, {})
+        state = solver.prepare(in_form(dual_alone(Q), "dual"))
+        answer = solver.solve(state, LoadCase(*np.ones((3, len(Q)))), TOLERANCE)
+        assert answer.status == "failed"
+        assert "not positive definite" in answer.details["cause"]
+
+
+def far(m: int = 120) -> Prepared:
+    """A dense K whose contacts all depend on one another."""
+    return Prepared(Assembly(Stiffness.of(rotated(m, 1e4, 5)), contact_rows(0, m)))
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+@pytest.mark.parametrize("data", ["strip", "parts", "far"])
+def test_cold_warm_and_batched_in_any_order_are_the_answer_of_nnls(
+    data: str, form: str, tmp_path: Path
+) -> None:
+    if data == "strip":
+        scene = read_scene(str(write_strip(tmp_path)))
+        made, series = prepared(scene), random_gaps(scene, 12, 3)
+        loads = [load_case(scene), *(series.load(k) for k in range(11))]
+    else:
+        made = far() if data == "far" else make_prepared(3, 25, 7)
+        loads = [make_load(seed, made)[0] for seed in range(6)]
+    session = session_of(made, form)
+    given = session.problem.loads(loads)
+    found = [[session.next(load, session.nearest(load) if k else None) for k, load in enumerate(given)]]
+    found += [session.solve_batch(given), session.solve_batch(given[::-1])[::-1]]
+    found.append([each for k in range(0, len(given), 3) for each in session.solve_batch(given[k : k + 3])])
+    for load, *answers in zip(loads, *found, strict=True):
+        x, lam = solve_by_nnls(made, load)
+        for answer in answers:
+            assert answer.status == "solved"
+            assert answer.details["closed"] == (lam > 0).sum()
+            own = answer.x if answer.x is not None else made.recover(answer.lam, load)
+            np.testing.assert_allclose(own, x, atol=1e-8)
+    closed = {int((solve_by_nnls(made, load)[1] > 0).sum()) for load in loads}
+    assert len(closed) > 2
+
+
+@pytest.mark.parametrize("mean", [-2.5, 0.0, 3.0, 8.0])
+def test_a_loose_tolerance_needs_no_more_products_than_a_tight_one(mean: float) -> None:
+    Q = decaying()
+    p = np.random.default_rng(3).standard_normal(len(Q)) + mean
+    answers = [solved(Q, p, tolerance) for tolerance in (1e-2, 1e-4, 1e-8, 1e-10)]
+    assert [answer.status for answer in answers] == ["solved"] * 4
+    products = [answer.iterations for answer in answers]
+    assert products == sorted(products)
+    assert residual(Q, p, answers[-1].lam) <= TOLERANCE
+    assert 0 < answers[-1].details["closed"] < len(Q)
+
+
+def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
+    """M = Q⁻¹: wherever p has gone, one sweep is right, and one more computes y from λ."""
+    data = make_prepared(3, 25)
+    case, first = make_load(1, data)
+    closed = solve_by_nnls(data, case)[1] > 0
+    second = replace(first, p=first.p + data.Q @ np.where(closed, 1.0, 0.0))  # N more on each closed contact
+    own = Sweeps(banded_inverse(data.Q, None), np.diag(data.Q), data.gaps)
+    one, two = (own([load], TOLERANCE)[0] for load in (first, second))
+    assert one.lam is not None
+    assert two.iterations <= 2
+    np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.01, 1.0])
+def test_no_contact_closed_few_and_all(kept: float) -> None:
+    Q = decaying()
+    spread = np.where(np.random.default_rng(4).random(len(Q)) < kept, 100.0, 0.0)
+    p = Q @ spread - np.where(spread > 0, 0.0, 1.0)
+    answer = solved(Q, p)
+    assert answer.status == "solved"
+    assert (kept > 0) == spread.any()
+    np.testing.assert_allclose(answer.lam, spread, atol=1e-7)
+
+
+@pytest.mark.parametrize(("rung", "sweeps_needed"), [("conditioning/9e+13", 6), ("duplicates/2e-05", 6)])
+def test_an_ill_conditioned_q_is_solved_near_rounding_in_few_sweeps(rung: str, sweeps_needed: int) -> None:
+    made = make_rung(f"hard/{rung}").made
+    assert made is not None
+    data = Prepared(made.assembly)
+    session = session_of(data, "dual")
+    (load,) = session.problem.loads([made.load])
+    answer = session.next(load, None)
+    assert answer.status == "solved"
+    assert answer.iterations <= sweeps_needed
+    assert residual(data.Q, load.p, answer.lam) <= TOLERANCE
+
+
+@pytest.mark.parametrize("size", [1e-13, 1e-9, 1e-5])
+def test_nearly_degenerate_sets(size: float) -> None:
+    """A third of the contacts with a force, or a gap, barely above zero."""
+    Q, rng = decaying(), np.random.default_rng(6)
+    weak, closed = rng.random(len(Q)) < 1 / 3, rng.random(len(Q)) < 0.5
+    value = np.where(weak, size, rng.uniform(0.1, 1, len(Q)))
+    lam, y = np.where(closed, value, 0.0), np.where(closed, 0.0, value)
+    answer = solved(Q, Q @ lam - y)
+    assert answer.status == "solved"
+    np.testing.assert_allclose(answer.lam, lam, atol=1e-8)
+
+
+@pytest.mark.parametrize(("m", "condition", "spread"), [(92, 1e9, 8), (107, 4e9, 8), (181, 1e6, 0)])
+def test_where_exchanges_circle_the_sets_settle(m: int, condition: float, spread: float) -> None:
+    """Loads of many sizes on a Q without locality: block exchanges alone do not end."""
+    rng = np.random.default_rng(m)
+    Q, p = rotated(m, condition, m), 10 ** rng.uniform(-spread, 0, m) * rng.choice([-1, 1], m)
+    answer = solved(Q, p)
+    assert answer.status == "solved"
+    assert residual(Q, p, answer.lam) <= 1e-9
+
+
+def test_unsettled_forces_are_cut_at_zero_and_judged_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    Q, p = decaying(), np.random.default_rng(3).standard_normal(LINES * ACROSS)
+    monkeypatch.setattr(sweeps, "MAX_SWEEPS", 2)
+    own = Sweeps(banded_inverse(Q, None), np.diag(Q), dual_alone(Q).gaps)
+    case = own.solved(LoadCase(p * 0, -p, p), TOLERANCE)
+    answer = own.answer(case, TOLERANCE)
+    assert (answer.status, answer.iterations) == ("iteration_limit", 2)
+    assert case.trial.lam.min() < 0
+    wanted = residual(Q, p, answer.lam)
+    assert wanted > TOLERANCE
+    assert answer.details["kkt_residual_mm"] == pytest.approx(wanted)
+    assert "2 products" in answer.details["cause"] or "products" in answer.details["cause"]
+
+
+def test_what_sweeps_settle_is_solved() -> None:
+    """A beam with nearly dependent contacts: gaps within the rounding of y, and beyond the tolerance."""
+    D = np.eye(8) - 2 * np.eye(8, k=-1) + np.eye(8, k=-2)
+    A = np.eye(8)
+    A[range(0, 8, 2), range(1, 8, 2)] = 512.0, 2048.0, 8.0, 64.0
+    data = Prepared(Assembly(Stiffness.of(1024 * D.T @ D), sp.csc_array(A)))
+    x = np.array([[-1, -2, -2, -2, -2, -2, -2, -2], [-61, 14, 49, -36, -47, 61, -13, -7]]) / 4096
+    lam = np.array([[0.25, 0, 0, 0, 0, 0, 0, 0], [0, 11.25, 0, 0, 0, 0, 0, 0]])
+    y = np.array([[0, 1, 1, 1, 1, 1, 1, 1], [0, 0, 14, 60, 0, 27, 97, 0]]) / 4096
+    cases = [
+        LoadCase(data.assembly.K.multiply(u) + A @ v, A.T @ u + w) for u, v, w in zip(x, lam, y, strict=True)
+    ]
+    session = session_of(data, "dual")
+    answers = session.solve_batch(session.problem.loads([*cases, cases[0]]))
+    assert [answer.status for answer in answers] == ["solved"] * 3
