@@ -126,6 +126,40 @@ def test_products_that_underflow_count() -> None:
     assert residual_of(np.zeros((1, 1)), M, doubled(np.zeros((20, 1))), "dense").error[0, 0] == 0.0
 
 
+def test_the_longest_sum_of_the_largest_pieces_is_exact() -> None:
+    """All products of M₁x₂ and M₂x₁ near the largest that they can be, and of one sign."""
+    rng = np.random.default_rng(0)
+    for bits in (22, 23):
+        unit = 2.0 ** (1 - bits)
+        M, hi = (1 - unit + unit * (0.499 + 1e-6 * rng.random(512)) for _ in range(2))
+        x, value = doubled(hi[:, None]), np.zeros((1, 1))
+        assert max(missed(residual_of(value, M[None], x, "dense"), 0, wanted_of(value, M[None], x, 0))) <= 0
+
+
+@pytest.mark.parametrize("kind", ["dense", "sparse"])
+def test_what_is_small_is_subtracted_with_its_rounding(kind: str) -> None:
+    rng = np.random.default_rng(0)
+    for scale, of_error in ((1.0, 0.0), (1.0, 1e-3), (2.0**-537, 0.0)):
+        M, x = scale * rng.standard_normal((9, 40)), scale * rng.standard_normal((40, 1))
+        value = M @ x  # so that little is left
+        total = Residual(value, np.full_like(value, of_error))
+        total.subtract_small([(WHOLE, WHOLE, M if kind == "dense" else sp.csr_array(M))], 40, x)
+        found = total.enclosed()
+        off = missed(found, 0, wanted_of(value, M, doubled(x), 0))
+        assert max(off) <= -Fraction(of_error) * 99 / 100
+        assert found.error.max() <= 1.02 * of_error + 1e-12 * scale**2 + 100 * ETA
+    # Terms that cancel are rounded all the same: 1 + 2⁻⁵³ − 1
+    M = np.array([[1.0, 2.0**-53, -1.0]])
+    total = Residual(np.zeros((1, 1)))
+    total.subtract_small([(WHOLE, WHOLE, M if kind == "dense" else sp.csr_array(M))], 3, np.ones((3, 1)))
+    assert missed(total.enclosed(), 0, [Fraction(-(2.0**-53))])[0] <= 0
+    underflowing = Residual(np.zeros((1, 1)))
+    tiny = np.full((1, 20), 0.98 * 2.0**-538)
+    underflowing.subtract_small([(WHOLE, WHOLE, tiny)], 20, np.full((20, 1), 2.0**-537))
+    wanted = -20 * Fraction(tiny[0, 0]) * Fraction(2.0**-537)
+    assert missed(underflowing.enclosed(), 0, [wanted])[0] <= 0
+
+
 def test_unknowns_of_every_size_keep_their_digits() -> None:
     """Of terms of one size the error is as small as if all factors were of one size."""
     unit = 2.0 ** np.arange(-200, 200, 20)
@@ -155,7 +189,7 @@ def test_the_residuals_of_a_problem_in_its_units(kind: str, seed: int) -> None:
     f, g = both @ at.hi, A.T @ at.hi[:16]  # so that little is left
     loads = [LoadCase(f[:, k], g[:, k]) for k in range(2)]
     load = made.load(loads)
-    r, s = made.forces(load.f, x, lam), made.gaps(load.g, x)
+    r, s = made.residuals(load, x, lam)
     for k, case in enumerate(loads):
         force, gap = (
             wanted_of(case.f[:, None], both, at[:, [k]], 0),
@@ -183,3 +217,27 @@ def test_length_neither_under_nor_overflows() -> None:
     assert length(np.array([ETA, ETA])) >= 2 * ETA  # √2 η is no number
     for bad in (np.nan, np.inf):
         assert not np.isfinite(length(np.array([bad])))
+
+
+@pytest.mark.parametrize("kind", ["dense", "band"])
+def test_residuals_that_have_moved(kind: str) -> None:
+    """r − K dx − A dλ and s − Aᵀdx, of residuals that are uncertain themselves."""
+    rng = np.random.default_rng(0)
+    B, A = rng.standard_normal((9, 9)), rng.standard_normal((9, 5))
+    K = B @ B.T + np.eye(9)
+    K = K + K.T
+    stored: Any = np.asfortranarray(K) if kind == "dense" else sp.csc_array(K)
+    made = Balanced.of(Prepared(Assembly(Stiffness.of(stored), sp.csc_array(A))))
+    dx, dlam, r, s = (rng.standard_normal((size, 1)) for size in (9, 5, 9, 5))
+    both = np.vstack([np.hstack([K, A]), np.hstack([A.T, np.zeros((5, 5))])])
+    units = np.vstack([made.D, made.R])
+    step = doubled(units * np.vstack([dx, dlam]))
+    wanted = wanted_of(np.vstack([r, s]) / units, both, step, 0)
+    wanted = [Fraction(float(u)) * v for u, v in zip(units[:, 0], wanted, strict=True)]
+    force, gap = made.moved(
+        Enclosure(r, np.full_like(r, 1e-3)), Enclosure(s, np.full_like(s, 1e-4)), dx, dlam
+    )
+    assert max(missed(force, 0, wanted[:9])) <= Fraction(-99, 10**5)
+    assert max(missed(gap, 0, wanted[9:])) <= Fraction(-99, 10**6)
+    assert force.error.max() <= 1.02e-3
+    assert gap.error.max() <= 1.02e-4

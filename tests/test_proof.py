@@ -56,7 +56,7 @@ def bound(
     units, one = proof.balanced, proof.balanced.load([load])
     at = DoubleDouble(x[:, None] / units.D, np.full((len(x), 1), lo) / units.D)
     forces = DoubleDouble(lam[:, None] / units.R, np.zeros((len(lam), 1)))
-    force, gap = units.forces(one.f, at, forces), units.gaps(one.g, at)
+    force, gap = units.residuals(one, at, forces)
     force = Enclosure(force.value, force.error + r * units.D)
     return float(proof.bounds(at, forces, force, Enclosure(gap.value, gap.error + s * units.R))[0][0])
 
@@ -263,6 +263,18 @@ def test_a_case_that_is_near_enough_is_not_refined_with_the_others(monkeypatch: 
     both = proof.proven([load, load], [lam, lam * 1.001], enough_mm=1e-7)
     assert set(passes) == {1}
     assert max(each.bound_mm for each in both) <= 1e-7
+
+
+@KINDS
+def test_a_correction_that_goes_beyond_zero_forces_is_not_believed(
+    kind: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """x + dx and λ + dλ balance, but λ + dλ is negative: the pressed contact would be open."""
+    proof, _ = springs(kind, 4.0, 16.0)
+    steps = array(0.5, 0.0)[:, None] / proof.balanced.D, array(-2.0)[:, None] / proof.balanced.R
+    monkeypatch.setattr(proof, "_corrections", lambda *_: steps)
+    (found,) = proof.proven([LoadCase(array(5.0, 32.0), array(2.0))], [array(1.0)], [array(1.0, 2.0)], 1e-3)
+    assert abs(found.x.hi - array(1.25, 2.0)).max() <= found.bound_mm
 
 
 def shed(kind: Any, stiffness: float, force: float, x: float | None = None) -> tuple[float, Fraction]:

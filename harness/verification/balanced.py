@@ -57,18 +57,24 @@ class Balanced:
         """K'⁻¹b."""
         return self.assembly.K.solve(b / self.D) / self.D
 
-    def forces(self, f: Matrix, x: DoubleDouble, lam: DoubleDouble) -> Enclosure:
-        """r = f − Kx − Aλ, (n, k)."""
-        total = Residual(np.broadcast_to(f, x.hi.shape))
+    def residuals(self, load: LoadCase, x: DoubleDouble, lam: DoubleDouble) -> tuple[Enclosure, Enclosure]:
+        """r = f' − K'x − A'λ (n, k) and s = g' − A'ᵀx (m, k)."""
+        f = np.broadcast_to(load.f, x.hi.shape)
+        total = Residual(np.concatenate([f, load.g]))
         total.subtract_product(row_panels(self.A), _longest(self.A), lam)
-        total.subtract_product(self._panels(), max(map(_longest, self.assembly.K.matrices)), x)
-        return total.enclosed()
+        total.subtract_product(self._panels(), self._longest, x)
+        return self._parts(total)
 
-    def gaps(self, g: Matrix, x: DoubleDouble) -> Enclosure:
-        """s = g − Aᵀx, (m, k)."""
-        total = Residual(g)
-        total.subtract_product(row_panels(self.At), _longest(self.At), x)
-        return total.enclosed()
+    def moved(self, r: Enclosure, s: Enclosure, dx: Matrix, dlam: Matrix) -> tuple[Enclosure, Enclosure]:
+        """r − K'dx − A'dλ and s − A'ᵀdx, for small dx (n, k) and dλ (m, k)."""
+        total = Residual(np.concatenate([r.value, s.value]), np.concatenate([r.error, s.error]))
+        total.subtract_small(row_panels(self.A), _longest(self.A), dlam)
+        total.subtract_small(self._panels(), self._longest, dx)
+        return self._parts(total)
+
+    def _parts(self, total: Residual) -> tuple[Enclosure, Enclosure]:
+        both, n = total.enclosed(), len(self.D)
+        return both[:n], both[n:]
 
     @cached_property
     def stiffest(self) -> float:
@@ -81,9 +87,15 @@ class Balanced:
         """σ² ≤ λmin(A'ᵀA'), proven; 0 if the contacts are dependent."""
         return independence(sp.csc_array(self.A))
 
+    @cached_property
+    def _longest(self) -> int:
+        return max(map(_longest, (*self.assembly.K.matrices, self.At)))
+
     def _panels(self) -> Iterator[Panel]:
-        """Rows of K'."""
+        """Rows of K', and of A'ᵀ below it."""
         D = self.D[:, 0]
+        for rows, columns, panel in row_panels(self.At):
+            yield rows + len(D), columns, panel
         for rows, columns, panel in self.assembly.K.panels():
             if sp.issparse(panel):
                 data = panel.data * D[columns][panel.indices] * np.repeat(D[rows], np.diff(panel.indptr))

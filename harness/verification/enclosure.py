@@ -5,10 +5,10 @@ their rounding errors (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26:1955–198
 |Σ computed − Σ| ≤ u|Σ| + γ²_k Σ|terms|, u = 2⁻⁵³, γ_k = ku/(1 − ku).
 
 Products Mx are sliced (Ozaki, Ogita, Oishi and Rump, Numer. Algorithms 59:95–118, 2012): M = M₁ + M₂ + M₃,
-x = x₁ + x₂ + x₃, where M₁, M₂, x₁ and x₂ have so few bits b that M₁x₁, M₁x₂ and M₂x₁ are exact in any order
-of summation: c products of 2b bits have a sum of at most 53 bits if 2(b − 1) + log₂ c ≤ 53, c the entries of
-the longest row. The other products, M₁x₃, M₂(x₂ + x₃) and M₃x, are 2⁻²ᵇ times smaller; so is their rounding:
-|fl(Pv) − Pv| ≤ γ_c |P||v| ≤ γ_c (Σ_j |P|_ij) max|v|.
+x = x₁ + x₂ + x₃, where M₁, M₂, x₁ and x₂ have so few bits b that M₁x₁ and M₁x₂ + M₂x₁ are exact in any order
+of summation: 2c products of 2b bits have a sum of at most 53 bits if 2(b − 1) + log₂ 2c ≤ 53, c the entries
+of the longest row. The other products, M₁x₃, M₂(x₂ + x₃) and M₃x, are 2⁻²ᵇ times smaller; so is their
+rounding: |fl(Pv) − Pv| ≤ γ_c |P||v| ≤ γ_c (Σ_j |P|_ij) max|v|.
 
 A product that underflows is off by η = 2⁻¹⁰⁷⁴ at most; additions are exact there. What overflows ends as
 infinity or NaN, which bounds nothing.
@@ -28,11 +28,12 @@ from problems.stiffness.rounding import U, gamma
 
 ETA = 2.0**-1074  # the smallest positive number
 SAFE = 1.01  # for the rounding of the bounds themselves
-TERMS = 9  # of a row of a residual, or fewer: four for each product, and one
+TERMS = 5  # of a row of a residual, or fewer: two exact ones of each product, and one
+MORE = 12  # roundings of what is not exact in a product beside those of its sums, or fewer
 ENTRIES_AT_A_TIME = 2**15  # of M: they and what is computed from them stay in the processor's cache
 
 #: (rows, columns, M[rows, columns]), dense or CSR; M is zero beside.
-Panel = tuple[slice, slice, Any]
+Panel = tuple[Any, slice, Any]
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,9 @@ class Enclosure:
 
     value: Matrix
     error: Matrix
+
+    def __getitem__(self, place: Any) -> Enclosure:
+        return Enclosure(self.value[place], self.error[place])
 
 
 def two_sum(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
@@ -88,39 +92,55 @@ def length(v: Matrix) -> Any:
 
 
 class Residual:
-    """value − Σ products, a column for each load case; the terms are added with their rounding errors."""
+    """value − Σ products, a column for each load case; exact terms are added with their rounding errors."""
 
-    def __init__(self, value: Matrix) -> None:
+    def __init__(self, value: Matrix, error: Matrix | None = None) -> None:
         self.hi, self.lo = np.array(value), np.zeros(value.shape)
-        self.error = ETA * (value != 0)  # a value in other units may be rounded to a multiple of η
+        # A value in other units may be rounded to a multiple of η.
+        self.error = ETA * (value != 0) if error is None else np.array(error)
 
     def subtract_product(self, panels: Iterable[Panel], longest: int, x: DoubleDouble) -> None:
         """Mx, x (columns of M, k). panels : of M, no row with more entries."""
-        bits = (53 - int(np.ceil(np.log2(max(longest, 2))))) // 2 + 1
+        bits = (53 - int(np.ceil(np.log2(2 * longest)))) // 2 + 1
         unit = _units(x.hi)  # M diag(unit) and x / unit have no rounding
         hi, lo = x.hi / unit[:, None], x.lo / unit[:, None]
         top = exponent(abs(hi).max(axis=0, initial=0.0))
         x1, after = cut(hi, top, bits)
         x2, x3 = cut(after, top - bits, bits)
         x3, after = x3 + lo, after + lo  # rounded by at most a rounding of themselves
-        most, most3, most_after = (abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after))
+        most, most_lo = (abs(part).max(axis=0, initial=0.0) for part in (hi, lo))
+        most3, most_after = (2 * most * 2.0**-each + most_lo for each in (2 * bits, bits))
         # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one. M₃ by the second
         # half of x is left out: a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, where u|Σ| covers γ²|Σ|.
-        rounding, again = gamma(longest + 8), 4 * gamma(TERMS) ** 2
+        rounding, again = gamma(longest + MORE), 4 * gamma(TERMS) ** 2
         of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
         of_each = SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])
+        by_first, by_second, k = np.hstack([x1, x2, x3]), np.hstack([x1, after]), x1.shape[1]
         for rows, columns, panel in panels:
             entries, count, above, of_row = _scaled(panel, unit[columns])
             M1, rest = cut(entries, of_row(above), bits)
             M2, M3 = cut(rest, of_row(above - bits), bits)
-            first, second, third = (_with(panel, part) for part in (M1, M2, M3))
-            rest = first @ x3[columns] + (second @ after[columns] + third @ hi[columns])
-            for term in (first @ x1[columns], first @ x2[columns], second @ x1[columns], rest):
-                self.hi[rows], error = two_sum(self.hi[rows], -term)
-                self.lo[rows] += error
+            first = _with(panel, M1) @ by_first[columns]
+            small, rest = first[:, k : 2 * k], first[:, 2 * k :]
+            if M2.any():
+                second = _with(panel, M2) @ by_second[columns]
+                small, rest = small + second[:, :k], rest + second[:, k:]
+            if M3.any():
+                rest = rest + _with(panel, M3) @ hi[columns]
+            value, lost = two_sum(self.hi[rows], -first[:, :k])
+            self.hi[rows], error = two_sum(value, -small)
+            self.lo[rows] += lost + (error - rest)
             of_M2 = count * np.exp2(above - bits)
             of_M1 = _with(panel, abs(entries)).sum(axis=1)[:, None] + of_M2
             self.error[rows] += np.hstack([of_M1, of_M2, of_M2 * 2.0**-bits, count + 1]) @ of_each
+
+    def subtract_small(self, panels: Iterable[Panel], longest: int, x: Matrix) -> None:
+        """Mx in float64, with its rounding."""
+        most = abs(x).max(axis=0, initial=0.0)
+        of_each = SAFE * np.stack([gamma(longest + MORE) * most, ETA * (1 + most) * (most > 0)])
+        for rows, columns, panel in panels:
+            self.lo[rows] -= panel @ x[columns]
+            self.error[rows] += np.column_stack([abs(panel).sum(axis=1), _count(panel) + 1]) @ of_each
 
     def enclosed(self) -> Enclosure:
         value = self.hi + self.lo
@@ -135,11 +155,17 @@ def _units(x: Matrix) -> Vector:
 
 
 def row_panels(M: sp.csr_array) -> Iterator[Panel]:
-    """Some rows of M at a time."""
-    height = max(ENTRIES_AT_A_TIME * M.shape[0] // max(M.nnz, 1), 1)
-    for start in range(0, M.shape[0], height):
-        rows = slice(start, min(start + height, M.shape[0]))
+    """Some rows of M at a time, of those with entries."""
+    filled = np.flatnonzero(np.diff(M.indptr))
+    height = max(ENTRIES_AT_A_TIME * len(filled) // max(M.nnz, 1), 1)
+    for start in range(0, len(filled), height):
+        rows = filled[start : start + height]
         yield rows, slice(None), M[rows]
+
+
+def _count(panel: Any) -> Vector:
+    """Entries of each row."""
+    return np.diff(panel.indptr) if sp.issparse(panel) else np.full(panel.shape[0], panel.shape[1])
 
 
 def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[[Matrix], Matrix]]:

@@ -91,36 +91,37 @@ class Proof:
         enough_mm : a bound that needs no further pass; one about the rounding of x never does.
         """
         units, load = self.balanced, self.balanced.load(loads)
-        f, g = np.broadcast_to(load.f, (len(units.D), len(loads))), load.g
+        load = LoadCase(np.broadcast_to(load.f, (len(units.D), len(loads))), load.g)
         lam = np.maximum(np.column_stack(lams), 0.0) / units.R
-        x = units.solve(f - units.A @ lam) if xs is None else np.column_stack(list(xs)) / units.D
-        state = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
-        best: list[Proven | None] = [None] * len(loads)
-        worse, left = np.zeros(len(loads), dtype=int), np.arange(len(loads))
-        for _ in range(MAX_PASSES):
-            x2, lam2 = state
-            r, s = units.forces(f, x2, lam2), units.gaps(g, x2)
-            bounds, rounding = self.bounds(x2, lam2, r, s)
-            going = np.ones(len(left), dtype=bool)
+        x = units.solve(load.f - units.A @ lam) if xs is None else np.column_stack(list(xs)) / units.D
+        x2, lam2 = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
+        r, s = units.residuals(load, x2, lam2)
+        found = [_Found() for _ in loads]
+        left = np.arange(len(loads))  # the load cases of the columns
+        bounds, rounding = self.bounds(x2, lam2, r, s)
+        for step in range(MAX_PASSES):
+            enough = np.maximum(enough_mm, AT_ROUNDING * rounding)
+            going = np.zeros(len(left), dtype=bool)
             for column, k in enumerate(left):
-                bound, before = float(bounds[column]), best[k]
-                worse[k] = 0 if before is None or bound <= before.bound_mm / 2 else worse[k] + 1
-                if before is None or bound < before.bound_mm:
-                    best[k] = self._found(x2[:, column], lam2[:, column], bound)
-                enough = max(enough_mm, AT_ROUNDING * float(rounding[column]))
-                going[column] = not (bound <= enough or worse[k] == MAX_WORSE or not self.kappa > 0)
-            if not going.any():
+                worse = found[k].take(float(bounds[column]), x2, lam2, column)
+                going[column] = not (bounds[column] <= enough[column] or worse == MAX_WORSE)
+            if not (going.any() and self.kappa > 0):
                 break
-            left, f, g = left[going], f[:, going], g[:, going]
-            x2, lam2 = x2[:, going], lam2[:, going]
-            dx, dlam = self._corrections(r.value[:, going], s.value[:, going], lam2.hi, enough_mm)
-            moved = lam2.plus(dlam)
-            negative = moved.hi < 0
-            state = (
-                x2.plus(dx),
-                DoubleDouble(np.where(negative, 0, moved.hi), np.where(negative, 0, moved.lo)),
-            )
-        return [each for each in best if each is not None]
+            if not going.all():
+                left, load = left[going], LoadCase(load.f[:, going], load.g[:, going])
+                x2, lam2, r, s = (each[:, going] for each in (x2, lam2, r, s))
+            dx, dlam = self._corrections(r.value, s.value, lam2.hi, enough_mm)
+            dlam = np.maximum(dlam, -lam2.hi)
+            x2, lam2 = x2.plus(dx), lam2.plus(dlam)
+            negative = lam2.hi < 0
+            lam2 = DoubleDouble(np.where(negative, 0, lam2.hi), np.where(negative, 0, lam2.lo))
+            if step == 0 and enough_mm:  # what was in float64 has moved by dx and dλ without rounding
+                r, s = units.moved(r, s, dx, dlam)
+                bounds, rounding = self.bounds(x2, lam2, r, s)
+            if step or not (bounds <= enough_mm).all():
+                r, s = units.residuals(load, x2, lam2)
+                bounds, rounding = self.bounds(x2, lam2, r, s)
+        return [self._proven(each) for each in found]
 
     def bounds(self, x: DoubleDouble, lam: DoubleDouble, r: Enclosure, s: Enclosure) -> tuple[Vector, Vector]:
         """(k,) mm of each column, and what of it is due to the rounding of x to float64."""
@@ -147,7 +148,7 @@ class Proof:
         w = units.solve(units.A @ dlam)
         dx -= w
         missed = np.where(C, -(y + units.At @ w), 0.0)
-        target = np.maximum(REDUCTION * length(np.where(C, y, 0.0)), enough_mm / 4 / self.spread)
+        target = np.maximum(REDUCTION * length(np.where(C, y, 0.0)), enough_mm / 2 / self.spread)
         direction, before = np.zeros_like(missed), np.ones(missed.shape[1])
         for _ in range(MAX_PRODUCTS):
             going = length(missed) > target
@@ -165,6 +166,24 @@ class Proof:
             before = np.where(product > 0, product, 1.0)
         return dx, dlam
 
-    def _found(self, x: DoubleDouble, lam: DoubleDouble, bound_mm: float) -> Proven:
+    def _proven(self, found: _Found) -> Proven:
         D, R = self.balanced.D[:, 0], self.balanced.R[:, 0]
-        return Proven(DoubleDouble(D * x.hi, D * x.lo), DoubleDouble(R * lam.hi, R * lam.lo), bound_mm)
+        x, lam = found.x[:, found.column], found.lam[:, found.column]
+        return Proven(DoubleDouble(D * x.hi, D * x.lo), DoubleDouble(R * lam.hi, R * lam.lo), found.bound_mm)
+
+
+class _Found:
+    """The least bound of a load case, and the columns that have it. worse : passes since it was halved."""
+
+    x: DoubleDouble
+    lam: DoubleDouble
+    column: int
+    bound_mm: float | None = None
+    worse = 0
+
+    def take(self, bound_mm: float, x: DoubleDouble, lam: DoubleDouble, column: int) -> int:
+        before = self.bound_mm
+        self.worse = 0 if before is None or bound_mm <= before / 2 else self.worse + 1
+        if before is None or bound_mm < before:
+            self.x, self.lam, self.column, self.bound_mm = x, lam, column, bound_mm
+        return self.worse

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from .block import Block, Matrix, NotPositiveDefinite, Vector
+from .block import ENTRIES_AT_A_TIME, Block, Matrix, NotPositiveDefinite, Vector
 from .rounding import U as ROUNDING
 from .rounding import gamma
 
 SMALL = 50  # unknowns below which eigenvalues are computed densely
-ROWS_AT_A_TIME = 16  # they and what is computed from them stay in the processor's cache
+LEAST_ROWS = 16  # of a panel
 NORM_STEPS = 5  # of the power method, for v
 
 
@@ -53,8 +53,9 @@ class DenseBlock(Block):
         return blas.dtrsv(self.U, blas.dtrsv(self.U, b.ravel(), trans=1)).reshape(b.shape)
 
     def panels(self) -> Iterator[tuple[slice, Any]]:
-        for start in range(0, self.size, ROWS_AT_A_TIME):
-            rows = slice(start, min(start + ROWS_AT_A_TIME, self.size))
+        height = max(ENTRIES_AT_A_TIME // self.size, LEAST_ROWS)
+        for start in range(0, self.size, height):
+            rows = slice(start, min(start + height, self.size))
             yield rows, self.matrix.T[rows]  # K is symmetric and stored by columns: these are contiguous
 
     def shifted(self, D: Vector, s: float) -> float | None:
