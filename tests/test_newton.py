@@ -94,7 +94,7 @@ def test_pivoting_ends_where_full_exchanges_cycle(stale: int, monkeypatch: pytes
 
 @pytest.mark.parametrize(("stale", "seed"), [(0, 0), (0, 5), (MAX_STALE_PASSES, 5)])
 def test_no_set_comes_back(stale: int, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Q without locality and loads of many sizes: exchanges circle, descent ends within a few times m sets."""
+    """Q without locality, loads of many sizes: exchanges circle, descent ends within a few times m sets."""
     monkeypatch.setattr("solvers.active_set.block_pivoting.MAX_STALE_PASSES", stale)
     rng = np.random.default_rng(seed)
     Q, p = definite(100, seed, 1e8), 10 ** rng.uniform(-6, 0, 100) * rng.choice([-1, 1], 100)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from harness.measurement.solver_session import SolverSession
 from small import make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
 from harness.conformance.known_problems import contact_rows
+from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.approximate_inverse import of_dense
 from problems.forms.assembly import Assembly, LoadCase
