@@ -72,8 +72,6 @@ MUTANTS = [
     Mutant(ENCLOSURE, "small + second[:, :k]", "small"),
     Mutant(ENCLOSURE, "first[:, k : 2 * k], first[:, 2 * k :]", "first[:, k : 2 * k], 0.0"),
     Mutant(ENCLOSURE, "two_sum(value, -small)", "two_sum(value, 0 * small)"),
-    Mutant(ENCLOSURE, "2 * most * 2.0**-each + most_lo", "most_lo"),
-    Mutant(ENCLOSURE, "2 * most * 2.0**-each + most_lo", "2 * most * 2.0**-each"),
     Mutant(ENCLOSURE, "np.where(size > 0, unit, unit[size > 0].min(initial=1.0))", "unit * 0 + 1.0"),
     Mutant(ENCLOSURE, "norm = np.linalg.norm(v / scale, axis=0)", "norm = np.linalg.norm(v, axis=0) / scale"),
     Mutant(ENCLOSURE, " + ETA * (norm > 0)", ""),

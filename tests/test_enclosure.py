@@ -131,9 +131,9 @@ def test_the_longest_sum_of_the_largest_pieces_is_exact() -> None:
     rng = np.random.default_rng(0)
     for bits in (22, 23):
         unit = 2.0 ** (1 - bits)
-        M, hi = (1 - unit + unit * (0.499 + 1e-6 * rng.random(512)) for _ in range(2))
-        x, value = doubled(hi[:, None]), np.zeros((1, 1))
-        assert max(missed(residual_of(value, M[None], x, "dense"), 0, wanted_of(value, M[None], x, 0))) <= 0
+        M, hi = (1 - unit + unit * (0.499 + 1e-6 * rng.random(shape)) for shape in ((8, 512), (512, 1)))
+        x, value = doubled(hi), M @ hi
+        assert max(missed(residual_of(value, M, x, "dense"), 0, wanted_of(value, M, x, 0))) <= 0
 
 
 @pytest.mark.parametrize("kind", ["dense", "sparse"])

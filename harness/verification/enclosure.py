@@ -108,8 +108,7 @@ class Residual:
         x1, after = cut(hi, top, bits)
         x2, x3 = cut(after, top - bits, bits)
         x3, after = x3 + lo, after + lo  # rounded by at most a rounding of themselves
-        most, most_lo = (abs(part).max(axis=0, initial=0.0) for part in (hi, lo))
-        most3, most_after = (2 * most * 2.0**-each + most_lo for each in (2 * bits, bits))
+        most, most3, most_after = (abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after))
         # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one. M₃ by the second
         # half of x is left out: a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, where u|Σ| covers γ²|Σ|.
         rounding, again = gamma(longest + MORE), 4 * gamma(TERMS) ** 2

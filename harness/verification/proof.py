@@ -96,20 +96,20 @@ class Proof:
         x = units.solve(load.f - units.A @ lam) if xs is None else np.column_stack(list(xs)) / units.D
         x2, lam2 = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
         r, s = units.residuals(load, x2, lam2)
-        found = [_Found() for _ in loads]
+        found = [_Found(x2, lam2, column) for column in range(len(loads))]
         left = np.arange(len(loads))  # the load cases of the columns
         bounds, rounding = self.bounds(x2, lam2, r, s)
         for step in range(MAX_PASSES):
             enough = np.maximum(enough_mm, AT_ROUNDING * rounding)
             going = np.zeros(len(left), dtype=bool)
             for column, k in enumerate(left):
-                worse = found[k].take(float(bounds[column]), x2, lam2, column)
-                going[column] = not (bounds[column] <= enough[column] or worse == MAX_WORSE)
+                found[k].take(float(bounds[column]), x2, lam2, column)
+                going[column] = not (bounds[column] <= enough[column] or found[k].worse == MAX_WORSE)
             if not (going.any() and self.kappa > 0):
                 break
             if not going.all():
                 left, load = left[going], LoadCase(load.f[:, going], load.g[:, going])
-                x2, lam2, r, s = (each[:, going] for each in (x2, lam2, r, s))
+                x2, lam2, r, s = x2[:, going], lam2[:, going], r[:, going], s[:, going]
             dx, dlam = self._corrections(r.value, s.value, lam2.hi, enough_mm)
             dlam = np.maximum(dlam, -lam2.hi)
             x2, lam2 = x2.plus(dx), lam2.plus(dlam)
@@ -172,18 +172,17 @@ class Proof:
         return Proven(DoubleDouble(D * x.hi, D * x.lo), DoubleDouble(R * lam.hi, R * lam.lo), found.bound_mm)
 
 
+@dataclass
 class _Found:
-    """The least bound of a load case, and the columns that have it. worse : passes since it was halved."""
+    """The least bound of a load case, and the column that has it. worse : passes since it was halved."""
 
     x: DoubleDouble
     lam: DoubleDouble
     column: int
-    bound_mm: float | None = None
-    worse = 0
+    bound_mm: float = np.inf
+    worse: int = 0
 
-    def take(self, bound_mm: float, x: DoubleDouble, lam: DoubleDouble, column: int) -> int:
-        before = self.bound_mm
-        self.worse = 0 if before is None or bound_mm <= before / 2 else self.worse + 1
-        if before is None or bound_mm < before:
+    def take(self, bound_mm: float, x: DoubleDouble, lam: DoubleDouble, column: int) -> None:
+        self.worse = 0 if bound_mm <= self.bound_mm / 2 else self.worse + 1
+        if bound_mm < self.bound_mm:
             self.x, self.lam, self.column, self.bound_mm = x, lam, column, bound_mm
-        return self.worse
