@@ -82,14 +82,14 @@ def test_pivoting_ends_where_full_exchanges_cycle(stale: int, monkeypatch: pytes
     bending = np.diff(np.eye(size + 4), 2, axis=0)[:, 2:-2]
     Q = np.asfortranarray(bending.T @ bending)
     U = sla.cholesky(Q)
-    for seed in range(40):
+    for seed in range(60):
         p = np.random.default_rng(seed).standard_normal(size)
         found = block_pivoting(lambda C, p=p: forces_on(C, Q, p), p > 0, np.diag(Q), 1e-12, 10_000)
         assert found.converged
         wanted = nnls(U, sla.solve_triangular(U, p, trans=1))[0]
         np.testing.assert_allclose(found.trial.lam, wanted, atol=1e-8 * max(1.0, wanted.max()))
         descended += found.descents > 0
-    assert descended > 3 if stale == 0 else descended < 3
+    assert descended > 3
 
 
 @pytest.mark.parametrize(("stale", "seed"), [(0, 0), (0, 5), (MAX_STALE_PASSES, 5)])

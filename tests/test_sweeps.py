@@ -45,10 +45,10 @@ def chain(m: int) -> np.ndarray:
 
 
 def decaying() -> np.ndarray:
-    """exp(−distance/3) between the contacts of a joint, numbered line by line."""
+    """Of the distance between contacts, numbered line by line; slowly, so that M needs sweeps."""
     nodes = np.array([(i, j) for i in range(LINES) for j in range(ACROSS)], dtype=float)
     distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
-    return np.asfortranarray(np.exp(-distance / 3))
+    return np.asfortranarray(1 / (1 + distance / 2) + 0.01 * np.eye(LINES * ACROSS))
 
 
 def rotated(m: int, condition: float, seed: int) -> np.ndarray:
@@ -126,16 +126,16 @@ def test_m_has_a_narrow_band_where_q_decays_alone() -> None:
             np.testing.assert_allclose(full(M) @ given, np.eye(len(Q)), atol=1e-8)
 
 
-def test_an_indefinite_q_fails() -> None:
+@pytest.mark.parametrize("name", ["newton", "ipm-fast"])
+def test_an_indefinite_q_fails(name: str) -> None:
     Q = decaying()
     Q[:, 7] = Q[7, :] = 0.0
     Q[7, 7] = -1.0
-    for name in ("newton", "ipm-fast"):
-        solver = make_solver(name, {})
-        state = solver.prepare(in_form(dual_alone(Q), "dual"))
-        answer = solver.solve(state, LoadCase(*np.ones((3, len(Q)))), TOLERANCE)
-        assert answer.status == "failed"
-        assert "not positive definite" in answer.details["cause"]
+    session = SolverSession(make_solver(name, {}), in_form(dual_alone(Q), "dual"), TOLERANCE)
+    session.open(batched=False)
+    answer = session.next(LoadCase(*np.ones((3, len(Q)))), None)
+    assert answer.status == "failed"
+    assert "not positive definite" in answer.details["cause"]
 
 
 def far(m: int = 120) -> Prepared:
@@ -247,13 +247,17 @@ def test_unsettled_forces_are_cut_at_zero_and_judged_as_such(monkeypatch: pytest
     monkeypatch.setattr(sweeps, "MAX_SWEEPS", 2)
     own = Sweeps(banded_inverse(Q, None), np.diag(Q), dual_alone(Q).gaps)
     case = own.solved(LoadCase(p * 0, -p, p), TOLERANCE)
+    assert not case.settled
     answer = own.answer(case, TOLERANCE)
     assert (answer.status, answer.iterations) == ("iteration_limit", 2)
-    assert case.trial.lam.min() < 0
+    lam = case.trial.lam.copy()
+    lam[case.C.argmax()] = -1e-3  # N, cut off, and the gaps are computed again
+    case.trial = replace(case.trial, lam=lam)
+    answer = own.answer(case, TOLERANCE)
     wanted = residual(Q, p, answer.lam)
     assert wanted > TOLERANCE
     assert answer.details["kkt_residual_mm"] == pytest.approx(wanted)
-    assert "2 products" in answer.details["cause"] or "products" in answer.details["cause"]
+    assert "products" in answer.details["cause"]
 
 
 def test_what_sweeps_settle_is_solved() -> None:
