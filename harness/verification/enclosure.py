@@ -168,13 +168,13 @@ def _count(panel: Any) -> Vector:
 
 
 def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[[Matrix], Matrix]]:
-    """The entries of M diag(unit), of each row (r, 1) their number and the exponent of the largest, and what
-    gives each entry its row's.
+    """The entries of M diag(unit), of each row (r, 1) their number, zeros of a dense M not counted, and the
+    exponent of the largest, and what gives each entry its row's.
     """
     if not sp.issparse(panel):
         entries = panel * unit
         top = exponent(abs(entries).max(axis=1, keepdims=True))
-        return entries, np.full_like(top, panel.shape[1]), top, lambda of_row: of_row
+        return entries, np.count_nonzero(entries, axis=1, keepdims=True), top, lambda of_row: of_row
     entries, count = panel.data * unit[panel.indices], np.diff(panel.indptr)
     largest = np.zeros(len(count))
     largest[count > 0] = (
