@@ -189,7 +189,7 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     case, first = make_load(1, data)
     closed = solve_by_nnls(data, case)[1] > 0
     second = replace(first, p=first.p + data.Q @ np.where(closed, 1.0, 0.0))  # N more on each closed contact
-    own = Sweeps(banded_inverse(data.Q, None), np.diag(data.Q), data.gaps)
+    own = Sweeps(data)
     one, two = (own([load], TOLERANCE)[0] for load in (first, second))
     assert one.lam is not None
     assert two.iterations <= 2
@@ -245,7 +245,7 @@ def test_where_exchanges_circle_the_sets_settle(m: int, condition: float, spread
 def test_unsettled_forces_are_cut_at_zero_and_judged_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     Q, p = decaying(), np.random.default_rng(3).standard_normal(LINES * ACROSS)
     monkeypatch.setattr(sweeps, "MAX_SWEEPS", 2)
-    own = Sweeps(banded_inverse(Q, None), np.diag(Q), dual_alone(Q).gaps)
+    own = Sweeps(dual_alone(Q))
     case = own.solved(LoadCase(p * 0, -p, p), TOLERANCE)
     assert not case.settled
     answer = own.answer(case, TOLERANCE)
