@@ -44,7 +44,6 @@ USUAL: list[Variant] = [
     for form in make_solver(name, {}).forms
 ]
 OTHERS: list[Variant] = [
-    ("newton", "dual", {"nested": False}),
     *(("ipm-fast", "dual", {key: False}) for key in ("finish", "single", "start_at_gaps")),
     *(("ipm", "dual", {"start": name}) for name in ("algorithm_4", "stp1", "stp2", "mehrotra")),
     *(("ipm", "dual", {"scheme": name}) for name in ("algorithm_2", "mehrotra")),
