@@ -110,7 +110,7 @@ def test_stiffer_and_stiffer_springs_leave_few_sets_to_pivot() -> None:
     assert data.assembly.m > 3000
     answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
     assert answer.status == "solved"
-    assert answer.details["factorisations"] <= 6
+    assert answer.inner_iterations <= 10  # contact sets, a factorisation of K each
 
 
 def test_the_matrices_are_those_of_linear_triangles() -> None:

@@ -91,6 +91,7 @@ class SolverSession:
 
     def warm(self, load: LoadCase, start: WarmStart) -> Answer:
         """Update for the next load case, and solve."""
+        self.units = self.units.followed_by(load)
         with self._step("setup_s"):
             given = self.units.load(load), self.units.tolerance(self.tolerance)
             near = WarmStart(self.units.load(start.load), *self.units.start(start.lam, start.gap, start.x))

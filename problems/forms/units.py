@@ -65,10 +65,18 @@ class Units:
 
     def of_loads(self, loads: Sequence[LoadCase]) -> Units:
         """With the ℓ of these load cases; 1 if there are neither loads nor gaps."""
-        size = max((float(abs(self.delta * self.R * load.g).max(initial=0.0)) for load in loads), default=0.0)
-        if not _usual(size):
-            size = max(size, *(self._moved(load) for load in loads))
+        size = self._size(loads)
         return replace(self, length=1.0 if size == 0 or _usual(size) else float(power_of_two(size)))
+
+    def followed_by(self, load: LoadCase) -> Units:
+        """These, in which what was solved before may be kept; others, for a load case of quite another size."""
+        size = self._size([load])
+        return self if size == 0 or _usual(size / self.length) else self.of_loads([load])
+
+    def _size(self, loads: Sequence[LoadCase]) -> float:
+        """About the displacements, mm."""
+        size = max((float(abs(self.delta * self.R * load.g).max(initial=0.0)) for load in loads), default=0.0)
+        return size if _usual(size) else max(size, *(self._moved(load) for load in loads))
 
     def _moved(self, load: LoadCase) -> float:
         """max |f_i|/k_ii, as of displacements at contacts, mm."""
