@@ -69,9 +69,9 @@ class Units:
         return replace(self, length=1.0 if size == 0 or _usual(size) else float(power_of_two(size)))
 
     def followed_by(self, load: LoadCase) -> Units:
-        """These, in which what was solved before may be kept; others, for a load case of quite another size."""
+        """These, in which what was solved before may be kept; others, for a load case of another size."""
         size = self._size([load])
-        return self if size == 0 or _usual(size / self.length) else self.of_loads([load])
+        return self if _usual(size / self.length) else self.of_loads([load])
 
     def _size(self, loads: Sequence[LoadCase]) -> float:
         """About the displacements, mm."""
