@@ -195,9 +195,7 @@ MUTANTS = [
     Mutant(DENSE, "    if info:\n            return None\n        largest", "    largest"),
     Mutant(BANDED, "return None if info else ", "return "),
     Mutant(
-        BALANCE,
-        "np.log2(np.where(positive, diagonal, 1.0)) / 2",
-        "np.log2(np.where(positive, diagonal, 1.0))",
+        BALANCE, "np.sqrt(np.where(diagonal > 0, diagonal, 1.0))", "np.where(diagonal > 0, diagonal, 1.0)"
     ),
     Mutant(BALANCE, "solve(v / D) / D", "solve(v)"),
     # Verdicts

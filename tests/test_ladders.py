@@ -11,6 +11,7 @@ import pytest
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
+from harness.solving.session import SolverSession
 from harness.verification.judge import judge
 from harness.verification.reference import best_of_candidates
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
@@ -141,10 +142,9 @@ def judged(name: str, solver: str, form: Form, tolerance: float) -> tuple[Answer
     """The answer on a rung and its verdict."""
     base = opened(name)
     data, case = base.prepared, base.load
-    made = make_solver(solver, {})
-    state = made.prepare(made.convert(in_form(data, form)))
-    load = LoadCase(case.f, case.g, data.dual_load(case))
-    answer = made.solve(made.setup(state, load, tolerance), load, tolerance)
+    session = SolverSession(make_solver(solver, {}), in_form(data, form), tolerance)
+    session.open()
+    answer = session.next(LoadCase(case.f, case.g, data.dual_load(case)), None)
     assert answer.lam is not None
     assert np.isfinite(answer.lam).all()
     x = answer.x if answer.x is not None else data.recover(answer.lam, case)

@@ -125,9 +125,9 @@ def _backward_error(
 ) -> float:
     A = prepared.assembly.A
     K_norm = prepared.assembly.K.norm
-    A_norm, At_norm = (float(abs(A).sum(axis=axis).max()) for axis in (1, 0))
+    A_norm, At_norm = (float(abs(A).sum(axis=axis).max(initial=0.0)) for axis in (1, 0))
     x_size = float(np.abs(x).max())
-    F = K_norm * x_size + float(np.abs(load.f).max()) + A_norm * float(np.abs(lam).max())
-    G = At_norm * x_size + float(np.abs(load.g).max())
+    F = K_norm * x_size + float(np.abs(load.f).max()) + A_norm * float(np.abs(lam).max(initial=0.0))
+    G = At_norm * x_size + float(np.abs(load.g).max(initial=0.0))
     complementarity = np.minimum(lam * A_norm / (F or 1.0), y / (G or 1.0))
-    return float(max(np.abs(force).max() / (F or 1.0), np.abs(complementarity).max()))
+    return float(max(np.abs(force).max() / (F or 1.0), np.abs(complementarity).max(initial=0.0)))

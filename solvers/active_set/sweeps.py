@@ -10,7 +10,8 @@ by a few contact sets of block principal pivoting, each a band factorisation, an
 load cases in one product. A sweep reduces the error by max|1 − eig(MQ)|, about 0.1 on a joint of plates. On a
 set that no longer changes, sweeps are steps of the conjugate gradient method preconditioned with M, and y
 follows by its change Q(λ⁺ − λ), whose rounding shrinks with it: that of Qλ⁺ − p would come back in every
-sweep, M's error carrying it into soft modes, up to √cond(Q) times as large.
+sweep, M's error carrying it into soft modes, up to √cond(Q) times as large. But where y was last computed at
+far larger forces, it is computed anew.
 
 An edge of contact creeps by about a row of contacts per set. As long as λ is far from the solution, a product
 corrects more than further sets; so the limit on the sets of a sweep grows with the sweeps.
@@ -28,7 +29,7 @@ from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandFactor
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
-from solvers.kkt import kkt_residual, largest_rounding
+from solvers.kkt import EPS, kkt_residual, largest_rounding, rounding_of
 
 from .banded_sets import BandedSets
 from .block_pivoting import ROUNDING_FACTOR, Set, TrialSolution, block_pivoting, wrong_signs
@@ -38,6 +39,7 @@ MAX_SWEEPS = 200
 FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
 TARGET = 0.02  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
 STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve the residual, at one that can be rounding
+SMALL = 2.0  # of the rounding of y: one that y may have brought along
 STEP_RANGE = 0.5, 2.0  # on an unchanged set; beyond it, a step is rounding
 
 
@@ -47,7 +49,8 @@ class Case:
 
     C : its contact set. trial : λ (m,) N, y (m,) mm, and |y_C|. factor : of M on the open contacts. before :
     the last step and Q times it, if the set was the one before. residual : max(|y_C|, max(−y)). stalled :
-    sweeps in succession that did not halve it. settled : no sign is wrong, and it is small enough.
+    sweeps in succession that did not halve it. settled : no sign is wrong, and it is small enough. doubt :
+    the rounding that y has brought along since it was last computed anew, mm.
     """
 
     load: LoadCase
@@ -56,6 +59,7 @@ class Case:
     factor: BandFactor | None = None
     before: tuple[Vector, Vector] | None = None
     residual: float = np.inf
+    doubt: float = np.inf
     stalled: int = 0
     settled: bool = False
     sweeps: int = 0
@@ -135,16 +139,23 @@ class Sweeps:
         compliance, left = self.diagonal[order], cases
         for _ in range(MAX_SWEEPS):
             found = [self._step(case, compliance) for case in left]
+            kept = [
+                same and case.doubt <= SMALL * largest_rounding(compliance, case.load.p[order], lam)
+                for case, (lam, same) in zip(left, found, strict=True)
+            ]
             moved = np.empty((len(order), len(left)), order="F")
             moved[order] = np.column_stack(
-                [lam - case.trial.lam if same else lam for case, (lam, same) in zip(left, found, strict=True)]
+                [
+                    lam - case.trial.lam if k else lam
+                    for case, (lam, _), k in zip(left, found, kept, strict=True)
+                ]
             )
-            loads = [
-                _none(each.load) if same else each.load for each, (_, same) in zip(left, found, strict=True)
-            ]
+            loads = [_none(case.load) if k else case.load for case, k in zip(left, kept, strict=True)]
             y = self.gaps(moved, loads)[order].T
-            for case, (lam, same), gap in zip(left, found, y, strict=True):
-                self._take(case, lam, case.trial.y + gap if same else gap, same, compliance, tolerance)
+            for case, (lam, same), gap, k in zip(left, found, y, kept, strict=True):
+                if not k:
+                    case.doubt = rounding_of(case.load.p[order], gap)
+                self._take(case, lam, case.trial.y + gap if k else gap, same, compliance, tolerance)
             left = [case for case in left if not case.settled]
             if not left:
                 break
@@ -179,6 +190,7 @@ class Sweeps:
         case.before = None
         if unchanged and curvature > 0:
             share = float(np.clip(-slope / curvature, *STEP_RANGE))
+            case.doubt = max(case.doubt, 4 * EPS * float(abs(case.trial.y).max()))
             lam, y = case.trial.lam + share * step, case.trial.y + share * change
             case.before = step, change
         missed = float(abs(y[case.C]).max(initial=0.0))
