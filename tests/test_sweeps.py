@@ -171,14 +171,16 @@ def test_cold_warm_and_batched_in_any_order_are_the_answer_of_nnls(
     assert len(closed) > 2
 
 
-@pytest.mark.parametrize("mean", [-2.5, 0.0, 3.0, 8.0])
-def test_a_loose_tolerance_needs_no_more_products_than_a_tight_one(mean: float) -> None:
+@pytest.mark.parametrize(("mean", "most"), [(-2.5, 5), (0.0, 10), (3.0, 10), (8.0, 11)])
+def test_a_loose_tolerance_needs_no_more_products_than_a_tight_one(mean: float, most: int) -> None:
+    """Steps that are not conjugate would take 7, 11, 11 and 12."""
     Q = decaying()
     p = np.random.default_rng(3).standard_normal(len(Q)) + mean
     answers = [solved(Q, p, tolerance) for tolerance in (1e-2, 1e-4, 1e-8, 1e-10)]
     assert [answer.status for answer in answers] == ["solved"] * 4
     products = [answer.iterations for answer in answers]
     assert products == sorted(products)
+    assert products[-1] <= most
     assert residual(Q, p, answers[-1].lam) <= TOLERANCE
     assert 0 < answers[-1].details["closed"] < len(Q)
 
@@ -232,14 +234,15 @@ def test_nearly_degenerate_sets(size: float) -> None:
     np.testing.assert_allclose(answer.lam, lam, atol=1e-8)
 
 
-@pytest.mark.parametrize(("m", "condition", "spread"), [(92, 1e9, 8), (107, 4e9, 8), (181, 1e6, 0)])
-def test_where_exchanges_circle_the_sets_settle(m: int, condition: float, spread: float) -> None:
-    """Loads of many sizes on a Q without locality: block exchanges alone do not end."""
-    rng = np.random.default_rng(m)
-    Q, p = rotated(m, condition, m), 10 ** rng.uniform(-spread, 0, m) * rng.choice([-1, 1], m)
+@pytest.mark.parametrize("seed", [1, 2, 5, 8])
+def test_where_exchanges_circle_the_sets_settle(seed: int) -> None:
+    """Loads of many sizes on a Q without locality: block exchanges alone do not end, descent does."""
+    rng = np.random.default_rng(seed)
+    Q, p = rotated(100, 3e9, seed), 10 ** rng.uniform(-12, 0, 100) * rng.choice([-1, 1], 100)
     answer = solved(Q, p)
     assert answer.status == "solved"
-    assert residual(Q, p, answer.lam) <= 1e-9
+    assert answer.iterations <= 40
+    assert residual(Q, p, answer.lam) <= TOLERANCE
 
 
 def test_unsettled_forces_are_cut_at_zero_and_judged_as_such(monkeypatch: pytest.MonkeyPatch) -> None:

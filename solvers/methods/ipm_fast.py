@@ -101,7 +101,7 @@ class FastIpm(Solver):
             details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
             done = residual <= tolerance or stalled == STALLED
             if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
-                answer = ready.finish.solve_from(ratio > 1, point.lam, load, tolerance)
+                answer = ready.finish.solve_from(ratio > 1, load, tolerance)
                 details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             if residual <= tolerance:

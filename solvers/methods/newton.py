@@ -18,7 +18,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from problems.forms.assembly import Vector
 from problems.stiffness.block import NotPositiveDefinite
 from solvers.active_set.block_pivoting import Set
 from solvers.active_set.sweeps import Sweeps
@@ -57,11 +56,9 @@ class DualState:
             found = sweeps(given, tolerance)
         return with_x(prepared, found, loads, tolerance) if sparse else found
 
-    def solve_from(self, C: Set, lam: Vector, load: LoadCase, tolerance: float) -> Answer:
-        """A load case with p from a contact set and the forces on it, (m,) N."""
-        lam = np.where(C, lam, 0.0)
-        start = WarmStart(load, lam, self.sweeps.gaps(lam[:, None], [load])[:, 0])
-        return self.sweeps.answer(self.sweeps.solved(load, tolerance, start, C), tolerance)
+    def solve_from(self, C: Set, load: LoadCase, tolerance: float) -> Answer:
+        """A load case with p from a contact set."""
+        return self.sweeps.answer(self.sweeps.solved(load, tolerance, C=C), tolerance)
 
 
 class ActiveSetNewton(Solver):
