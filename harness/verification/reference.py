@@ -29,10 +29,9 @@ from .definite import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
 from .proof import Proof, Proven
 
-ESTIMATED = 0.5  # of an estimate of λmin that is no smaller
 STOPPED = "no further method was tried"
 UNPROVEN = "could not be proven"
-KNOWN, ESTIMATED = 0.9, 0.5  # shares of λmin from Lanczos, and of an estimate that is no smaller
+ESTIMATED = 0.5  # of an estimate of λmin that is no smaller
 
 
 def default_limit_s(m: int) -> float:
@@ -48,10 +47,9 @@ def reference_of(
     given: Sequence[Vector] = (),
 ) -> Reference:
     """The reference of a scene: the answer that it was made from, if any, else that of its load case."""
-    if isinstance(scene, MadeScene) and scene.made.x is not None and scene.made.lam is not None:
-        made = scene.made
-        x, lam = scene.made.x, scene.made.lam
-        return Reference(x, lam, lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm)
+    made = scene.made if isinstance(scene, MadeScene) else None
+    if made is not None and made.x is not None and made.lam is not None:
+        return Reference(made.x, made.lam, made.lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm)
     return reference(prepared, load, limit_s, given)
 
 

@@ -93,11 +93,8 @@ class DenseBlock(Block):
             values = np.linalg.eigvalsh(K)
             return float(values[0]), float(values[-1])
 
-        def solve(b: Vector) -> Vector:
-            return sla.cho_solve((self.U, False), b, check_finite=False)
-
         v0 = np.random.default_rng(0).standard_normal(n)
-        inverse = LinearOperator((n, n), matvec=solve, dtype=float)
+        inverse = LinearOperator((n, n), matvec=self.solve, dtype=float)
         largest, smallest_inverse = (
             eigsh(op, 1, which="LA", v0=v0, tol=1e-6, return_eigenvectors=False)[0] for op in (K, inverse)
         )

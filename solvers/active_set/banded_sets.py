@@ -15,9 +15,7 @@ import numpy as np
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 
-from .block_pivoting import Set, TrialSolution
-
-SIGN_UNCERTAINTY = 1e-5  # of |y_C| at the point: smaller values have no reliable sign
+from .block_pivoting import SIGN_UNCERTAINTY, Set, TrialSolution
 
 
 class BandedSets:

@@ -12,6 +12,7 @@ from problems.forms.assembly import Vector
 
 MAX_STALE_PASSES = 10  # passes without a new smallest count of wrong signs, before steps of descent
 ROUNDING_FACTOR = 10.0  # times the observed rounding: a value closer to zero has no wrong sign
+SIGN_UNCERTAINTY = 1e-5  # of |y_C| where a change starts: smaller values have no reliable sign
 
 Set = NDArray[np.bool_]
 

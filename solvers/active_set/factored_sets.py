@@ -29,12 +29,11 @@ from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
 from solvers.base import LoadCase
 
-from .block_pivoting import Set, TrialSolution
+from .block_pivoting import SIGN_UNCERTAINTY, Set, TrialSolution
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
 PASSES = 2
 GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
-SIGN_UNCERTAINTY = 1e-5  # of |y_C| at the point: smaller values have no reliable sign
 
 
 @dataclass(frozen=True)
