@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.linalg import blas
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.linear_algebra.conjugate_gradients import Solved, conjugate_gradients
 
+from .conjugate_gradients import Solved, conjugate_gradients
 from .newton_system import Direct, NewtonSystem
 
 #: CG iterations after which a factorisation in a new order pays off. A Cholesky factorisation takes m³/3

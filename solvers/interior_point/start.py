@@ -26,7 +26,7 @@ MULTIPLIER = 2.0  # the multiplier of λ, > 1
 MAX_STEPS = 200  # multiplications, and sweeps of corrections
 
 
-class NoStart(ValueError):
+class NoStart(np.linalg.LinAlgError):
     """No feasible starting point was found."""
 
 

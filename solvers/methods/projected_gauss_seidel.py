@@ -19,8 +19,8 @@ from scipy.linalg import blas
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Answer, LoadCase
-from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
 from solvers.kkt import kkt_residual, kkt_status, rounding_of
+from solvers.method import Method, State, first_point
 from solvers.settings import require
 
 CHECKED = 10  # sweeps after which y is computed anew
@@ -28,7 +28,7 @@ SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slowe
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
-class ProjectedGaussSeidel(DenseDualSolver):
+class ProjectedGaussSeidel(Method):
     """Projected Gauss–Seidel, from λ = 0 or a warm start.
 
     Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Qλ|)) mm, looked at after every
@@ -52,7 +52,7 @@ class ProjectedGaussSeidel(DenseDualSolver):
             max_sweeps=(self.max_sweeps >= 1, "must be at least 1"),
         )
 
-    def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
         lam, y = first_point(ready.start, load)
         products, sweeps = 0, 0
