@@ -19,21 +19,21 @@ corrects more than further sets; so the limit on the sets of a sweep grows with 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.forms.banded_inverse import BandFactor
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
 from solvers.kkt import EPS, kkt_residual, largest_rounding, rounding_of
 
-from .banded_sets import BandedSets
+from .banded_sets import OpenFactor, banded_set
 from .block_pivoting import ROUNDING_FACTOR, Set, TrialSolution, block_pivoting, wrong_signs
-from .factored_sets import FactoredSets, approached_set
+from .factored_sets import factored_set, penalty_continuation
 
 MAX_SWEEPS = 200
 FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
@@ -56,7 +56,7 @@ class Case:
     load: LoadCase
     C: Set
     trial: TrialSolution
-    factor: BandFactor | None = None
+    factor: OpenFactor | None = None
     before: tuple[Vector, Vector] | None = None
     residual: float = np.inf
     doubt: float = np.inf
@@ -89,7 +89,8 @@ class Sweeps:
         before = self.last or [self.solved(loads[0], tolerance)]
         self.last = self._sweep([self._from(_nearest(before, each), each) for each in loads], tolerance)
         for case in self.last:
-            case.factor = None  # as large as M for each; the next cases have other sets
+            if case.factor is not None:
+                case.factor.last = None  # as large as M for each; the next cases have other sets
         return [self.answer(case, tolerance) for case in self.last]
 
     def solved(
@@ -99,7 +100,7 @@ class Sweeps:
         order = self.order
         if start is None:
             y = -load.p[order]
-            first = y < 0 if self.M is not None else approached_set(self.prepared, load)
+            first = y < 0 if self.M is not None else penalty_continuation(self.prepared, load)
             case = Case(load, first, TrialSolution(np.zeros(len(y)), y, float(abs(y).max(initial=0.0))))
         else:
             lam, y = start.lam[order], start.gap[order]
@@ -110,8 +111,8 @@ class Sweeps:
         return self._sweep([case], tolerance)[0]
 
     def answer(self, case: Case, tolerance: float) -> Answer:
-        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew where
-        the rounding that it brought along decides, or a force was below zero.
+        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew
+        where the rounding that it brought along decides, or a force was below zero.
 
         "solved" if max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm.
         """
@@ -134,7 +135,7 @@ class Sweeps:
         """A load case that starts from the solution of another one."""
         y = solved.trial.y + (solved.load.p - load.p)[self.order]
         trial = TrialSolution(solved.trial.lam, y, float(abs(y).max(initial=0.0)))
-        return Case(load, solved.C, trial, solved.factor)
+        return Case(load, solved.C, trial, None if solved.factor is None else replace(solved.factor))
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
         order = self.order
@@ -167,15 +168,16 @@ class Sweeps:
         """λ (m,) of the case with Q replaced by M⁻¹, and whether its set is the one before; on such a set it
         is conjugate to the last step.
         """
-        sets: BandedSets | FactoredSets
+        at: Callable[[Set], TrialSolution]
         if self.M is None:
-            sets = FactoredSets(self.prepared, case.trial)
+            at = partial(factored_set, self.prepared, case.trial)
         else:
-            sets = BandedSets(self.M, case.trial, case.factor)
+            case.factor = case.factor or OpenFactor(self.M)
+            at = partial(banded_set, case.factor, case.trial)
         floor = largest_rounding(compliance, case.load.p[self.order], case.trial.lam)
-        found = block_pivoting(sets.at, case.C, compliance, floor, int(FIRST_SETS * GROWTH**case.sweeps))
+        found = block_pivoting(at, case.C, compliance, floor, int(FIRST_SETS * GROWTH**case.sweeps))
         unchanged = not (case.C ^ found.C).any()
-        case.C, case.factor, case.sets = found.C, sets.factor, case.sets + found.passes
+        case.C, case.sets = found.C, case.sets + found.passes
         lam = found.trial.lam
         if unchanged and case.before is not None:
             step, change = case.before

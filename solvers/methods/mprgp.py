@@ -11,12 +11,12 @@ smooth fields only, and the face changes contact by contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, ClassVar
 
 from problems.forms.assembly import Vector
+from problems.forms.banded_inverse import BandedInverse
+from solvers.active_set.banded_sets import OpenFactor
 from solvers.base import Answer, Form, LoadCase, Problem, Status, failed
 from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
 from solvers.gradient_projection.proportioning import Proportioning
@@ -30,10 +30,11 @@ PRECONDITIONERS = ("band", "face", "none")
 
 @dataclass(frozen=True, kw_only=True)
 class _State(State):
-    """diagonal : of Q, or about that. metric : makes a load case's own."""
+    """diagonal : of Q, or about that. alpha : ᾱ of the metric."""
 
     diagonal: Vector
-    metric: Callable[[], Diagonal]
+    alpha: float
+    M: BandedInverse
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
@@ -72,14 +73,14 @@ class Mprgp(Method):
         Q, diagonal, M = problem.prepared.compliance, near.diagonal, near.M
         if M is None:
             return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
-        metric: Callable[[], Diagonal]
+        alpha = 1.0 if self.preconditioner == "band" else step_length(Q, diagonal)
+        return _State(problem=problem, diagonal=diagonal, alpha=alpha, M=M)
+
+    def _metric(self, ready: _State) -> Diagonal:
         if self.preconditioner == "none":
-            metric = partial(Diagonal, diagonal, step_length(Q, diagonal))
-        elif self.preconditioner == "face":
-            metric = partial(Face, diagonal, step_length(Q, diagonal), M)
-        else:
-            metric = partial(Band, diagonal, 1.0, M)
-        return _State(problem=problem, diagonal=diagonal, metric=metric)
+            return Diagonal(ready.diagonal, ready.alpha)
+        kind = Band if self.preconditioner == "band" else Face
+        return kind(ready.diagonal, ready.alpha, OpenFactor(ready.M))
 
     def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
         prepared, sparse, start = ready.problem.prepared, "x" in ready.problem.needs, ready.start
@@ -90,7 +91,7 @@ class Mprgp(Method):
         def gaps(lam: Vector) -> Vector:
             return prepared.gaps(lam[:, None], [given])[:, 0]
 
-        metric = ready.metric()
+        metric = self._metric(ready)
         case = Proportioning(
             prepared.compliance, given.p, ready.diagonal, metric, gaps, *first_point(start, given)
         )
