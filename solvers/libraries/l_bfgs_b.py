@@ -7,29 +7,32 @@ when the objective no longer changes in its last digit, which it also calls a su
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import minimize
 
-from problems.errors import InputError
 from problems.forms.assembly import Vector
 from solvers.adapter import Converted, dense
 from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.settings import require
 
 LIMIT = 1_000_000  # iterations, and products with Q
 
 
+@dataclass(kw_only=True, frozen=True, eq=False)
 class LBfgsB(Solver):
     """It starts from λ = 0 or a warm start. maxcor : pairs of vectors in the approximate Hessian."""
 
     forms: ClassVar[tuple[Form, ...]] = ("dual",)
-    distribution = "scipy"
+    distribution: ClassVar[str | None] = "scipy"
 
-    def __init__(self, *, maxcor: int = 10) -> None:
-        if type(maxcor) is not int or maxcor < 1:
-            raise InputError.one("solver l-bfgs-b", "options.maxcor", maxcor, "must be a whole number from 1")
-        self.maxcor = maxcor
+    maxcor: int = 10
+
+    def __post_init__(self) -> None:
+        valid = type(self.maxcor) is int and self.maxcor >= 1
+        require("l-bfgs-b", vars(self), maxcor=(valid, "must be a whole number from 1"))
 
     def convert(self, problem: Problem) -> Converted:
         return Converted(problem, dense(problem.blocks))
