@@ -22,14 +22,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
-from solvers.kkt import EPS, kkt_residual, largest_rounding, rounding_of
+from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
 
 from .banded_sets import OpenFactor, banded_set
 from .block_pivoting import ROUNDING_FACTOR, Set, TrialSolution, block_pivoting, wrong_signs
@@ -83,6 +82,7 @@ class Sweeps:
         near = self.prepared.approximate_inverse
         self.M, self.diagonal, self.gaps = near.M, near.diagonal, self.prepared.gaps
         self.order = np.arange(len(near.diagonal)) if near.M is None else near.M.order
+        self.own = near.diagonal[self.order]
 
     def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """An answer to each load, all with p, solved together from the nearest of the cases before them."""
@@ -104,7 +104,7 @@ class Sweeps:
             case = Case(load, first, TrialSolution(np.zeros(len(y)), y, float(abs(y).max(initial=0.0))))
         else:
             lam, y = start.lam[order], start.gap[order]
-            closed = self.diagonal[order] * lam > y
+            closed = self.own * lam > y
             case = self._from(Case(start.load, closed, TrialSolution(lam, y, 0.0)), load)
         if C is not None:
             case.C = C[order]
@@ -124,12 +124,10 @@ class Sweeps:
             y = self.gaps(lam[:, None], [case.load])[:, 0]
             residual = kkt_residual(lam, y)
         enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
-        details: dict[str, Any] = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
-        status: Status = "solved" if enough else "inaccurate" if case.settled else "iteration_limit"
-        if not enough:
-            why = "rounding" if case.settled else f"{MAX_SWEEPS} products"
-            details["cause"] = f"{why}: optimal only to {residual:.1e} mm"
-        return Answer(status, lam, iterations=case.sweeps, inner_iterations=case.sets, details=details)
+        limit = "" if case.settled else f"{MAX_SWEEPS} products"
+        counts = {"iterations": case.sweeps, "inner_iterations": case.sets}
+        status: Status = "solved" if enough else "inaccurate"
+        return judged(status, lam, residual, {"closed": int(case.C.sum())}, limit, **counts)
 
     def _from(self, solved: Case, load: LoadCase) -> Case:
         """A load case that starts from the solution of another one."""
@@ -139,11 +137,11 @@ class Sweeps:
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
         order = self.order
-        compliance, left = self.diagonal[order], cases
+        left = cases
         for _ in range(MAX_SWEEPS):
-            found = [self._step(case, compliance) for case in left]
+            found = [self._step(case) for case in left]
             kept = [
-                same and case.doubt <= SMALL * largest_rounding(compliance, case.load.p[order], lam)
+                same and case.doubt <= SMALL * largest_rounding(self.own, case.load.p[order], lam)
                 for case, (lam, same) in zip(left, found, strict=True)
             ]
             moved = np.empty((len(order), len(left)), order="F")
@@ -158,13 +156,13 @@ class Sweeps:
             for case, (lam, same), gap, k in zip(left, found, y, kept, strict=True):
                 if not k:
                     case.doubt = rounding_of(case.load.p[order], gap)
-                self._take(case, lam, case.trial.y + gap if k else gap, same, compliance, tolerance)
+                self._take(case, lam, case.trial.y + gap if k else gap, same, tolerance)
             left = [case for case in left if not case.settled]
             if not left:
                 break
         return cases
 
-    def _step(self, case: Case, compliance: Vector) -> tuple[Vector, bool]:
+    def _step(self, case: Case) -> tuple[Vector, bool]:
         """λ (m,) of the case with Q replaced by M⁻¹, and whether its set is the one before; on such a set it
         is conjugate to the last step.
         """
@@ -174,8 +172,8 @@ class Sweeps:
         else:
             case.factor = case.factor or OpenFactor(self.M)
             at = partial(banded_set, case.factor, case.trial)
-        floor = largest_rounding(compliance, case.load.p[self.order], case.trial.lam)
-        found = block_pivoting(at, case.C, compliance, floor, int(FIRST_SETS * GROWTH**case.sweeps))
+        floor = largest_rounding(self.own, case.load.p[self.order], case.trial.lam)
+        found = block_pivoting(at, case.C, self.own, floor, int(FIRST_SETS * GROWTH**case.sweeps))
         unchanged = not (case.C ^ found.C).any()
         case.C, case.sets = found.C, case.sets + found.passes
         lam = found.trial.lam
@@ -184,9 +182,7 @@ class Sweeps:
             lam = lam - ((lam - case.trial.lam) @ change / (step @ change)) * step
         return lam, unchanged
 
-    def _take(
-        self, case: Case, lam: Vector, y: Vector, unchanged: bool, compliance: Vector, tolerance: float
-    ) -> None:
+    def _take(self, case: Case, lam: Vector, y: Vector, unchanged: bool, tolerance: float) -> None:
         """Take λ and y, or a part of the step, and decide whether the case is settled."""
         order = self.order
         step, change = lam - case.trial.lam, y - case.trial.y
@@ -202,8 +198,8 @@ class Sweeps:
         case.stalled = case.stalled + 1 if residual > case.residual / 2 else 0
         case.trial, case.sweeps = TrialSolution(lam, y, missed), case.sweeps + 1
         case.residual = residual
-        floor = largest_rounding(compliance, case.load.p[order], lam)
-        right = not wrong_signs(case.C, case.trial, compliance, floor).any()
+        floor = largest_rounding(self.own, case.load.p[order], lam)
+        right = not wrong_signs(case.C, case.trial, self.own, floor).any()
         enough = TARGET * tolerance
         if case.stalled:
             enough = max(tolerance, ROUNDING_FACTOR * floor)

@@ -10,7 +10,6 @@ d is the change of p from the load case whose answer is the start, and t goes fr
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.parametric_path import ParametricPath
 from solvers.active_set.principal_sets import solve_from
 from solvers.base import Answer, LoadCase, WarmStart
-from solvers.kkt import kkt_status
+from solvers.kkt import judged, kkt_status
 from solvers.method import Method, State
 from solvers.settings import require
 
@@ -49,7 +48,6 @@ class Lemke(Method):
         if not arrived:
             path.t = 0.0
             path.refresh()
-        details: dict[str, Any] = {"products": path.products}
         lam = np.maximum(path.lam, 0.0)
         y = path.y if (path.lam >= 0).all() else Q @ lam - p
         status, residual = kkt_status(Q, p, lam, y, tolerance)
@@ -59,11 +57,8 @@ class Lemke(Method):
             answer = solve_from(closed, Q, p, tolerance)
             details = {**answer.details, "finishing_sets": answer.iterations}
             return replace(answer, iterations=path.pivots, details=details)
-        details["kkt_residual_mm"] = residual
-        if status != "solved":
-            status = "iteration_limit"
-            details["cause"] = f"max_pivots = {self.max_pivots:g}: optimal only to {residual:.1e} mm"
-        return Answer(status, lam, iterations=path.pivots, details=details)
+        limit = f"max_pivots = {self.max_pivots:g}"
+        return judged(status, lam, residual, {"products": path.products}, limit, iterations=path.pivots)
 
 
 def _cold(Q: Matrix, p: Vector) -> ParametricPath:

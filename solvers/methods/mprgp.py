@@ -12,15 +12,15 @@ smooth fields only, and the face changes contact by contact.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
 from solvers.active_set.banded_sets import OpenFactor
-from solvers.base import Answer, Form, LoadCase, Problem, Status, failed
+from solvers.base import Answer, Form, LoadCase, Problem, failed
 from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
 from solvers.gradient_projection.proportioning import Proportioning
-from solvers.kkt import kkt_residual, largest_rounding
+from solvers.kkt import judged, kkt_residual, largest_rounding
 from solvers.method import Method, State, first_point
 from solvers.settings import one_of, require
 from solvers.sparse_dual import with_p, with_x
@@ -98,12 +98,13 @@ class Mprgp(Method):
         enough = case.solve(tolerance, self.max_products)
         residual = kkt_residual(case.lam, case.y)
         solved = residual <= max(tolerance, largest_rounding(ready.diagonal, given.p, case.lam))
-        status: Status = "solved" if solved else "inaccurate" if enough else "iteration_limit"
-        details: dict[str, Any] = {"products": case.products, "kkt_residual_mm": residual}
-        details |= {"steps": case.steps}
-        if not solved:
-            tried = "rounding" if enough else f"max_products = {self.max_products}"
-            details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
-        steps = sum(case.steps.values())
-        answer = Answer(status, case.lam, iterations=steps, inner_iterations=metric.sets, details=details)
+        answer = judged(
+            "solved" if solved else "inaccurate",
+            case.lam,
+            residual,
+            {"products": case.products, "steps": case.steps},
+            "" if enough else f"max_products = {self.max_products}",
+            iterations=sum(case.steps.values()),
+            inner_iterations=metric.sets,
+        )
         return with_x(prepared, [answer], [load], tolerance)[0] if sparse else answer

@@ -11,7 +11,6 @@ which converges for 0 < ω < 2, by a factor of about 1 − 1/cond(Q) per sweep: 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.linalg import blas
@@ -19,7 +18,7 @@ from scipy.linalg import blas
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Answer, LoadCase
-from solvers.kkt import kkt_residual, kkt_status, rounding_of
+from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
 from solvers.method import Method, State, first_point
 from solvers.settings import require
 
@@ -57,13 +56,13 @@ class ProjectedGaussSeidel(Method):
         lam, y = first_point(ready.start, load)
         products, sweeps = 0, 0
         reached: list[float] = []  # the residual at each check
-        cause = ""
+        limit = cause = ""
         while True:
             reached.append(kkt_residual(lam, y))
             if reached[-1] <= max(tolerance, rounding_of(p, y)):
                 break
             if sweeps >= self.max_sweeps:
-                cause = f"max_sweeps = {self.max_sweeps}"
+                limit = f"max_sweeps = {self.max_sweeps}"
                 break
             if len(reached) > PATIENCE and not reached[-1] <= SLOWEST * reached[-1 - PATIENCE]:
                 cause = f"{PATIENCE * CHECKED} sweeps did not halve the KKT residual"
@@ -73,11 +72,8 @@ class ProjectedGaussSeidel(Method):
                 sweeps += 1
             y, products = product(Q, lam) - p, products + 1
         status, residual = kkt_status(Q, p, lam, y, tolerance)
-        details: dict[str, Any] = {"products": products + sweeps, "kkt_residual_mm": residual}
-        if status == "inaccurate":
-            status = "iteration_limit" if cause.startswith("max_sweeps") else "inaccurate"
-            details["cause"] = f"{cause}: optimal only to {residual:.1e} mm"
-        return Answer(status, lam, iterations=sweeps, details=details)
+        details = {"products": products + sweeps}
+        return judged(status, lam, residual, details, limit, cause, iterations=sweeps)
 
 
 def _sweep(Q: Matrix, lam: Vector, y: Vector, relaxation: float) -> Vector:

@@ -19,7 +19,6 @@ length nor how it solves its equations: nothing here is taken from it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
@@ -27,7 +26,7 @@ import scipy.linalg as sla
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Answer, LoadCase
-from solvers.kkt import kkt_residual, kkt_status, rounding_of
+from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
 from solvers.method import Method, State, first_point
 from solvers.settings import require
 
@@ -71,22 +70,18 @@ class ProjectedNewton(Method):
     def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         point = _Point(*first_point(ready.start, load))
         newton = _Newton(ready.Q, load.p)
-        cause = f"max_iterations = {self.max_iterations}"
+        limit = f"max_iterations = {self.max_iterations}"
         for k in range(self.max_iterations + 1):
             if k == self.max_iterations or point.residual <= rounding_of(load.p, point.y):
                 break
             close = point.residual <= RESIDUAL_TARGET * tolerance
             following = newton.step(point)
             if following is None or (close and following.residual > point.residual / 2):
-                cause = "rounding"
+                limit = ""
                 break
             point = following
         status, residual = kkt_status(ready.Q, load.p, point.lam, point.y, tolerance)
-        details: dict[str, Any] = {"products": newton.products, "kkt_residual_mm": residual}
-        if status == "inaccurate":
-            status = "inaccurate" if cause == "rounding" else "iteration_limit"
-            details["cause"] = f"{cause}: optimal only to {residual:.1e} mm"
-        return Answer(status, point.lam, iterations=k, details=details)
+        return judged(status, point.lam, residual, {"products": newton.products}, limit, iterations=k)
 
 
 class _Newton:
