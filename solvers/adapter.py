@@ -67,7 +67,7 @@ class Library(Solver):
 
     def __init__(self, **options: object) -> None:
         name = type(self).__name__.lower()
-        self.own = {key: options.pop(key, values[0]) for key, values in self.choices.items()}
+        self.own: dict[str, Any] = {key: options.pop(key, values[0]) for key, values in self.choices.items()}
         require(name, self.own, **{key: one_of(self.own[key], self.choices[key]) for key in self.own})
         self.settings = chosen(name, options, self.defaults())
 

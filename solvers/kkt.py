@@ -42,7 +42,9 @@ def judged(
     details: dict[str, Any],
     limit: str = "",
     cause: str = "rounding",
-    **counts: int,
+    *,
+    iterations: int,
+    inner_iterations: int | None = None,
 ) -> Answer:
     """The answer λ with its KKT residual in the details, and with the cause if it is not solved.
 
@@ -52,7 +54,7 @@ def judged(
     if status != "solved":
         status = "iteration_limit" if limit else "inaccurate"
         details["cause"] = f"{limit or cause}: optimal only to {residual:.1e} mm"
-    return Answer(status, lam, details=details, **counts)
+    return Answer(status, lam, None, iterations, inner_iterations, details=details)
 
 
 def largest_rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:

@@ -125,9 +125,16 @@ class Sweeps:
             residual = kkt_residual(lam, y)
         enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
         limit = "" if case.settled else f"{MAX_SWEEPS} products"
-        counts = {"iterations": case.sweeps, "inner_iterations": case.sets}
         status: Status = "solved" if enough else "inaccurate"
-        return judged(status, lam, residual, {"closed": int(case.C.sum())}, limit, **counts)
+        return judged(
+            status,
+            lam,
+            residual,
+            {"closed": int(case.C.sum())},
+            limit,
+            iterations=case.sweeps,
+            inner_iterations=case.sets,
+        )
 
     def _from(self, solved: Case, load: LoadCase) -> Case:
         """A load case that starts from the solution of another one."""

@@ -17,12 +17,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
-from solvers.active_set.growing_factor import GrowingFactor
 from solvers.active_set.principal_sets import solve_from
 from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, failed
 from solvers.kkt import kkt_residual, kkt_status
@@ -171,29 +169,22 @@ def _on_support(ready: _Prepared, load: LoadCase, lam: Vector, result: GiResult)
     With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). Entries that are then negative, at
     contacts closed without a force, move to C.
     """
-    C = result.active
+    C, factor, Q = result.active, result.factor, ready.Q
     while True:
-        lam = _refined(ready, load, lam, C, result.factor)
+        lam = lam.copy()
+        for _ in range(2):
+            lam[C] = 0.0
+            r = load.p - Q @ lam
+            r[C] = 0.0
+            v = sla.cho_solve((ready.U, False), r, check_finite=False)
+            u = np.zeros_like(v)
+            u[C] = factor.solve(factor.solve_transposed(v[C]))
+            lam += v - ready.G @ u
+        lam[C] = 0.0
         negative = np.flatnonzero(lam < 0)
         if not negative.size:
             return lam
         for k in negative:
-            d = result.factor.solve_transposed(ready.G[C, k])
-            result.factor.append(d, float(np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))))
+            d = factor.solve_transposed(ready.G[C, k])
+            factor.append(d, float(np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))))
             C = np.append(C, k)
-
-
-def _refined(
-    ready: _Prepared, load: LoadCase, lam: Vector, C: NDArray[np.intp], factor: GrowingFactor
-) -> Vector:
-    lam = lam.copy()
-    for _ in range(2):
-        lam[C] = 0.0
-        r = load.p - ready.problem.Q @ lam
-        r[C] = 0.0
-        v = sla.cho_solve((ready.U, False), r, check_finite=False)
-        u = np.zeros_like(v)
-        u[C] = factor.solve(factor.solve_transposed(v[C]))
-        lam += v - ready.G @ u
-    lam[C] = 0.0
-    return lam

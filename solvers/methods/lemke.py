@@ -43,7 +43,7 @@ class Lemke(Method):
 
     def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
-        path = _cold(Q, p) if ready.start is None else _warm(Q, p, ready.start)
+        path = _path(Q, p, ready.start)
         arrived = path.follow(int(self.max_pivots * len(p)) + 10)
         if not arrived:
             path.t = 0.0
@@ -61,10 +61,8 @@ class Lemke(Method):
         return judged(status, lam, residual, {"products": path.products}, limit, iterations=path.pivots)
 
 
-def _cold(Q: Matrix, p: Vector) -> ParametricPath:
+def _path(Q: Matrix, p: Vector, start: WarmStart | None) -> ParametricPath:
+    if start is not None:
+        return ParametricPath(Q, p, p - start.load.p, 1.0, np.flatnonzero(start.lam > 0))
     d = np.random.default_rng(0).uniform(1.0, 2.0, len(p))
     return ParametricPath(Q, p, d, max(float((p / d).max(initial=0.0)), 0.0), np.empty(0, dtype=np.intp))
-
-
-def _warm(Q: Matrix, p: Vector, start: WarmStart) -> ParametricPath:
-    return ParametricPath(Q, p, p - start.load.p, 1.0, np.flatnonzero(start.lam > 0))
