@@ -111,14 +111,11 @@ def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = Non
     return Answer(status, lam, None if x is None else np.array(x, dtype=float), **facts)
 
 
-def unknowns(problem: Problem) -> int:
-    """The length of z."""
-    return sum(block.shape[0] for block in problem.blocks)
-
-
 def rows_for_bounds(problem: Problem, sign: float) -> sp.csc_matrix:
     """G, or ±I if a library takes the bounds z ≥ 0 as rows, CSC."""
-    return sp.csc_matrix(sign * sp.eye(unknowns(problem)) if problem.G is None else problem.G)
+    if problem.G is not None:
+        return sp.csc_matrix(problem.G)
+    return sp.csc_matrix(sign * sp.eye(sum(block.shape[0] for block in problem.blocks)))
 
 
 def upper_triangle(blocks: Sequence[Matrix]) -> sp.csc_matrix:
