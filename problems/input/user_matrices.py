@@ -19,6 +19,7 @@ from . import sparse_npz
 from .bounded import LARGEST
 from .dependent_contacts import refuse_dependent
 
+NAMES = ("K", "A", "f", "g", "nodes")
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
 LONGEST_LINE = 60  # characters quoted in a message
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
