@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,7 +22,6 @@ class Clamps(Positions, ContactEffect):
 
     units: ClassVar = {"clamping_force": "N", "radius": "mm", "points": "mm", "edge": "mm"}
 
-    kind: Literal["clamps"]
     clamping_force: Positive
     radius: Positive = 20.0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,7 +23,6 @@ class Fasteners(Positions, ContactEffect):
 
     units: ClassVar = {"preload": "N", "points": "mm", "edge": "mm"}
 
-    kind: Literal["fasteners"]
     preload: Positive
 
     def force(self, joint: Joint) -> Vector:

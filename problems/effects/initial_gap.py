@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,7 +35,6 @@ class InitialGap(ContactEffect, GapEffect):
 
     units: ClassVar = {"mean": "mm", "sd": "mm", "correlation_length": "mm"}
 
-    kind: Literal["initial_gap"]
     mean: Finite
     random: RandomField | None = None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,7 +26,6 @@ class InstalledFasteners(Positions, ContactEffect, TieEffect):
 
     units: ClassVar = {"stiffness": "N/mm", "approach": "mm", "points": "mm", "edge": "mm"}
 
-    kind: Literal["installed_fasteners"]
     stiffness: Positive = 1e5
     approach: Finite = 0.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import scipy.sparse as sp
 
@@ -23,7 +23,6 @@ class LocalThickness(StiffnessEffect):
 
     units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
 
-    kind: Literal["local_thickness"]
     thickness: Positive
     x: tuple[Finite, Finite]
     y: tuple[Finite, Finite]

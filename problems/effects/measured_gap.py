@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -25,7 +25,6 @@ class MeasuredGap(ContactEffect, GapEffect):
 
     units: ClassVar = {"points": "mm"}
 
-    kind: Literal["measured_gap"]
     points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3)]
 
     @model_validator(mode="before")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from problems.forms.assembly import Vector
@@ -19,7 +17,6 @@ class Pressure(PartEffect, ForceEffect):
     pushes the part in the direction of positive displacements.
     """
 
-    kind: Literal["pressure"]
     value: Finite
 
     def force(self, joint: Joint) -> Vector:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
@@ -22,7 +22,6 @@ class RigidTool(PartEffect, GapEffect):
 
     units: ClassVar = {"distance": "mm", "curvature": "1/mm", "crest": "mm"}
 
-    kind: Literal["rigid_tool"]
     distance: Finite = 0.0
     curvature: tuple[Finite, Finite] = (0.0, 0.0)
     crest: tuple[Finite, Finite] | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,6 @@ class Shims(ContactEffect, GapEffect):
 
     units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
 
-    kind: Literal["shims"]
     thickness: Positive
     x: tuple[Finite, Finite]
     y: tuple[Finite, Finite]

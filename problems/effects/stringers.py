@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,7 +18,6 @@ class Stringers(StiffnessEffect):
     pitch, start, stop in mm; I and J in mm⁴. E and G = E / 2(1 + ν) are the part's.
     """
 
-    kind: Literal["stringers"]
     pitch: Positive
     start: Finite
     stop: Finite

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated
 
 import scipy.sparse as sp
 from pydantic import Field
@@ -19,7 +19,6 @@ class Supports(StiffnessEffect):
     points in mm, on the part; stiffness in N/mm.
     """
 
-    kind: Literal["supports"]
     points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1)]
     stiffness_per_point: Positive = 1e6
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
-from problems.fem.line_loads import line_loads
+from problems.fem.hermite import line_loads
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect, PartModel
 
 
 class ThermalBending(PartLoadEffect):
@@ -24,7 +23,6 @@ class ThermalBending(PartLoadEffect):
 
     units: ClassVar = {"difference": "K", "expansion": "1/K"}
 
-    kind: Literal["thermal_bending"]
     difference: Finite
     expansion: Positive = 23e-6
 

@@ -92,7 +92,8 @@ def read(path: Path) -> Data:
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
     try:
-        return format_of(path).read(path)
+        found = format_of(path).read(path)
+        return {name: vector(M) if name in ("f", "g") else M for name, M in found.items()}
     except InputError:
         raise
     except Exception as error:  # of the libraries, which raise whatever a damaged file leads to

@@ -8,7 +8,6 @@ contact forces λ and the displacements x, the same in every form.
 
 from __future__ import annotations
 
-import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -115,11 +114,126 @@ class Problem(ABC):
         return found
 
 
+class Primal(Problem):
+    """min ½xᵀKx − fᵀx, Aᵀx ≤ g, n unknowns. Needs K and A, no factor."""
+
+    form: ClassVar[Form] = "primal"
+    bounded: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ("lam", "x")
+
+    @property
+    def blocks(self) -> tuple[Any, ...]:
+        return self.assembly.K.matrices
+
+    @property
+    def G(self) -> sp.csr_array:
+        return sp.csr_array(self.assembly.A.T)
+
+    def q(self, load: LoadCase) -> Vector:
+        return -load.f
+
+    def h(self, load: LoadCase) -> Vector:
+        return load.g
+
+    def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
+        return [read_only(case) for case in cases]
+
+    def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
+        return multipliers, z
+
+    def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector | None, Vector]:
+        return x, lam
+
+    def gap(self, load: LoadCase, lam: Vector, x: Vector | None) -> Vector:
+        assert x is not None
+        return load.g - self.assembly.A.T @ x
+
+    def distance(self, one: LoadCase, other: LoadCase) -> float:
+        """The larger of the relative changes of f and g, in their 2-norms."""
+        pairs = ((one.f, other.f), (one.g, other.g))
+        return max(float(np.linalg.norm(a - b) / (np.linalg.norm(b) or 1.0)) for a, b in pairs)
+
+    @property
+    def arrays(self) -> list[Matrix]:
+        return self.assembly.K.arrays
+
+
+class Dual(Problem):
+    """min ½λᵀQλ − pᵀλ, λ ≥ 0, m unknowns, with Q = AᵀK⁻¹A and p = AᵀK⁻¹f − g.
+
+    Needs the factors of K, for p and for x = K⁻¹(f − Aλ), and Q.
+    """
+
+    form: ClassVar[Form] = "dual"
+    bounded: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("lam",)
+
+    @property
+    def blocks(self) -> tuple[Matrix, ...]:
+        return (self.Q,)
+
+    @property
+    def G(self) -> None:
+        return None
+
+    def q(self, load: LoadCase) -> Vector:
+        return -load.p
+
+    def h(self, load: LoadCase) -> None:
+        return None
+
+    def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
+        """With p; K⁻¹f is computed once if they share their f."""
+        p = self.prepared.dual_load(stacked(cases)).T
+        pairs = zip(cases, p, strict=True)
+        return [read_only(LoadCase(case.f, case.g, np.ascontiguousarray(mine))) for case, mine in pairs]
+
+    def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
+        return z, None
+
+    def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector | None, Vector]:
+        return lam, gap
+
+    def gap(self, load: LoadCase, lam: Vector, x: Vector | None) -> Vector:
+        return self.Q @ lam - load.p
+
+    def distance(self, one: LoadCase, other: LoadCase) -> float:
+        """‖p − p'‖₂, mm."""
+        return float(np.linalg.norm(one.p - other.p))
+
+    @property
+    def arrays(self) -> list[Matrix]:
+        K = self.assembly.K
+        return [*K.arrays, *K.factors, self.Q]
+
+
+class Sparse(Primal):
+    """min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ g over all N unknowns of the model, K̂ and B sparse.
+
+    Nothing is condensed: x is û at the junction, and λ is that of the other forms. Needs K̂ and B, no factor.
+    prepared : any; if its blocks are dense, a sparse copy.
+    """
+
+    form: ClassVar[Form] = "sparse"
+
+    def __init__(self, prepared: Prepared) -> None:
+        given = prepared.assembly
+        K = given.K.as_sparse(given.nodes)
+        super().__init__(prepared if K is given.K else Prepared(replace(given, K=K)))
+
+    @property
+    def model_s(self) -> float | None:
+        return self.prepared.stages.seconds.get("model")
+
+    @property
+    def yardstick(self) -> None:
+        return None
+
+
 def in_form(prepared: Prepared, form: Form) -> Problem:
-    """The problem in the form of that name: the subclass of Problem in the file of the same name."""
-    module = importlib.import_module(f"problems.forms.{form}")
-    problem: Problem = getattr(module, form.title())(prepared)
-    return problem
+    """The problem in the form of that name."""
+    classes: dict[Form, type[Problem]] = {"primal": Primal, "dual": Dual, "sparse": Sparse}
+    return classes[form](prepared)
 
 
 def read_only(load: LoadCase) -> LoadCase:

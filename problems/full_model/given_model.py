@@ -17,15 +17,15 @@ from problems.model.scene import MadeScene, MatricesScene
 from problems.storage.cache import digest
 from problems.storage.fingerprint import fingerprint
 
-from .model import Model
-
 DENSEST = 0.25  # of a block's entries: a denser K gains nothing from the sparse form
 SMALL = 200  # unknowns up to which any K is taken
 CODE = ("problems/model", "problems/full_model", "problems/input", "problems/formats")
 
 
 @dataclass(frozen=True)
-class GivenModel(Model):
+class GivenModel:
+    """As JointModel, of the scene's own K, A, f and g."""
+
     scene: MatricesScene | MadeScene
 
     @classmethod

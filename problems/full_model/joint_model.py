@@ -23,8 +23,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
 from problems.forms.stages import CachedStages, SparseStages, indefinite
 from problems.model.effect import Effect, TieEffect
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect, PartModel
 from problems.model.scene import JointScene
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.operator import Stiffness
@@ -33,7 +32,6 @@ from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
 from .graded import graded
-from .model import Model
 from .numbering import Numbering, Unknowns
 
 CODE = ("problems/fem", "problems/model", "problems/effects", "problems/full_model")
@@ -41,7 +39,7 @@ WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model tha
 
 
 @dataclass(frozen=True)
-class JointModel(Model):
+class JointModel:
     """The parts of a scene as finite elements."""
 
     scene: JointScene
@@ -53,6 +51,7 @@ class JointModel(Model):
         return cls(scene, tuple(PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part))
 
     def sparse(self) -> Prepared:
+        """K̂ and B. Raises InputError, where factors are first needed, if K̂ is not positive definite."""
         start = time.perf_counter()
         assembly, coarser = self.assembly(), self.graded()
         seconds = time.perf_counter() - start
@@ -62,12 +61,14 @@ class JointModel(Model):
         return Prepared(assembly, stages, coarser=coarser.assembly if worth else None)
 
     def dense(self, progress: Progress) -> Prepared:
+        """K and A, memory-mapped from the cache or computed now. Raises InputError as `sparse` does."""
         stages = self._condensed(progress)
         return Prepared(stages.assembly, stages)
 
     @property
     def built(self) -> bool:
-        from .condensed import part_key  # of the dense forms only
+        """Whether every dense matrix is in the cache; computes nothing."""
+        from .condense import part_key  # of the dense forms only
 
         known = [*map(part_key, self.parts)]
         if self.springs is not None:
@@ -89,7 +90,7 @@ class JointModel(Model):
                 place, force = self.numbering.places[k], load.load(self.parts[k])
                 f[place[place >= 0]] += force[place >= 0]
             else:
-                from .condensed import condensed_load  # of the dense forms only
+                from .condense import condensed_load  # of the dense forms only
 
                 own = condensed_load(load, self.parts[k], partial(self.interior, k))
                 f[joint.unknowns(load.part)] += own
@@ -204,7 +205,7 @@ class JointModel(Model):
 
     def _condensed(self, progress: Progress) -> CachedStages:
         """K, a dense block for each part, or for parts from the first to the last that springs join."""
-        from .condensed import condensed_stiffness, part_key  # of the dense forms only
+        from .condense import condensed_stiffness, part_key  # of the dense forms only
 
         joint, source_of = self.scene.joint, self.scene.source_of
         blocks, seconds, keys = [], {}, [*map(part_key, self.parts)]

@@ -13,9 +13,8 @@ from scipy.linalg import blas, lapack
 
 from .band_solve import band_solve
 from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector
-from .local_compliance import BlockPart, Rows
 from .rounding import U, gamma
-from .selected_inverse import band_blocks
+from .selected_inverse import BlockPart, Rows, band_blocks
 
 COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
 

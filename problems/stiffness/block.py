@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .local_compliance import BlockPart, Rows
+from .selected_inverse import BlockPart, Rows
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

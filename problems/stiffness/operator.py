@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import connected_components
 from .balance import POWER_STEPS, balanced_units, least_eigenvalue
 from .block import Block, Matrix, NotPositiveDefinite, Vector
 from .dense import DenseBlock
-from .local_compliance import LocalCompliance, Rows
 from .scaled import ScaledBlock
+from .selected_inverse import LocalCompliance, Rows
 from .sparse import sparse_block
 
 DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .block import Block, Matrix, SparseBlock, Vector, scaled
-from .local_compliance import Rows
+from .selected_inverse import Rows
 
 
 class ScaledBlock(SparseBlock):
