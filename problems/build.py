@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Progress
+from problems.forms.problem import Progress, silent
 from problems.model.effect import Effect
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 
@@ -39,7 +39,7 @@ def model_of(scene: Scene) -> JointModel | GivenModel:
     return _last[1]
 
 
-def prepared(scene: Scene, progress: Progress = lambda text, fraction: None, form: Form = "dual") -> Prepared:
+def prepared(scene: Scene, progress: Progress = silent, form: Form = "dual") -> Prepared:
     """K and A of a scene, condensed from the cache or now, or as they are for the sparse form.
 
     Factors and Q are made when first needed. Raises InputError if a part can move freely, if a user's

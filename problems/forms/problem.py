@@ -24,6 +24,10 @@ from .prepared import Prepared
 Progress = Callable[[str, float], None]
 
 
+def silent(text: str, fraction: float) -> None:
+    """No progress."""
+
+
 class Problem(ABC):
     """An assembly in one of its forms. The arrays may be memory-mapped and are read-only."""
 
@@ -223,7 +227,7 @@ class Sparse(Primal):
 
     @property
     def model_s(self) -> float | None:
-        return self.prepared.stages.seconds.get("model")
+        return self.prepared.seconds.get("model")
 
     @property
     def yardstick(self) -> None:

@@ -19,9 +19,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.prepared import Prepared
-from problems.forms.problem import Progress
-from problems.forms.stages import CachedStages, SparseStages, indefinite
+from problems.forms.problem import Progress, silent
+from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
 from problems.model.effect import Effect, TieEffect
 from problems.model.part import PartLoadEffect, PartModel
 from problems.model.scene import JointScene
@@ -50,20 +49,14 @@ class JointModel:
         joint = scene.joint
         return cls(scene, tuple(PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part))
 
-    def sparse(self) -> Prepared:
+    def sparse(self) -> SparsePrepared:
         """K̂ and B. Raises InputError, where factors are first needed, if K̂ is not positive definite."""
         start = time.perf_counter()
         assembly, coarser = self.assembly(), self.graded()
         seconds = time.perf_counter() - start
         key = cache.digest("sparse", self.scene.assembly_key, fingerprint([Path(__file__)], CODE))
-        stages = SparseStages(key, seconds, self.scene.source_of, own=False)
-        worth = coarser.work < WORTH * self.work
-        return Prepared(assembly, stages, coarser=coarser.assembly if worth else None)
-
-    def dense(self, progress: Progress) -> Prepared:
-        """K and A, memory-mapped from the cache or computed now. Raises InputError as `sparse` does."""
-        stages = self._condensed(progress)
-        return Prepared(stages.assembly, stages)
+        like = coarser.assembly if coarser.work < WORTH * self.work else None
+        return SparsePrepared(assembly, key, seconds, self.scene.source_of, coarser=like)
 
     @property
     def built(self) -> bool:
@@ -73,7 +66,7 @@ class JointModel:
         known = [*map(part_key, self.parts)]
         if self.springs is not None:
             known.append(self._spring_key(cache.digest(known)))
-        return None not in map(cache.load, known) and self._condensed(lambda text, fraction: None).built
+        return None not in map(cache.load, known) and self.dense().built
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
@@ -203,8 +196,10 @@ class JointModel:
     def _interiors(self) -> dict[int, tuple[Unknowns, SparseBlock]]:
         return {}
 
-    def _condensed(self, progress: Progress) -> CachedStages:
-        """K, a dense block for each part, or for parts from the first to the last that springs join."""
+    def dense(self, progress: Progress = silent) -> DensePrepared:
+        """K and A, memory-mapped from the cache or computed now: a dense block of K for each part, or for
+        parts from the first to the last that springs join. Raises InputError as `sparse` does.
+        """
         from .condense import condensed_stiffness, part_key  # of the dense forms only
 
         joint, source_of = self.scene.joint, self.scene.source_of
@@ -223,7 +218,7 @@ class JointModel:
             blocks, before["ties"] = self._with_springs(key, blocks, groups, progress)
         nodes = np.tile(joint.nodes, (len(joint.part), 1))
         assembly = Assembly(Stiffness.of(*blocks), joint.contact_matrix(), nodes, self._names(groups))
-        return CachedStages(assembly, key, before, source_of, progress)
+        return DensePrepared(assembly, key, before, source_of, progress)
 
     def _ranges(self) -> list[list[int]]:
         """The parts of each dense block, consecutive: from the first to the last that springs join."""

@@ -15,7 +15,6 @@ from scipy.sparse.csgraph import connected_components
 from .balance import POWER_STEPS, balanced_units, least_eigenvalue
 from .block import Block, Matrix, NotPositiveDefinite, Vector
 from .dense import DenseBlock
-from .scaled import ScaledBlock
 from .selected_inverse import LocalCompliance, Rows
 from .sparse import sparse_block
 
@@ -32,7 +31,7 @@ class Stiffness:
         them from a cache, or say in an error whose K it is.
     """
 
-    def __init__(self, blocks: Sequence[Block], factor: Callable[[Stiffness], None] | None = None) -> None:
+    def __init__(self, blocks: Sequence[Block], factor: Callable[[Stiffness], object] | None = None) -> None:
         self.blocks = tuple(blocks)
         self._make = factor or Stiffness.factor_blocks
         ends = np.cumsum([0, *(block.size for block in self.blocks)])
@@ -162,15 +161,6 @@ class Stiffness:
         """About the condition number of DKD, whose largest eigenvalue is at most ‖DKD‖_∞."""
         least = min(self.least_eigenvalues(D))
         return float((self.absolute_sums(D) * D).max()) / least if least > 0 else np.inf
-
-    def scaled(self, D: Vector) -> Stiffness:
-        """DKD of sparse blocks, by the factors of K. D (n,) : powers of two."""
-        blocks = [ScaledBlock(block, D[rows]) for block, rows in self._own_rows()]
-
-        def factor(_: Stiffness) -> None:
-            self.factors  # noqa: B018  # made when first asked for
-
-        return Stiffness(blocks, factor)
 
     def compliance(self, A: sp.csc_array) -> Matrix:
         """Q = AᵀK⁻¹A, (m, m), mm/N, by columns."""
