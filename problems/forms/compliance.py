@@ -1,4 +1,4 @@
-"""Q = AᵀK⁻¹A, as a matrix or without it, by solutions with K: products, diagonal, principal submatrices."""
+"""Q = AᵀK⁻¹A, as a matrix or without it, by solutions with K: products, principal submatrices."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from problems.stiffness.operator import Stiffness
 
-from .assembly import Matrix, Vector
+from .assembly import Matrix
 from .product import product
 
 Rows = NDArray[np.intp]
@@ -26,10 +26,6 @@ class Compliance(ABC):
     @abstractmethod
     def __matmul__(self, lam: Matrix) -> Matrix:
         """Q λ, λ (m,) or (m, k)."""
-
-    @abstractmethod
-    def diagonal(self) -> Vector:
-        """(m,) mm/N."""
 
     @abstractmethod
     def submatrix(self, rows: Rows) -> Compliance:
@@ -55,9 +51,6 @@ class DenseCompliance(Compliance):
     def __matmul__(self, lam: Matrix) -> Matrix:
         return product(self.Q, lam)
 
-    def diagonal(self) -> Vector:
-        return np.diag(self.Q).copy()
-
     def submatrix(self, rows: Rows) -> DenseCompliance:
         return DenseCompliance(self.Q[np.ix_(rows, rows)].T)
 
@@ -79,9 +72,6 @@ class ComplianceProducts(Compliance):
     def __matmul__(self, lam: Matrix) -> Matrix:
         product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
         return product
-
-    def diagonal(self) -> Vector:
-        return self.toarray().diagonal().copy()
 
     def submatrix(self, rows: Rows) -> ComplianceProducts:
         return ComplianceProducts(self.K, self.A[:, rows])

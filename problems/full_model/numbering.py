@@ -1,4 +1,4 @@
-"""The unknowns of the uncondensed model, numbered so that K̂ has a narrow band.
+"""The unknowns of the full model, numbered so that K̂ has a narrow band.
 
 The unknowns û of a part are those of its plate that are not built in: deflection, slopes and twist at each
 node. They are numbered line by line across the shorter direction of the grid, and the parts that springs

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from .balance import POWER_STEPS, balanced_units, least_eigenvalue
 from .block import Block, Matrix, NotPositiveDefinite, Vector
 from .dense import DenseBlock
-from .selected_inverse import LocalCompliance, Rows
+from .selected_inverse import BlockPart, Rows
 from .sparse import sparse_block
 
 DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
@@ -174,18 +174,25 @@ class Stiffness:
 
     def local_compliance(
         self, A: sp.csc_array, windows: Sequence[Rows], single: bool = True
-    ) -> LocalCompliance | None:
-        """Q_WW of windows of contacts, in single precision to four digits, for a preconditioner; None unless
-        every block has a band along which the contacts of a window are near each other.
+    ) -> Callable[[Rows], Matrix] | None:
+        """Q_WW (k, k) mm/N, by columns, of windows W of contacts, in single precision to four digits, for a
+        preconditioner; None unless every block has a band along which those of a window are near each other.
         """
         _ = self.factors
-        parts = []
+        parts: list[BlockPart] = []
         for block, rows in self._own_rows():
             part = block.local_compliance(sp.csc_array(A[rows]), windows, single)
             if part is None:
                 return None
             parts.append(part)
-        return LocalCompliance(tuple(parts))
+
+        def local(contacts: Rows) -> Matrix:
+            Q = np.zeros((len(contacts), len(contacts)), order="F")
+            for part in parts:
+                part.add_to(Q, contacts)
+            return Q
+
+        return local
 
 
 def dense_blocks(K: sp.csr_array) -> list[Matrix]:

@@ -163,20 +163,6 @@ class BlockPart:
                 Q += left[:, None] * Z[np.ix_(row, column)] * right
 
 
-@dataclass(frozen=True)
-class LocalCompliance:
-    """Q_WW for the windows W that it was made for."""
-
-    parts: tuple[BlockPart, ...]
-
-    def __call__(self, contacts: Rows) -> Matrix:
-        """(k, k), mm/N, stored by columns."""
-        Q = np.zeros((len(contacts), len(contacts)), order="F")
-        for part in self.parts:
-            part.add_to(Q, contacts)
-        return Q
-
-
 def _padded(A: sp.csc_array) -> tuple[Rows, Matrix]:
     """(s, m) row numbers and values of the entries of each column, s the most that one has."""
     counts = np.diff(A.indptr)
