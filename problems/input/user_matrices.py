@@ -42,10 +42,9 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
             kind = ".npz with K, A, f, g" if key == "problem" else "Matrix Market file"
             where = "file" if key == "problem" else key
             raise InputError.one(path, where, str(error), f"a readable {kind}") from error
-        data |= {
-            name: M.toarray() if sp.issparse(M) and name in ("f", "g") else M for name, M in found.items()
-        }
-    return checked(data, {key: str(files.get("problem") or files.get(key)) for key in data}, sparse)
+        data |= found
+    data |= {key: data[key].toarray() for key in "fg" if sp.issparse(data.get(key))}
+    return checked(data, {key: str(files.get("problem") or files.get(key)) for key in NAMES}, sparse)
 
 
 def checked(
