@@ -42,25 +42,22 @@ class InitialGap(ContactEffect, GapEffect):
         g = at_contacts(self.mean, self.pairs(joint), joint)
         if self.random:
             rng = np.random.default_rng(self.random.seed)
-            Lx, Ly = (_square_root(grid, self.random.correlation_length) for grid in (joint.x, joint.y))
+            length = self.random.correlation_length
+            Lx, Ly = (_square_root(grid.tobytes(), length) for grid in (joint.x, joint.y))
             for pair in self.pairs(joint):
                 Z = rng.standard_normal((len(joint.y), len(joint.x)))
                 g[contacts_of(pair, joint)] += self.random.sd * (Ly @ Z @ Lx).ravel()
         return g
 
 
-def _square_root(grid: Vector, correlation_length: float) -> Matrix:
+@lru_cache(maxsize=8)  # a series draws field after field on one grid
+def _square_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     """Symmetric square root of C = exp(−(x_i − x_j)² / 2ℓ²): unique, so that no sign depends on the machine.
 
     √w of an eigenvalue w within rounding of 0 would differ by some 1e-8 from one processor, or number of
     threads, to the next, and the gaps as much. w / √(w + s) differs by rounding / √s; its square is w to
     within s = SHIFT · max w.
     """
-    return _cached_root(grid.tobytes(), correlation_length)
-
-
-@lru_cache(maxsize=8)  # a series draws field after field on one grid
-def _cached_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     grid = np.frombuffer(grid_bytes)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / correlation_length) ** 2)
     w, V = np.linalg.eigh(C)

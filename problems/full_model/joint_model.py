@@ -132,7 +132,7 @@ class JointModel:
         """K̂, a sparse block for each part or for parts that springs join, and B (N, m)."""
         blocks = []
         ends = np.cumsum([0, *self.numbering.sizes])
-        for parts, start, stop in zip(self.numbering.blocks, ends[:-1], ends[1:], strict=True):
+        for parts, start, stop in zip(self.tied, ends[:-1], ends[1:], strict=True):
             K = self._block(parts, int(start), int(stop - start))
             if self.springs is not None:
                 T, k = self.springs
@@ -141,13 +141,13 @@ class JointModel:
                 K = K + (added + added.T) / 2  # the order of products is another in K_ji: proofs see it
             blocks.append(sp.csc_array(K))
         B, nodes = self._at_junction(self.scene.joint.contact_matrix()), self._nodes()
-        names = self._names(self.numbering.blocks)
+        names = self._names(self.tied)
         return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, names, junction=self.junction)
 
     def _names(self, blocks: Iterable[Iterable[int]]) -> tuple[str, ...]:
         return tuple(" + ".join(self.scene.joint.part[part].name for part in parts) for parts in blocks)
 
-    def _block(self, parts: tuple[int, ...], start: int, size: int) -> sp.csc_array:
+    def _block(self, parts: list[int], start: int, size: int) -> sp.csc_array:
         """The stiffness of some parts, (size, size), on the unknowns from `start` on."""
         own = [self.parts[part].stiffness() for part in parts]
         K = own[0] if len(own) == 1 else sp.csr_array(sp.block_diag(own, format="csr"))

@@ -22,11 +22,10 @@ Unknowns = NDArray[np.intp]
 class Numbering:
     """places : for each part (plate.size,), the number of each of its plate's unknowns; −1 where built in.
 
-    blocks : the parts of each diagonal block of K̂. sizes : its number of unknowns.
+    sizes : the number of unknowns of each diagonal block of K̂.
     """
 
     places: tuple[Unknowns, ...]
-    blocks: tuple[tuple[int, ...], ...]
     sizes: tuple[int, ...]
 
     @classmethod
@@ -49,7 +48,7 @@ class Numbering:
                 places[part][free[part]] = offset + rank[owner == k]
             sizes.append(len(line))
             offset += len(line)
-        return cls(tuple(places), tuple(map(tuple, blocks)), tuple(sizes))
+        return cls(tuple(places), tuple(sizes))
 
     @property
     def size(self) -> int:
