@@ -1,4 +1,4 @@
-"""Q = AᵀK⁻¹A, (m, m) mm/N, as a matrix or without it, by solutions with K: products, principal submatrices."""
+"""Q = AᵀK⁻¹A, (m, m) mm/N, as a matrix, or by solutions with K: products and principal submatrices."""
 
 from __future__ import annotations
 
