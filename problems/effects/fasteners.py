@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -21,9 +21,7 @@ class Fasteners(Positions, ContactEffect):
     contact; by default a fastener goes through all of them.
     """
 
-    units: ClassVar = {"preload": "N", "points": "mm", "edge": "mm"}
-
-    preload: Positive
+    preload: Annotated[Positive, "N"]
 
     def force(self, joint: Joint) -> Vector:
         nodal = np.zeros(joint.node_count)

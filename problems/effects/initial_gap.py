@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -19,8 +19,8 @@ SHIFT = 1e-10
 class RandomField(Table):
     """Gaussian field: standard deviation and correlation length in mm, and the seed."""
 
-    sd: Positive
-    correlation_length: Positive
+    sd: Annotated[Positive, "mm"]
+    correlation_length: Annotated[Positive, "mm"]
     seed: Seed
 
 
@@ -33,9 +33,7 @@ class InitialGap(ContactEffect, GapEffect):
     `between` names one contact; by default all of them get the gap, each with its own random field.
     """
 
-    units: ClassVar = {"mean": "mm", "sd": "mm", "correlation_length": "mm"}
-
-    mean: Finite
+    mean: Annotated[Finite, "mm"]
     random: RandomField | None = None
 
     def gap(self, joint: Joint) -> Vector:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 
 from problems.forms.assembly import Vector
@@ -17,7 +19,7 @@ class Pressure(PartEffect, ForceEffect):
     pushes the part in the direction of positive displacements.
     """
 
-    value: Finite
+    value: Annotated[Finite, "N/mm²"]
 
     def force(self, joint: Joint) -> Vector:
         f = np.zeros(joint.size[0])

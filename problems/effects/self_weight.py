@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -21,10 +21,8 @@ class SelfWeight(PartLoadEffect):
     the plate and its pads, not of stringers and ribs.
     """
 
-    units: ClassVar = {"density": "kg/m³", "gravity": "m/s²"}
-
-    density: Positive = 2700.0
-    gravity: Finite = 9.80665
+    density: Annotated[Positive, "kg/m³"] = 2700.0
+    gravity: Annotated[Finite, "m/s²"] = 9.80665
 
     def load(self, model: PartModel) -> Vector:
         weight = self.density * self.gravity * KG_PER_M3_TIMES_M_PER_S2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -23,10 +23,8 @@ class SupportShift(PartLoadEffect):
     The spring of a support is then unloaded at w = shift (mm) instead of w = 0.
     """
 
-    units: ClassVar = {"shift": "mm", "points": "mm"}
-
-    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1)]
-    shift: Finite
+    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), "mm"]
+    shift: Annotated[Finite, "mm"]
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
         def points(kind: type[SupportShift | Supports]) -> list[tuple[float, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -21,10 +21,8 @@ class ThermalBending(PartLoadEffect):
     w_xx = w_yy = −κ, without stress. Stringers and ribs stay at the mean temperature.
     """
 
-    units: ClassVar = {"difference": "K", "expansion": "1/K"}
-
-    difference: Finite
-    expansion: Positive = 23e-6
+    difference: Annotated[Finite, "K"]
+    expansion: Annotated[Positive, "1/K"] = 23e-6
 
     def load(self, model: PartModel) -> Vector:
         plate = model.plate

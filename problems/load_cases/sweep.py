@@ -72,7 +72,7 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
                 effect = _changed(scene.effects[step.effect], step, value)
             except ValidationError as error:
                 effect, name = scene.effects[step.effect], effect_name(scene, step.effect)
-                faults += validation_faults(f"--sweep {step.name}", type(effect), error, name, effect.units)
+                faults += validation_faults(f"--sweep {step.name}", type(effect), error, name)
                 continue
             faults += [Fault(f"--sweep {step.name}", *fault) for fault in effect.faults(scene.joint)]
     names = [step.name for step in steps]

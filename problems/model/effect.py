@@ -19,7 +19,7 @@ import importlib
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 import scipy.sparse as sp
@@ -52,9 +52,7 @@ EXCLUDED = {
 
 
 class Effect(Table):
-    """Parameters of an effect, in mm and N."""
-
-    units: ClassVar[dict[str, str]] = {}
+    """Parameters of an effect, each with its unit, as in Annotated[Positive, "mm"]."""
 
     kind: str
 
