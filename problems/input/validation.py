@@ -18,7 +18,7 @@ VALUE, WORD = "a value", "a word"
 def validation_faults(
     where: object, model: type[BaseModel], error: ValidationError, prefix: str = ""
 ) -> Iterator[Fault]:
-    """The faults of a table that is not a valid `model`, each with the unit that the key is annotated with."""
+    """The faults of a table that is not a valid `model`, each with the unit its key is annotated with."""
     items = error.errors()
     for item in items:
         depth = len(item["loc"])
