@@ -15,7 +15,8 @@ from problems.forms.assembly import LoadCase
 from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.manufactured.exact import exact_assembly, manufacture, spectrum, two_parts
 from problems.manufactured.ladder import Ladder, Scene, matrices
-from problems.manufactured.plates import CLAMPED, FREE, Tables, plates
+
+from .plates import CLAMPED, FREE, Tables, plates
 
 
 def _stack(count: int) -> Tables:
