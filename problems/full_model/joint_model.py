@@ -156,13 +156,10 @@ class JointModel:
         order = np.empty(size, dtype=np.int32)
         order[place[free]] = free
         K = K[order]
-        column, ends = place[K.indices], K.indptr
-        if size < len(place):
-            kept = column >= 0
-            column, data, ends = column[kept], K.data[kept], np.append(0, np.cumsum(kept))[ends]
-        else:
-            data = K.data
-        found = sp.csc_array((data, column, ends), shape=(size, size))  # symmetric
+        column = place[K.indices]
+        kept = column >= 0
+        ends = np.append(0, np.cumsum(kept))[K.indptr]
+        found = sp.csc_array((K.data[kept], column[kept], ends), shape=(size, size))  # symmetric
         found.sort_indices()
         return found
 
