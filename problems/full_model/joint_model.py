@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
-from problems.model.effect import Effect, TieEffect
+from problems.model.effect import Effect, ForceEffect, GapEffect, TieEffect
 from problems.model.part import PartLoadEffect, PartModel
 from problems.model.scene import JointScene
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
@@ -71,13 +71,15 @@ class JointModel:
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
         joint, given = self.scene.joint, self.scene.effects if effects is None else tuple(effects)
-        f, g = self.scene.junction_load(given)
-        loads = [effect for effect in given if isinstance(effect, PartLoadEffect)]
+        f, g = np.zeros(self.numbering.size if sparse else joint.size[0]), np.zeros(joint.size[1])
+        here = self.junction if sparse else slice(None)
+        for effect in given:
+            if isinstance(effect, ForceEffect):
+                f[here] += effect.force(joint)
+            elif isinstance(effect, GapEffect):
+                g += effect.gap(joint)
         names = [part.name for part in joint.part]
-        if sparse:
-            at_junction, f = f, np.zeros(self.numbering.size)
-            f[self.junction] = at_junction
-        for load in loads:
+        for load in (effect for effect in given if isinstance(effect, PartLoadEffect)):
             k = names.index(load.part)
             if sparse:
                 place, force = self.numbering.places[k], load.load(self.parts[k])
