@@ -117,8 +117,8 @@ class Residual:
         # half of x is left out: a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, where u|Σ| covers γ²|Σ|.
         rounding, again = gamma(longest + MORE), 4 * gamma(TERMS) ** 2
         of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
-        if not sharp:
-            of_parts = rounding * most_after + again * most, rounding * most, 0 * most
+        if not sharp:  # γ² is within the 1 % of γ 2⁻ᵇ
+            of_parts = rounding * most_after, rounding * most, 0 * most
         of_each = SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])
         by_first, by_second, k = np.hstack([x1, x2, x3]), np.hstack([x1, after]), x1.shape[1]
         for rows, columns, panel in panels:

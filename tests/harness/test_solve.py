@@ -199,12 +199,9 @@ def test_the_ledger_names_every_effect_and_what_it_added(tmp_path: Path) -> None
     assert added["fasteners", "load"]["amount"] == "a +160 N on 2 nodes"  # through to the tool
     assert "3e+04 N, b -3e+04 N" in added["installed_fasteners", "load"]["amount"]
     assert all(entry["seconds"] > 0 for entry in record["ledger"] if entry["adds"] != "constraints")
-    vectors = [entry for entry in record["ledger"] if entry["adds"] in ("gap", "load")]
-    assert all(entry["mib"] * 2**20 > 8 * 110 for entry in vectors)  # f and g have 110 entries
-    assert added["ribs a", "stiffness"]["mib"] > 0
     constraints = added["rigid_tool b", "constraints"]
     assert constraints["amount"] == "55 contacts of b and tool"
-    assert constraints["seconds"] is constraints["mib"] is None
+    assert constraints["seconds"] is None
     page = (tmp_path / "out" / "answer.md").read_text()
     for entry in record["ledger"]:
         assert f"| {entry['effect']} | {entry['adds']} | {entry['amount']} |" in page
