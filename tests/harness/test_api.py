@@ -32,7 +32,6 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
 from problems.full_model.joint_model import JointModel
 from problems.model.joint import Joint
 from solvers.base import failed
@@ -67,12 +66,6 @@ def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> N
     scenes.append(load_scene({"joint": Joint.model_validate(table["joint"]), "effect": effects}))
     assert len({scene.key for scene in scenes}) == 1
     assert load_scene(scenes[0]) is scenes[0]
-
-
-def test_a_dict_is_left_as_it_was() -> None:
-    table = tomllib.loads(STRIP)
-    load_scene(table)
-    assert table == tomllib.loads(STRIP)
 
 
 def test_all_faults_of_a_dict_are_named() -> None:
@@ -240,12 +233,3 @@ def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytes
     np.testing.assert_allclose([result.gap for result in found], gaps, atol=1e-7)
     assert judge(scene, x, form="sparse").verdict == "within"
     assert judge(scene, x + 1e-6, form="sparse").verdict == "outside"
-
-
-def test_the_callers_loads_stay_writable() -> None:
-    problem = in_form(make_prepared(1, 6), "primal")
-    f, g = np.ones(problem.assembly.n), np.ones(problem.assembly.m)
-    (load,) = problem.loads([LoadCase(f, g)])
-    assert not load.f.flags.writeable
-    assert f.flags.writeable
-    assert g.flags.writeable

@@ -17,7 +17,6 @@ from strip import write_strip
 
 from harness.measurement.run import run as run_suite
 from harness.planning.suite import read_suite
-from harness.results.machine import installed_version
 from harness.results.provenance import HOOK_VARIABLES, ROOT, commit
 from harness.results.records import MEASUREMENTS, read
 from harness.series import store
@@ -162,10 +161,6 @@ def test_a_work_tree_outweighs_what_is_installed(tree: Path) -> None:
     head = committed(tree)
     installed(tree, ORIGIN)
     assert asked(tree) == (head, True)
-
-
-def test_the_version_is_known_wherever_the_code_lies() -> None:
-    assert installed_version("rivetbench") == __version__
 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:

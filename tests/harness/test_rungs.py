@@ -53,13 +53,6 @@ def test_a_refused_rung_is_recorded_and_not_measured(directory: Path, suite: Sui
     assert "refused" not in problems[WIDE]
 
 
-def test_running_again_measures_nothing_twice(directory: Path, suite: Suite) -> None:
-    before = (directory / records.MEASUREMENTS).read_bytes()
-    console = Console(file=StringIO())
-    assert run(suite, directory, console) == 0
-    assert (directory / records.MEASUREMENTS).read_bytes() == before
-
-
 @pytest.mark.parametrize(("share", "code"), [(0.9, 0), (1.1, 1)])
 def test_the_gate_makes_out_the_limit_itself(directory: Path, share: float, code: int) -> None:
     (row,) = records.read(directory / records.MEASUREMENTS)

@@ -216,22 +216,6 @@ def test_the_ledger_names_every_effect_and_what_it_added(tmp_path: Path) -> None
     assert any(name.startswith("matrices") for name in record["steps"])
 
 
-def test_effects_of_the_ledger_add_up_to_the_load_case(tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    path = tmp_path / "scene.toml"
-    path.write_text(SCENE.replace("PRELOAD", "80"))
-    scene = read_scene(str(path))
-    load = load_case(scene)
-    alone = [
-        load_case(replace(scene, effects=(*scene.stiffness_effects, effect)))
-        for effect in scene.effects
-        if effect not in scene.stiffness_effects
-    ]
-    np.testing.assert_allclose(sum(part.f for part in alone), load.f, rtol=1e-14)
-    np.testing.assert_array_equal(sum(part.g for part in alone), load.g)
-
-
 def test_a_change_of_loads_alone_reuses_the_assembly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(tmp_path)
     before = arrays(tmp_path)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from strip import write_strip
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
@@ -122,14 +121,6 @@ def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path) -> None:
         picture = imread(tmp_path / "both" / f"{name}.png")[:, :, :3]
         for border in (picture[:3], picture[-3:], picture[:, :3], picture[:, -3:]):
             assert (border == 1.0).all()
-
-
-def test_the_same_scene_twice_has_no_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
-    monkeypatch.setattr("report.writers.two_answers.gap_maps", lambda *_: {})
-    scene = write_strip(tmp_path)
-    assert harness("solve", scene, scene, "--out", tmp_path / "both").exit_code == 0
-    assert {float(row["change_mm"]) for row in rows(tmp_path / "both" / "contacts.csv")} == {0.0}
 
 
 @pytest.mark.parametrize(

@@ -162,15 +162,6 @@ def test_prepared_holds_what_it_says() -> None:
     assert json.dumps(made.facts)
 
 
-def test_a_truncated_part_of_a_scene_stops_the_run(root: Path) -> None:
-    made = build.prepared(SCENE)
-    assert made.Q.size
-    path = root / str(made.key) / "Q.npy"
-    path.write_bytes(path.read_bytes()[:-16])
-    with pytest.raises(InputError, match=r"Q\.npy"):
-        _ = build.prepared(SCENE).Q
-
-
 def with_more(text: str, edited: Path) -> Callable[[Path], bytes]:
     """Path.read_bytes, as if that text stood at the end of one file."""
     read = Path.read_bytes

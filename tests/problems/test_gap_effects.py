@@ -40,14 +40,6 @@ def test_a_measured_plane_is_met_exactly(
     np.testing.assert_allclose(g, a + b * x + c * y, atol=1e-10)
 
 
-def test_a_measured_point_on_a_node_is_met() -> None:
-    random = np.random.default_rng(4)
-    values = random.uniform(0.1, 0.9, 45)
-    points = tuple((x, y, v) for (x, y), v in zip(TWO.nodes.tolist(), values, strict=True))
-    g = MeasuredGap(kind="measured_gap", points=points).gap(TWO)
-    np.testing.assert_allclose(g, values, atol=1e-12)
-
-
 def test_interpolation_errs_with_the_square_of_the_distance() -> None:
     """g = sin x sin y measured on grids of half the spacing: a quarter of the error."""
 

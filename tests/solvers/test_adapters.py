@@ -10,7 +10,6 @@ import piqp
 import pytest
 import qpsolvers
 import scipy.linalg as sla
-import scipy.sparse as sp
 from proxsuite import proxqp
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 from solving import TESTED
@@ -275,13 +274,6 @@ def test_a_stopped_solver_does_not_say_solved(
     assert got.status != "solved"
 
 
-def test_linear_term_has_the_sign_of_the_libraries() -> None:
-    prepared = make_prepared(16, 3)
-    _, load = make_load(16, prepared)
-    np.testing.assert_array_equal(in_form(prepared, "primal").q(load), -load.f)
-    np.testing.assert_array_equal(in_form(prepared, "dual").q(load), -load.p)
-
-
 def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
     """OSQP says solved here with a dual residual of 4e-7 at a tolerance of 1e-9."""
     prepared = make_strips(40)
@@ -298,13 +290,6 @@ def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
     assert np.abs(prepared.recover(polished.lam, case) - expected_x).max() > 1e-7
     assert polished.status == "inaccurate"
     assert answers[False].status == "solved"
-
-
-def test_sparse_rows_have_the_orientation_of_the_libraries() -> None:
-    prepared = make_prepared(17, 3, 2)
-    rows = Clarabel().convert(in_form(prepared, "primal")).G
-    assert sp.issparse(rows)
-    assert rows.shape == (prepared.assembly.m, prepared.assembly.n)
 
 
 @pytest.mark.parametrize(

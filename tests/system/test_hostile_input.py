@@ -15,7 +15,6 @@ from harness.planning.suite import read_suite
 from problems.errors import InputError
 from problems.load_cases.sweep import sweep
 from problems.scene import read_scene
-from problems.storage import cache
 
 SCENE = """
 title = "TITLE"
@@ -190,23 +189,6 @@ def test_measured_gaps_from_a_pipe_or_a_device_are_not_read(name: str, tmp_path:
         done = CliRunner().invoke(app, words)
         assert done.exit_code == 2
         assert "no regular file" in done.output
-
-
-def test_rows_from_a_pipe_are_not_read(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "measurements.jsonl")
-    done = CliRunner().invoke(app, ["gate", str(tmp_path)])
-    assert done.exit_code == 2
-    assert "no regular file" in done.output
-
-
-def test_a_manifest_of_the_cache_from_a_pipe_is_not_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
-    (tmp_path / "key").mkdir()
-    os.mkfifo(tmp_path / "key" / cache.MANIFEST)
-    with pytest.raises(InputError, match=r"manifest\.json.*delete"):
-        cache.load("key")
 
 
 def test_a_loop_of_links_is_no_file(tmp_path: Path) -> None:

@@ -85,20 +85,6 @@ def test_forks_threads_and_exit_handlers_are_left_behind(
     assert {row["verdict"] for row in store.rows(tmp_path / "out")} == {"within"}
 
 
-@pytest.mark.parametrize(
-    ("at_import", "said"),
-    [
-        ("sys.exit(0)", "importing the file failed with SystemExit: 0"),
-        ("os._exit(0)", "importing it: ended with exit code 0"),
-    ],
-)
-def test_an_import_that_ends_the_process_is_bad_input(tmp_path: Path, at_import: str, said: str) -> None:
-    done = harness(tmp_path, *series(tmp_path, at_import))
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "mine.py" in done.stderr
-
-
 @pytest.mark.parametrize("step", ["convert", "prepare"])
 def test_a_preparation_that_hangs_ends(tmp_path: Path, step: str) -> None:
     going = series(tmp_path)
