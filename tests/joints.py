@@ -20,6 +20,26 @@ def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> J
     return Joint.model_validate({"junction": data, "part": part, "contacts": contacts})
 
 
+def two_parts(
+    length: float = 100.0, width: float = 50.0, nodes: tuple[int, int] = (4, 3), side: str = "north"
+) -> str:
+    """The table [joint] of parts a and b, 2 and 3 mm thick; `side` is where b goes on and is clamped."""
+    return f"""
+[joint]
+junction = {{ length = {length}, width = {width}, nodes = {list(nodes)} }}
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = {{ length = 40.0, elements = 2 }}
+clamped = ["north"]
+[[joint.part]]
+name = "b"
+thickness = 3.0
+{side} = {{ length = {40.0 if side == "north" else 60.0}, elements = 2 }}
+clamped = ["{side}"]
+"""
+
+
 def make_scene(joint: Joint, *effects: Effect) -> JointScene:
     return JointScene("small", "small", joint, effects)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from joints import forbid_building
+from joints import forbid_building, two_parts
 from matplotlib.image import imread
 from rich.console import Console
 from small import solve_by_nnls
@@ -57,19 +57,7 @@ approach = 0.3
 [[effect]]
 kind = "self_weight"
 part = "b"
-[joint]
-junction = { length = 200.0, width = 80.0, nodes = [11, 5] }
-[[joint.part]]
-name = "a"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 3.0
-south = { length = 60.0, elements = 2 }
-clamped = ["south"]
-"""
+""" + two_parts(200.0, 80.0, (11, 5), "south")
 APART = """
 [[effect]]
 kind = "initial_gap"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joints import two_parts
 from matplotlib.image import imread
 from typer.testing import CliRunner, Result
 
@@ -23,23 +24,7 @@ kind = "fasteners"
 preload = 80.0
 points = [[30.0, 70.0], [150.0, 70.0]]
 """
-JOINT = """
-[joint]
-junction = { length = 160.0, width = 80.0, nodes = [9, 5] }
-[[joint.part]]
-name = "a"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 3.0
-south = { length = 60.0, elements = 2 }
-clamped = ["south"]
-[[effect]]
-kind = "initial_gap"
-mean = 0.3
-"""
+JOINT = two_parts(160.0, 80.0, (9, 5), "south") + '[[effect]]\nkind = "initial_gap"\nmean = 0.3\n'
 SPRINGS = """
 [[effect]]
 kind = "installed_fasteners"

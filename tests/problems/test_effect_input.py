@@ -5,24 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from joints import two_parts
 
 from problems.errors import Fault, InputError
 from problems.scene import read_scene
 
-JOINT = """
-[joint]
-junction = { length = 100.0, width = 50.0, nodes = [5, 3] }
-[[joint.part]]
-name = "a"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-"""
+JOINT = two_parts(nodes=(5, 3))
 
 
 def faults(folder: Path, *tables: str, joint: str = JOINT) -> list[Fault]:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from joints import make_joint, make_scene, untied
+from joints import make_joint, make_scene, two_parts, untied
 
 from problems.build import prepared
 from problems.model.effect import effect_class, effect_kinds
@@ -16,20 +16,7 @@ from problems.model.scene import JointScene, plain
 from problems.scene import read_scene, scene_names
 
 ROOT = Path(__file__).parents[2]
-JOINT = """
-[joint]
-junction = { length = 100.0, width = 50.0, nodes = [4, 3] }
-[[joint.part]]
-name = "a"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 3.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-"""
+JOINT = two_parts()
 OLD = {"fasteners", "initial_gap", "pressure", "ribs", "stringers", "supports"}
 #: Each kind by itself, as small as it can be.
 TABLES = {
