@@ -31,9 +31,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What no test saw is said in one line: judge.js runs in a browser only."""
+    """What no test saw is said aloud: judge.js runs in a browser only."""
     reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
     missing = [reason.partition(NO_BROWSER)[2] for reason in reasons if NO_BROWSER in reason]
     if missing:
-        text = f"WARNING: the page was not tried: {len(missing)} browser tests skipped, {missing[0]}"
-        terminalreporter.write_line(text, yellow=True, bold=True)
+        terminalreporter.write_sep("=", f"{len(missing)} browser tests SKIPPED", yellow=True, bold=True)
+        terminalreporter.write_line(f"The page was not tried: {missing[0]}.", yellow=True)

@@ -61,6 +61,7 @@ def test_the_names_are_offered_and_documented() -> None:
 def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> None:
     table = tomllib.loads(STRIP)
     scenes = [load_scene(write_strip(tmp_path)), load_scene(table)]
+    assert table == tomllib.loads(STRIP)  # left as it was
     gap, fasteners, *others = table["effect"]
     effects = (gap, Fasteners.model_validate(fasteners), *others)
     scenes.append(load_scene({"joint": Joint.model_validate(table["joint"]), "effect": effects}))

@@ -28,7 +28,7 @@ from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 
-FLIPS = 400  # bytes damaged per file
+FLIPS = 120  # bytes damaged per file
 
 
 @pytest.fixture(scope="module")

@@ -95,7 +95,6 @@ def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
     [
         ("newton", "sparse", "K"),
         ("piqp", "primal", "K"),
-        ("piqp", "dual", "K factors Q"),
         ("gi", "primal", "K factors Q"),
     ],
 )

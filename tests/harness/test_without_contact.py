@@ -16,7 +16,6 @@ from typer.testing import CliRunner
 from harness.cli.app import app
 from harness.scene.exchange import export, import_
 from harness.scene.solve import solve
-from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.scene import read_scene
@@ -96,7 +95,7 @@ def test_there_is_nothing_to_measure(path: Path) -> None:
     assert "there is no quadratic program to measure" in done.output
 
 
-@pytest.mark.parametrize("form", [form for form in formats.names() if form != "dmig"])
+@pytest.mark.parametrize("form", ["npz", "mtx"])
 def test_there_and_back(form: str, path: Path) -> None:
     """And the matrices, solved by themselves, give the same displacements."""
     file, back = path.parent / PATHS[form], path.parent / "back.npz"

@@ -9,8 +9,8 @@ from scipy.linalg import lapack
 from problems.stiffness.band_solve import FEW, PANEL, band_solve
 
 
-@pytest.mark.parametrize("width", [PANEL, PANEL + 1, 100, 2 * PANEL, 200])
-@pytest.mark.parametrize("size", [1, 50, 100, 201, 202, 300, 777, 1024])
+@pytest.mark.parametrize("width", [PANEL, PANEL + 1, 200])
+@pytest.mark.parametrize("size", [1, 50, 201, 300, 1024])
 def test_the_same_as_one_by_one(width: int, size: int) -> None:
     """Sizes with a last panel that is shorter, and matrices smaller than their band."""
     random = np.random.default_rng(size)

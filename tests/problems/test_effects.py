@@ -97,9 +97,9 @@ def test_pressure_sums_to_value_times_area() -> None:
     assert grid[-1, -1] == pytest.approx(cell / 4)
 
 
-@pytest.mark.parametrize("nodes", [(9, 5), (25, 9)])
-def test_random_gap_has_its_mean_deviation_and_correlation(nodes: tuple[int, int]) -> None:
+def test_random_gap_has_its_mean_deviation_and_correlation() -> None:
     """2000 fields: the mean, the deviation at every node, and exp(−r² / 2ℓ²) along x, y and both."""
+    nodes = (9, 5)
     joint = make_joint(PART, PART | {"name": "b"}, nodes=nodes)
     samples = np.array([field_of(seed, joint, length=100.0) for seed in range(2000)])
     assert samples.mean() == pytest.approx(0.6, abs=0.01)
@@ -117,7 +117,7 @@ def test_random_gap_has_its_mean_deviation_and_correlation(nodes: tuple[int, int
         assert (one * other).mean() == pytest.approx(np.exp(-((distance / 100) ** 2) / 2), abs=0.03)
 
 
-@pytest.mark.parametrize("length", [30.0, 150.0, 800.0])
+@pytest.mark.parametrize("length", [30.0, 800.0])
 def test_rounding_does_not_change_a_random_gap(length: float) -> None:
     """A grid and its mirror image, whose rounding differs: of one field the gaps differ by some 1e-10 of its
     deviation, where roots of eigenvalues near zero differ by 1e-8.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from long import seeds
 from sparse_matrices import band_matrix, graph_matrix, renumbered
 
 from problems.forms.assembly import Assembly
@@ -19,7 +20,7 @@ from problems.stiffness.sparse import sparse_block
 @pytest.mark.parametrize(
     ("n", "half", "m"), [(200, 7, 30), (201, 7, 90), (50, 49, 9), (30, 1, 30), (9, 0, 4)]
 )
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(1, 3))
 def test_it_is_that_of_the_dense_matrices(n: int, half: int, m: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     K, A = (

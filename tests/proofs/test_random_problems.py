@@ -5,12 +5,12 @@ RIVETBENCH_LONG=1 takes thousands of them instead of a few hundred.
 
 from __future__ import annotations
 
-import os
 from itertools import product
 
 import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from long import ASKED as LONG
 from solving import CASES, IN_HOUSE, allowed, solve
 from test_reference import exact_solution
 
@@ -23,7 +23,6 @@ from problems.ladders.units import rescaled
 from problems.manufactured.exact import manufacture, spectrum
 from problems.stiffness.operator import Stiffness
 
-LONG = bool(os.environ.get("RIVETBENCH_LONG"))
 SEEDS = st.integers(0, 2**32 - 1)
 
 

@@ -51,14 +51,10 @@ def test_conformance(name: str, options: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(("name", "options", "form"), CASES, ids=str)
-@pytest.mark.parametrize("kind", ["parts", "parts and tool", "strips"])
+@pytest.mark.parametrize("kind", ["parts and tool", "strips"])
 def test_agrees_with_nnls(name: str, options: dict[str, Any], form: Form, kind: str) -> None:
     skip_unless_taken(name, options, form)
-    prepared = {
-        "parts": lambda: make_prepared(1, 6),
-        "parts and tool": lambda: make_prepared(2, 20, 5),
-        "strips": lambda: make_strips(40),
-    }[kind]()
+    prepared = make_strips(40) if kind == "strips" else make_prepared(2, 20, 5)
     solver, tolerance = make_solver(name, options), TOLERANCES[form]
     session = SolverSession(solver, in_form(prepared, form), tolerance)
     session.open()

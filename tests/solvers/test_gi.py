@@ -69,7 +69,7 @@ def by_nnls(G: np.ndarray, s0: np.ndarray) -> np.ndarray:
     return nnls(U, -sla.solve_triangular(U, s0, trans=1))[0]
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_pivots_lead_to_the_solution(seed: int) -> None:
     size = [3, 40, 150][seed % 3]
     G = definite(size, seed)

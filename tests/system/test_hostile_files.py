@@ -70,7 +70,9 @@ def test_a_refused_import_leaves_what_is_there(own: bool, tmp_path: Path) -> Non
     if not own:
         out.write_bytes(b"precious")
     before = out.read_bytes()
-    assert invoke("import", bad, "--out", out).exit_code == 2
+    refused = invoke("import", bad, "--out", out)
+    assert refused.exit_code == 2
+    assert str(bad) in refused.output
     assert out.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
 
@@ -299,9 +301,9 @@ def two_rows(directory: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [0, 5])
 @pytest.mark.parametrize(
-    ("damage", "lost"), [(no_gaps, COUNT), (short_gaps, COUNT - 5), (other_gaps, 1), (two_rows, 10)]
+    ("damage", "lost", "more"),
+    [(no_gaps, COUNT, 5), (short_gaps, COUNT - 5, 0), (other_gaps, 1, 5), (two_rows, 10, 0)],
 )
 def test_gaps_that_are_lost_are_solved_again(damage: Any, lost: int, more: int, series: Path) -> None:
     wanted = np.fromfile(series / store.GAPS, np.float32)
@@ -347,15 +349,14 @@ def test_rows_of_another_series_among_its_own_are_named(series: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content"),
     [
-        *((store.SERIES, text) for text in (b"", b"[]", b"[" * 100_000, b'{"identity": 1}', b"\xff")),
+        *((store.SERIES, text) for text in (b"", b"[" * 100_000, b'{"identity": 1}')),
         (store.SERIES, b'{"identity": {"solver": "gi", "form": "dual", "tolerance": 1.0}, "cases": 12}'),
         (
             store.SERIES,
             b'{"identity": {}, "cases": 1, "threads": 1, "scene": "", "title": "", "machine": ""}',
         ),
-        *(("contacts.npz", text) for text in (b"", b"PK\x03\x04")),
-        *((store.CASES, text) for text in (b"[" * 100_000 + b"\n", b"[]\n", b"1\n", b'{"case": "a"}\n')),
-        (store.CASES, b'{"case": 0, "verdict": {}}\n'),
+        ("contacts.npz", b"PK\x03\x04"),
+        *((store.CASES, text) for text in (b"[" * 100_000 + b"\n", b"1\n", b'{"case": "a"}\n')),
         (store.CASES, b'{"case": -1, "verdict": "within"}\n'),
         (store.CASES, b'{"case": 0, "verdict": "within", "max_gap_mm": "x"}\n'),
     ],
@@ -371,25 +372,19 @@ def test_a_damaged_file_of_a_series_is_named(name: str, content: bytes, series: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("place", [np.nan, np.inf, 1e300])
-def test_contacts_nowhere_on_earth_are_damaged(place: float, series: Path) -> None:
-    with np.load(series / "contacts.npz") as file:
+@pytest.mark.parametrize("place", [None, np.nan, 1e300])
+def test_contacts_nowhere_on_earth_are_named_and_made_again(place: float | None, series: Path) -> None:
+    path = series / "contacts.npz"
+    with np.load(path) as file:
         arrays = dict(file)
-    arrays["contact_nodes"][0, 0] = place
-    np.savez(series / "contacts.npz", **arrays)
+    if place is None:
+        path.unlink()
+    else:
+        arrays["contact_nodes"][0, 0] = place
+        np.savez(path, **arrays)
     refused = invoke("report", series)
     assert refused.exit_code == 2
     assert "contacts.npz" in refused.output
-    assert solve_series(series).exit_code == 0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["contacts.npz", store.GAPS])
-def test_a_missing_file_of_a_series_is_named_and_made_again(name: str, series: Path) -> None:
-    (series / name).unlink()
-    refused = invoke("report", series)
-    assert refused.exit_code == 2
-    assert name in refused.output
     assert solve_series(series).exit_code == 0
     assert invoke("report", series).exit_code == 0
 
@@ -429,12 +424,9 @@ def test_the_gate_does_not_pass_what_nobody_planned(results: Path) -> None:
 
 
 WRONG: list[tuple[str, Any]] = [
-    *(("limit_mm", value) for value in ("a", -1.0, [1], True)),
-    *((name, 3) for name in ("key", "source", "status", "message", "answer", "scene_key", "scene", "solver")),
-    *(("gated", value) for value in ("yes", 1, None)),
-    *(("series", value) for value in ([], {"cases": "a"}, {"cases": 2, "other": 1})),
-    *(("case", value) for value in ("a", {}, [])),
-    *(("solve_s", value) for value in ("fast", {}, [1, 2])),
+    *(("limit_mm", value) for value in ("a", -1.0, True)),
+    *((name, 3) for name in ("key", "status", "answer", "scene")),
+    *(("gated", 1), ("series", {"cases": "a"}), ("case", "a"), ("solve_s", [1, 2])),
 ]
 
 
@@ -452,9 +444,7 @@ def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, r
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "value"), [("key", None), ("key", []), ("status", 3), ("time_limit_s", "a")]
-)
+@pytest.mark.parametrize(("name", "value"), [("key", None), ("time_limit_s", "a")])
 def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, results: Path) -> None:
     rows = measured(results)
     rows[1][name] = value
@@ -482,11 +472,11 @@ def test_a_nested_line_is_named(results: Path) -> None:
     [
         *(
             ("suite.toml", text)
-            for text in (b"solver = 3", b"solver = [3]", b"[[solver]]\nname = 1", b"\xff", b"scenes = 3")
+            for text in (b"solver = [3]", b"[[solver]]\nname = 1", b"\xff", b"scenes = 3")
         ),
         *(("problems.jsonl", text) for text in (b"[" * 100_000 + b"\n{}\n", b"{}\n", b'{"scene": 3}\n')),
         ("problems.jsonl", b'{"scene": "tiny", "n": "many"}\n'),
-        *(("machine.json", text) for text in (b"[" * 100_000, b"[]", b"1", b"\xff")),
+        *(("machine.json", text) for text in (b"[" * 100_000, b"1", b"\xff")),
     ],
 )
 def test_a_damaged_file_beside_the_rows_is_named(name: str, content: bytes, results: Path) -> None:

@@ -112,11 +112,9 @@ def processes(folder: Path) -> list[psutil.Process]:
 @pytest.mark.parametrize(
     ("in_solve", "said"),
     [
-        ("sys.exit(0)", "raised SystemExit: 0"),
         ("os._exit(0)", "ended with exit code 0 before its answer"),
         ("raise KeyboardInterrupt", "raised KeyboardInterrupt"),
         ("os.kill(os.getpid(), 11)", "killed by SIGSEGV"),
-        ("time.sleep(60)", "the test took more than 1 s"),
         ("while True: pass", "the test took more than 1 s"),
         ("held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(60)", "more than 700 MiB"),
     ],
@@ -162,14 +160,10 @@ def test_an_endless_import_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("at_import", "in_solve"),
     [
-        ("threading.Thread(target=time.sleep, args=(60,)).start()", "pass"),
+        ("threading.Thread(target=time.sleep, args=(60,)).start()", "os.fork()"),
         ("", "threading.Thread(target=time.sleep, args=(60,)).start()"),
-        ("", "os.fork()"),
-        ("os.fork()", "pass"),
-        ("", "os.fork() or time.sleep(60)"),
-        ("", "os.fork() or (os.setsid(), time.sleep(60))"),
-        ("atexit.register(print, 'bye')\natexit.register(time.sleep, 60)", "pass"),
-        ("print('hello' * 10**6)", "print(lam)"),
+        ("os.fork()", "os.fork() or (os.setsid(), time.sleep(60))"),
+        ("print('hello' * 10**6)\natexit.register(time.sleep, 60)", "print(lam)"),
     ],
 )
 def test_threads_forks_and_exit_handlers_are_left_behind_by_no_command(
@@ -342,16 +336,11 @@ def test_the_gate_makes_plain_types_that_nobody_can_change() -> None:
     ("in_solve", "said"),
     [
         ("lam = lam + 1j", "wanted real numbers"),
-        ("lam = lam.astype(object)", "wanted real numbers"),
-        ("return Answer('solved', lam, iterations='five')", "iterations is 'five'"),
-        ("return Answer('solved', lam, iterations=10**400)", "iterations is 1000"),
         ("problem.Q[:] = 0", "read-only"),
         ("problem.assembly.A.data[:] = 0", "read-only"),
-        ("problem.assembly.K.matrices[0][:] = 0", "read-only"),
         ("problem.prepared.assembly.K.factors[0][:] = 0", "read-only"),
         ("load.p[:] = 0", "read-only"),
         ("np.load(problem.Q.filename, mmap_mode='r+')[0, 0] += 1e-6", "wrote into the cache: delete"),
-        ("np.save(problem.Q.filename, problem.Q * 1.5)", "wrote into the cache: delete"),
         ("os.remove(problem.Q.filename)", "wrote into the cache: delete"),
     ],
 )

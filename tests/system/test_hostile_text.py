@@ -33,7 +33,7 @@ from report.writers.solution import write as write_solution
 
 HOSTILE = "<b>x</b>|![i](http://e)`c`$a_b$ *e*\n# h\x1b[31m\u202e\ud800"
 LITERAL = r"&lt;b&gt;x&lt;/b&gt;\|\!\[i\](http://e)&#96;c&#96;\$a_b\$ \*e\* \# h�\[31m��"
-FORMULAS = ['=cmd|"/c calc"!A1', "+1+1", "-2+3", "@SUM(A1)", " =1"]
+FORMULAS = ["+1+1", "-2+3", "@SUM(A1)", " =1"]
 
 
 @pytest.fixture(autouse=True)
@@ -113,9 +113,7 @@ def test_a_page_shows_hostile_text_as_it_is(made: Any, written: Any, tmp_path: P
 
 
 @pytest.mark.parametrize(("made", "written"), MADE)
-@pytest.mark.parametrize(
-    "name", ["a" * 20_000, "$x_{$ \\frac{1}{0} $" * 9, "a\nb|c", "=1", "|", "_", "\ud800"]
-)
+@pytest.mark.parametrize("name", ["a" * 20_000, "$x_{$ \\frac{1}{0} $" * 9, "_|\ud800"])
 def test_any_text_is_drawn_in_seconds(made: Any, written: Any, name: str, tmp_path: Path) -> None:
     begun = time.perf_counter()
     page = written(made(tmp_path, name))
@@ -152,8 +150,8 @@ def test_labels_of_ticks_and_of_legends_are_spelled_out() -> None:
     assert axes.get_yticklabels()[0].get_fontsize() == 5
 
 
-@pytest.mark.parametrize("formula", FORMULAS)
-def test_a_spreadsheet_runs_no_formula(formula: str, tmp_path: Path) -> None:
+def test_a_spreadsheet_runs_no_formula(tmp_path: Path) -> None:
+    formula = '=cmd|"/c calc"!A1'
     target = write(results(tmp_path, formula)).parent
     cells = [cell for path in target.glob("*.csv") for line in csv.reader(path.open()) for cell in line]
     assert f"'{formula}" in cells
@@ -167,6 +165,8 @@ def test_numbers_in_a_csv_file_are_untouched() -> None:
     found = escape.csv_frame(frame)
     assert found["text"].tolist() == ["-1.5", "+2", "'-", "–"]
     pd.testing.assert_series_equal(found["number"], frame["number"])
+    formulas = escape.csv_frame(pd.DataFrame({"text": FORMULAS}))["text"].tolist()
+    assert formulas == [f"'{formula}" for formula in FORMULAS]
 
 
 def test_a_text_comes_back_whole_from_its_quotation() -> None:

@@ -29,10 +29,8 @@ def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[ob
 @pytest.mark.parametrize(
     ("fault", "status", "said"),
     [
-        ("os._exit(0)", "crashed", "ended with exit code 0 before its answer"),
         ("os.kill(os.getpid(), 11)", "crashed", "killed by SIGSEGV"),
         ("sys.exit(0)", "failed", "raised SystemExit"),
-        ("time.sleep(60)", "time_limit", "solve took more than 1 s"),
         ("exec('while True: pass')", "time_limit", "solve took more than 1 s"),
         (MORE_MEMORY, "memory_limit", "more than 700 MiB"),
     ],
@@ -64,19 +62,9 @@ def test_a_plugin_that_writes_into_the_cache_is_named(tmp_path: Path) -> None:
     assert [row["verdict"] for row in store.rows(tmp_path / "out")] == ["within", "within", "no_answer"]
 
 
-@pytest.mark.parametrize(
-    ("at_import", "in_solve"),
-    [
-        ("threading.Thread(target=time.sleep, args=(60,)).start()", "pass"),
-        ("", "os.fork()"),
-        ("os.fork()", "pass"),
-        ("", "os.fork() or (os.setsid(), time.sleep(60))"),
-        ("atexit.register(time.sleep, 60)", "print('hello' * 10**6)"),
-    ],
-)
-def test_forks_threads_and_exit_handlers_are_left_behind(
-    tmp_path: Path, at_import: str, in_solve: str
-) -> None:
+def test_forks_threads_and_exit_handlers_are_left_behind(tmp_path: Path) -> None:
+    at_import = "threading.Thread(target=time.sleep, args=(60,)).start()\natexit.register(time.sleep, 60)"
+    in_solve = "os.fork() or (os.setsid(), time.sleep(60)); print('hello' * 10**6)"
     done = harness(tmp_path, *series(tmp_path, at_import, in_solve))
     assert done.returncode == 0, done.stdout + done.stderr
     assert "5 within" in done.stdout
