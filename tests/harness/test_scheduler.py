@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import pytest
 import tiny
 from rich.console import Console
@@ -38,7 +37,7 @@ from harness.planning.suite import read_suite
 from harness.results.records import MEASUREMENTS, read
 from harness.series import store
 from harness.series.on_worker import solve_on_worker
-from harness.series.run import on_workers, run
+from harness.series.run import run
 from harness.series.session import Job
 from problems.errors import InputError
 from problems.load_cases.measured_gaps import measured_gaps
@@ -123,16 +122,6 @@ def test_every_task_comes_back_once_and_few_are_handed_out() -> None:
     assert seen == {k: 2 * k for k in range(40) if k != 13}
 
 
-def test_a_series_on_other_processes_is_the_series_on_this_one(job: Job) -> None:
-    alone = {result.row["case"]: result for result in solve_on_worker((job, range(CASES)))}
-    with ProcessPoolExecutor(2) as executor:
-        results = [r for some in on_workers(job, list(range(CASES)), executor, 2, quiet()) for r in some]
-    assert sorted(result.row["case"] for result in results) == list(range(CASES))
-    for result in results:
-        np.testing.assert_allclose(result.gap, alone[result.row["case"]].gap, atol=1e-9)
-        assert result.row["verdict"] == "within"
-
-
 def test_versions_that_differ_are_named() -> None:
     here = versions()
     assert other_versions("worker a", here, here) == []
@@ -152,15 +141,6 @@ def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -
 def test_a_number_of_workers_that_cannot_be(wrong: str) -> None:
     with pytest.raises(InputError, match="local:N"), workers(wrong):
         pass
-
-
-@needs_dask
-def test_workers_of_this_machine_are_processes_of_their_own() -> None:
-    with workers("local:2") as (executor, count):
-        seen = {executor.submit(os.getpid).result() for _ in range(20)}
-    assert count == 2
-    assert 1 <= len(seen - {os.getpid()}) == len(seen) <= 2
-    assert not any(map(psutil.pid_exists, seen))
 
 
 @needs_dask
@@ -190,23 +170,6 @@ def test_workers_that_will_not_do_are_named(
     assert [fault.where.split()[0] for fault in raised.value.faults] == ["worker", "worker"]
     for fault in raised.value.faults:
         assert f"scipy = '{VERSIONS['scipy']}': the driver has 0.1" in str(fault)
-
-
-@needs_dask
-def test_workers_without_these_packages_are_told_of(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Elsewhere:
-        """Unpickles nowhere but here."""
-
-        def __reduce__(self) -> Any:
-            return __import__, ("a_package_of_the_driver",)
-
-        def __call__(self) -> dict[str, str]:
-            return VERSIONS
-
-    monkeypatch.setattr(scheduler, "versions", Elsewhere())
-    told = "No module named 'a_package_of_the_driver'\": install rivetbench for the scheduler"
-    with pytest.raises(InputError, match=re.escape(told)), workers(cluster.scheduler_address):
-        pass
 
 
 @needs_dask

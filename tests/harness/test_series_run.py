@@ -110,16 +110,6 @@ def test_another_series_is_refused(change: tuple[str, str]) -> None:
     assert len(rows_of("mine")) == 3
 
 
-def test_a_torn_row_is_solved_again() -> None:
-    series("--cases", "30", "--out", "torn")
-    path, wanted = Path("torn") / store.CASES, gaps_of("torn")
-    text = path.read_text()
-    path.write_text(text[: text.rindex('"status"')])
-    assert "30 cases, 29 already" in series("--cases", "30", "--out", "torn").output
-    assert sorted(row["case"] for row in rows_of("torn")) == list(range(30))
-    np.testing.assert_allclose(gaps_of("torn"), wanted, atol=1e-9)
-
-
 def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     solve = SeriesSession._try
 
@@ -250,14 +240,6 @@ def test_what_p_has_lost_in_rounding_is_in_the_bound(monkeypatch: pytest.MonkeyP
         assert row["verdict"] == "within"
         error = row["displacement_error_mm"]
         assert 1e-8 < error <= row["bound_mm"] <= 1.02 * (error + 1e-2 * job.limit_mm)
-
-
-def test_memory_does_not_grow_with_the_cases() -> None:
-    scene = read_scene("strip.toml")
-    job = Job(scene, random_gaps(scene, 10**9, 0), "gi", "dual", 1e-9, 1e-7, 0, 1)
-    session = SeriesSession(job)
-    for _ in session.solve(range(10**8, 10**8 + 5 * session_module.KEPT_ANSWERS)):
-        assert len(session.session.solved) <= session_module.KEPT_ANSWERS
 
 
 @pytest.mark.parametrize("fault", ["raise RuntimeError", "return answers[:-1]", "return [None] * len(loads)"])

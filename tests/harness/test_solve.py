@@ -22,10 +22,8 @@ from typer.testing import CliRunner
 from harness.cli.app import app
 from harness.scene.ledger import ledger
 from harness.scene.solve import solve
-from harness.scene.validate import estimated
 from problems.build import load_case, model_of, prepared
 from problems.errors import InputError
-from problems.model.scene import JointScene
 from problems.scene import read_scene
 from report.writers.vtu import grid_with_fields, write_vtu
 
@@ -344,20 +342,6 @@ def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
     assert not model_of(read_scene(str(path))).built
     _ = prepared(read_scene(str(path))).Q
     assert "is in the cache" in CliRunner().invoke(app, ["validate", str(path)]).output
-
-
-def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text(APART)
-    scene = read_scene(str(path))
-    assert isinstance(scene, JointScene)
-    made = prepared(scene)
-    stored = sum(a.nbytes for a in (*made.assembly.K.matrices, *made.assembly.K.factors, made.Q))
-    estimate = estimated(scene, 1e9)
-    assert estimate.stored_mib == pytest.approx(stored / 2**20)
-    assert (estimate.n, estimate.m) == (made.assembly.n, made.assembly.m)
-    slower = estimated(scene, 1e8)
-    assert slower.build_s == pytest.approx(10 * estimate.build_s)
 
 
 def test_validate_looks_at_given_matrices(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from rich.console import Console
 
@@ -16,8 +15,6 @@ from harness.series.run import Tally, summary
 from problems.build import prepared
 from problems.errors import InputError
 from problems.scene import read_scene
-from report.results.series import FIGURES, Series
-from report.writers.series import _summary
 
 K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
 
@@ -84,21 +81,3 @@ def test_a_series_says_how_many_bounds_are_missing() -> None:
     first, *_, last = (line for line in console.file.getvalue().splitlines() if "bound" in line)
     assert "largest proven error bound 1.0e-09 mm" in first
     assert "some bounds could not be proven" in last
-
-
-@pytest.mark.parametrize(
-    ("bounds", "sentence"),
-    [
-        ([1e-9, 2e-9], "Every answer is proven to be within 2.00e-9 mm of the exact one."),
-        ([1e-9, np.nan], "The error of 1 answer could not be bounded; of 1 other it is at most 1.00e-9 mm."),
-        ([np.nan, np.nan], "The error of 2 answers could not be bounded."),
-    ],
-)
-def test_the_report_of_a_series_says_how_many_bounds_are_missing(bounds: list[float], sentence: str) -> None:
-    cases = pd.DataFrame({"case": [0, 1], **{name: [1e-3, 1e-3] for name in FIGURES}, "bound_mm": bounds})
-    identity = {"solver": "newton", "form": "dual", "tolerance": 1e-9, "limit_mm": 1e-7}
-    facts = {"title": "t", "cases": 2, "threads": 1, "machine": "m", "identity": identity, "scene": "s"}
-    code = pd.DataFrame({"commit": ["", ""], "clean": [None, None]})
-    gaps, nowhere = np.zeros((2, 3), np.float32), np.zeros((0, 2))
-    series = Series(facts, {"within": 2}, cases, gaps, None, nowhere, [], code)
-    assert sentence in _summary(series)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg as sla
-import scipy.sparse as sp
 from long import ASKED
 
 from harness.planning.plan import expand
@@ -77,15 +76,6 @@ def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_o
         np.testing.assert_allclose(np.linalg.eigvalsh(K), 64 * np.sort(d), rtol=1e-9)
     H = sla.hadamard(64, dtype=float)
     np.testing.assert_array_equal(K, (H * d) @ H)  # 64 = the stiffness of the grid's smallest eigenvalue
-
-
-@pytest.mark.parametrize("name", SMALL)
-def test_the_problem_is_one_whole(name: str) -> None:
-    """The Hadamard blocks of one part overlap those of the other, so that no contact stands alone."""
-    assembly = SMALL[name].assembly
-    K = sp.block_diag([K != 0 for K in assembly.K.matrices])
-    graph = sp.block_array([[K, assembly.A != 0], [(assembly.A != 0).T, None]])
-    assert sp.csgraph.connected_components(graph, directed=False)[0] == 1
 
 
 TRIED = [

@@ -12,7 +12,6 @@ from joints import make_joint, make_scene
 from scipy.sparse.linalg import splu
 from test_only_what_is_called_for import TABLES, scene_of
 
-from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
@@ -133,29 +132,3 @@ def test_what_is_built_in_is_left_out(turned: bool, clamped: list[str]) -> None:
     assert model.nodes is not None
     np.testing.assert_array_equal(model.nodes[model.junction], np.tile(scene.joint.nodes, (2, 1)))
     check_same(scene)
-
-
-def test_a_beam_that_lies_on_a_tool() -> None:
-    """Lift-off length a = (72 EI g/q)^¼ at each end, reaction q (L − 2a) + 2qa/3: without the dense road."""
-    scene = read_scene("gallery/heavy-sheet-on-tool")
-    found = best_of_candidates(prepared(scene, form="sparse"), load_case(scene, "sparse"))
-    q, EI, L, gap = 2700e-9 * 9.80665 * 2.0, 70e3 * 2.0**3 / 12, 2000.0, 0.5
-    a = (72 * EI * gap / q) ** 0.25
-    assert found.bound_mm < 1e-10
-    assert found.lam.sum() == pytest.approx(100.0 * (q * (L - 2 * a) + 2 * q * a / 3), rel=2e-3)
-
-
-def test_a_plate_on_a_frame() -> None:
-    """Simply supported square plate: 0.00406235 q a⁴/D in the middle."""
-    scene = read_scene("gallery/plate-on-frame")
-    whole = prepared(scene, form="sparse")
-    x = whole.assembly.at_junction(whole.assembly.K.solve(load_case(scene, "sparse").f)).reshape(17, 17)
-    D = 70e3 * 5.0**3 / (12 * (1 - 0.3**2))
-    assert x[8, 8] == pytest.approx(0.00406235 * 2700e-9 * 9.80665 * 5.0 * 1000.0**4 / D, rel=2e-3)
-
-
-def test_no_force_beyond_what_the_scene_names() -> None:
-    scene = make_scene(make_joint(HELD, HELD | {"name": "b"}, contacts=[("a", "b")]))
-    load = load_case(scene, "sparse")
-    assert not load.f.any()
-    assert not load.g.any()
