@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commands import harness
 from synthetic_results import no_answer, row, write_rows
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from harness.cli.app import app
 from harness.results.records import append
 from harness.results.sides import measurement, read_side
 
 
 def compare(*words: object) -> Result:
-    return CliRunner().invoke(app, ["compare", *map(str, words)])
+    return harness("compare", *words)
 
 
 def repeats(times: list[float], **figures: Any) -> list[dict[str, Any]]:

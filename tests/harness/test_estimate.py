@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
+from commands import harness
 
-from harness.cli.app import app
 from harness.planning import estimate as estimates
 from harness.planning.estimate import estimated_sparse, refuse_what_cannot_fit
 from harness.scene import validate
@@ -50,7 +49,7 @@ def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_validate_offers_the_sparse_form_where_no_dense_one_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     machine_of(24_000, monkeypatch)
-    done = CliRunner().invoke(app, ["validate", "scaling/100352"])
+    done = harness("validate", "scaling/100352")
     said = " ".join(done.output.split())
     assert done.exit_code == 0
     assert "No dense form can hold it: the process would take up to 134606 MiB" in said
@@ -61,7 +60,7 @@ def test_validate_offers_the_sparse_form_where_no_dense_one_fits(monkeypatch: py
 
 def test_validate_gives_both_where_both_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     machine_of(24_000, monkeypatch)
-    said = CliRunner().invoke(app, ["validate", "4386/0107"]).output
+    said = harness("validate", "4386/0107").output
     assert "Dense forms" in said
     assert "Sparse form" in said
 

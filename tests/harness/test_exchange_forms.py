@@ -13,11 +13,10 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 import tiny
+from commands import harness
 from small import solve_by_nnls
 from strip import write_strip
-from typer.testing import CliRunner, Result
 
-from harness.cli.app import app
 from problems.build import load_case, prepared
 from problems.forms.names import Form
 from problems.forms.problem import in_form
@@ -25,10 +24,6 @@ from problems.scene import read_scene
 
 READERS = Path(__file__).parents[2] / "examples" / "readers"
 EIGEN = Path("/usr/include/eigen3")
-
-
-def harness(*words: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, words)])
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from commands import harness
 from finished import finished_run
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from harness.cli.app import app
 from harness.results import records
 from harness.results.sides import measurement
 from harness.verification.baseline import Baseline, read_baseline
@@ -32,7 +32,7 @@ def copy(finished: Path, tmp_path: Path) -> Path:
 
 
 def gate(directory: Path, *words: object) -> Result:
-    return CliRunner().invoke(app, ["gate", str(directory), *map(str, words)])
+    return harness("gate", directory, *words)
 
 
 def changed(directory: Path, **figures: Any) -> Path:

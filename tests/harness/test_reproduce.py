@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 import tiny
+from commands import harness
 from finished import finished_run
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from harness.cli.app import app
 from harness.measurement.reproduce import find_row, of_one_process
 from harness.results import records
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 
 def reproduce(directory: Path, *words: str) -> Result:
-    return CliRunner().invoke(app, ["reproduce", str(directory), *words])
+    return harness("reproduce", directory, *words)
 
 
 @pytest.fixture(scope="module")

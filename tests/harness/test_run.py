@@ -17,10 +17,9 @@ import numpy as np
 import psutil
 import pytest
 import tiny
+from commands import harness
 from rich.console import Console
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.measurement.run import run
 from harness.planning.suite import read_suite
 from harness.results import records
@@ -200,11 +199,6 @@ def test_gate_with_nothing_to_judge(copy: Path, rows_kept: str) -> None:
     code, text = said_by(gate, copy)
     assert code == 3
     assert "Nothing could be judged" in text
-
-
-def harness(*arguments: object) -> Any:
-    """The command line, in this process."""
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path) -> None:

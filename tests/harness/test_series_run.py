@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 import tiny
+from commands import harness
 from small import solve_by_nnls
 from strip import write_strip
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.series import session as session_module
 from harness.series import store
 from harness.series.session import Job, SeriesSession
@@ -52,7 +51,7 @@ def _no_report(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def series(*arguments: str, code: int = 0) -> Any:
-    ended = CliRunner().invoke(app, ["series", "strip.toml", "--threads", "1", *arguments])
+    ended = harness("series", "strip.toml", "--threads", "1", *arguments)
     assert ended.exit_code == code, ended.output
     return ended
 

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from commands import harness
 from joints import forbid_building, two_parts
 from matplotlib.image import imread
 from rich.console import Console
 from small import solve_by_nnls
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.scene.ledger import ledger
 from harness.scene.solve import solve
 from problems.build import load_case, model_of, prepared
@@ -304,7 +303,7 @@ def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text(SCENE.replace("PRELOAD", "-1").replace("I = 500.0", "I = 0"))
     for command in (["solve", str(bad), "--out", str(tmp_path / "out")], ["validate", str(bad)]):
-        done = CliRunner().invoke(app, command)
+        done = harness(*command)
         assert done.exit_code == 2
         lines = done.output.strip().splitlines()
         assert len(lines) == 2
@@ -325,7 +324,7 @@ def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
 def test_a_joint_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
     (tmp_path / "large.toml").write_text(APART.replace("nodes = [11, 5]", "nodes = [2001, 2001]"))
     for command in (["validate"], ["solve", "--out", str(tmp_path / "out")]):
-        done = CliRunner().invoke(app, [*command, str(tmp_path / "large.toml")])
+        done = harness(*command, tmp_path / "large.toml")
         assert done.exit_code == 2
         (line,) = done.output.strip().splitlines()
         assert "junction.nodes = [2001, 2001]: fewer nodes" in line
@@ -335,22 +334,22 @@ def test_a_joint_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
 def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SCENE.replace("PRELOAD", "80").replace("I = 500.0", "I = 777.0"))
-    first = CliRunner().invoke(app, ["validate", str(path)])
+    first = harness("validate", path)
     assert first.exit_code == 0
     for said in ("n = 110", "m = 110", "contact b – tool", "has to be built", "self_weight"):
         assert said in first.output
     assert not model_of(read_scene(str(path))).built
     _ = prepared(read_scene(str(path))).Q
-    assert "is in the cache" in CliRunner().invoke(app, ["validate", str(path)]).output
+    assert "is in the cache" in harness("validate", path).output
 
 
 def test_validate_looks_at_given_matrices(tmp_path: Path) -> None:
     """Of a rung, and of a user: one that is not positive definite is refused."""
-    done = CliRunner().invoke(app, ["validate", "hard/loads/zero-gap"])
+    done = harness("validate", "hard/loads/zero-gap")
     assert done.exit_code == 0
     assert "n = 128, m = 64" in done.output
     np.savez(tmp_path / "mine.npz", K=np.diag([1.0, -1.0]), A=np.eye(2), f=np.ones(2), g=np.ones(2))
-    done = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")])
+    done = harness("validate", tmp_path / "mine.npz")
     assert done.exit_code == 2
     assert "the pivot of unknown 1" in done.output
     assert "positive definite" in done.output
@@ -360,6 +359,6 @@ def test_a_scene_of_own_matrices_has_no_ledger(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", K=np.eye(2), A=np.eye(2)[:, :1], f=np.ones(2), g=np.ones(1))
     scene = read_scene(str(tmp_path / "mine.npz"))
     assert ledger(scene, built=True) == []
-    said = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")]).output
+    said = harness("validate", tmp_path / "mine.npz").output
     assert "n = 2, m = 1, blocks of 2" in said
     assert "seem to have 1 digits" in said

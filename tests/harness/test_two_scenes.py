@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import harness
 from joints import two_parts
 from matplotlib.image import imread
-from typer.testing import CliRunner, Result
 
-from harness.cli.app import app
 from harness.scene.fastener_forces import fastener_forces
 from harness.scene.starter import STARTER
 from problems.build import load_case, prepared
@@ -32,10 +31,6 @@ points = [[80.0, 40.0], [120.0, 20.0]]
 stiffness = 500.0
 approach = 0.2
 """
-
-
-def harness(*words: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, words)])
 
 
 def write(path: Path, text: str) -> Path:

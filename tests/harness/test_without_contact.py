@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import harness
 from rich.console import Console
 from test_formats import FOLDERS, PATHS, files_of
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.scene.exchange import export, import_
 from harness.scene.solve import solve
 from problems.build import load_case, prepared
@@ -83,14 +82,14 @@ def test_its_page_has_no_contacts(path: Path) -> None:
 
 
 def test_validate_says_so(path: Path) -> None:
-    done = CliRunner().invoke(app, ["validate", str(path)])
+    done = harness("validate", path)
     assert done.exit_code == 0
     assert "No contact: a linear solve" in done.output
 
 
 def test_there_is_nothing_to_measure(path: Path) -> None:
     out = path.parent / "run"
-    done = CliRunner().invoke(app, ["run", "--scene", str(path), "--solver", "gi", "--out", str(out)])
+    done = harness("run", "--scene", path, "--solver", "gi", "--out", out)
     assert done.exit_code == 2
     assert "there is no quadratic program to measure" in done.output
 

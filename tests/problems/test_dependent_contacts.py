@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from typer.testing import CliRunner
+from commands import harness
 
 from harness import LoadCase, own_matrices, solve_series
-from harness.cli.app import app
 from problems.errors import InputError
 from problems.input.dependent_contacts import refuse_dependent
 
@@ -112,7 +111,7 @@ def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
     np.save(tmp_path / "gaps.npy", np.zeros((2, 3)))
     places = {"OWN": "own.npz", "X": "x.npy", "GAPS": "gaps.npy", "NEW": "new", "NEW.npz": "new.npz"}
     given = [str(tmp_path / places[word]) if word in places else word for word in words.split()]
-    done = CliRunner().invoke(app, given)
+    done = harness(*given)
     assert done.exit_code == 2, done.output
     said = " ".join(done.output.split())
     assert f"{own}: A[:, 2] = 'dependent': must not depend on the columns before it" in said

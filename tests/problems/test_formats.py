@@ -13,15 +13,14 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 import scipy.sparse as sp
+from commands import harness
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import untied
 from rich.console import Console
 from scipy.io import FortranFile
 from small import make_load, make_prepared, solve_by_nnls
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.scene.exchange import export, import_, matrices
 from harness.scene.solve import solve
 from problems import formats
@@ -220,7 +219,7 @@ def test_a_format_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "x.txt").write_text("1 2 3")
     with pytest.raises(InputError, match=r"\.op4, \.plain"):
         formats.read(tmp_path / "x.txt")
-    done = CliRunner().invoke(app, ["list", "formats"])
+    done = harness("list", "formats")
     assert "a file .plain of f" in done.output
     sys.modules.pop("problems.formats.plain_format")
 
@@ -302,10 +301,10 @@ def test_what_is_missing_or_of_no_format_is_named(tmp_path: Path) -> None:
         ([str(tmp_path / "x.txt")], ".op4"),
         ([str(tmp_path / "none.mtx")], "no such file"),
     ):
-        done = CliRunner().invoke(app, ["import", *given_files, "--out", str(tmp_path / "out.npz")])
+        done = harness("import", *given_files, "--out", tmp_path / "out.npz")
         assert done.exit_code == 2
         assert said in done.output
-    done = CliRunner().invoke(app, ["export", SCENE, "--format", "xls", "--out", str(tmp_path / "o")])
+    done = harness("export", SCENE, "--format", "xls", "--out", tmp_path / "o")
     assert done.exit_code == 2
     assert "qpsolvers" in done.output
 

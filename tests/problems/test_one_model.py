@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commands import harness
 from joints import make_joint, make_scene, two_parts
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from problems import scene as reading
 from problems.build import load_case, model_of, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
@@ -52,7 +51,7 @@ def test_one_solve_makes_one_model_and_reads_its_scene_once(
     monkeypatch.setattr(reading, "read_toml", counted_read)
     path = tmp_path / "scene.toml"
     path.write_text(TEXT)
-    done = CliRunner().invoke(app, ["solve", str(path), "--form", form, "--out", str(tmp_path / "out")])
+    done = harness("solve", path, "--form", form, "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     assert (len(made), read) == (1, [path])
 

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
+from commands import harness
 from scipy.sparse.linalg import spsolve
 from sparse_matrices import band_matrix, renumbered
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.planning import own_matrices, road
 from problems import formats
 from problems.build import load_case, prepared
@@ -62,7 +61,7 @@ def files(folder: Path, K: sp.csc_array | None = None, scipy_npz: bool = False) 
 
 
 def run(*words: str) -> tuple[int, str]:
-    done = CliRunner().invoke(app, list(words))
+    done = harness(*words)
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done.exit_code, " ".join(done.output.split())
 

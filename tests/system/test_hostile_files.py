@@ -14,12 +14,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import tiny
+from commands import harness
 from rich.console import Console
 from small import make_load, make_prepared
 from strip import write_strip
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from harness.cli.app import app
 from harness.measurement.run import run
 from harness.planning.suite import read_suite, read_written
 from harness.results import records
@@ -53,7 +53,7 @@ def own_matrices(**changes: Any) -> formats.Data:
 
 
 def invoke(*words: object) -> Result:
-    done = CliRunner().invoke(app, [str(word) for word in words])
+    done = harness(*words)
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done
 

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import harness
 from joints import two_parts
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.suite import read_suite
 from problems.errors import InputError
@@ -85,7 +84,7 @@ def test_tolerances_and_limits_are_positive_and_finite(words: str, value: str, t
     (tmp_path / "scene.toml").write_text(SCENE)
     command, option = words.split()
     words = [command, str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), option, value]
-    done = CliRunner().invoke(app, words)
+    done = harness(*words)
     assert done.exit_code == 2
     assert "positive and finite" in done.output
     assert not (tmp_path / "out").exists()
@@ -124,12 +123,12 @@ def test_sweeps_are_bounded(values: str, tmp_path: Path) -> None:
 def test_cases_of_a_series_are_bounded(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(SCENE)
     words = ["--out", str(tmp_path / "out"), "--cases", "1000000000000"]
-    assert CliRunner().invoke(app, ["series", str(tmp_path / "scene.toml"), *words]).exit_code == 2
+    assert harness("series", tmp_path / "scene.toml", *words).exit_code == 2
 
 
 def test_markup_in_a_title_and_in_a_path_is_text(tmp_path: Path) -> None:
     (tmp_path / "[red]x.toml").write_text(SCENE.replace("TITLE", "[/b] [link=x]y"))
-    done = CliRunner().invoke(app, ["validate", str(tmp_path / "[red]x.toml")])
+    done = harness("validate", tmp_path / "[red]x.toml")
     assert done.exit_code == 0, done.output
     assert "[/b] [link=x]y" in done.output
 
@@ -139,7 +138,7 @@ def test_a_table_with_a_million_bad_rows_shows_the_first(tmp_path: Path) -> None
     table = 'kind = "fasteners"\npreload = 1.0\nfile = "points.csv"'
     path = tmp_path / "scene.toml"
     path.write_text(SCENE.replace('kind = "pressure"\npart = "a"\nvalue = 1e-3', table))
-    done = CliRunner().invoke(app, ["validate", str(path)])
+    done = harness("validate", path)
     assert done.exit_code == 2
     assert "and 2900 more" in done.output
     assert done.output.count("line ") == 100
@@ -153,7 +152,7 @@ def test_measured_gaps_from_a_pipe_or_a_device_are_not_read(name: str, tmp_path:
     (tmp_path / "device" / name).symlink_to("/dev/zero")
     for path in (tmp_path / name, tmp_path / "device" / name):
         words = ["series", str(tmp_path / "scene.toml"), "--gaps", str(path), "--out", str(tmp_path / "out")]
-        done = CliRunner().invoke(app, words)
+        done = harness(*words)
         assert done.exit_code == 2
         assert "no regular file" in done.output
 
@@ -170,7 +169,7 @@ def test_a_loop_of_links_is_no_file(tmp_path: Path) -> None:
         *("report loop.d", "gate loop.d", "export good.toml --format npz --out out.npz/file.npz"),
     ):
         given = [str(tmp_path / word) if "." in word else word for word in words.split()]
-        done = CliRunner().invoke(app, given)
+        done = harness(*given)
         assert done.exit_code == 2, (words, done.exception)
         assert done.output.strip()
 
@@ -187,7 +186,7 @@ def test_loads_whose_displacements_overflow_are_refused(form: str, tmp_path: Pat
     K, A = 1e-3 * np.array([[2.0, 1.0], [1.0, 2.0]]), np.ones((2, 1))  # x = ±inf, p = inf − inf
     np.savez(tmp_path / "own.npz", K=K, A=A, g=np.ones(1), f=np.full(2, 1.7e308))
     given = ["solve", str(tmp_path / "own.npz"), "--form", form, "--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(app, given)
+    done = harness(*given)
     assert done.exit_code == 2, done.output
     assert "finite displacements" in done.output.replace("\n", " ")
     assert not (tmp_path / "out").exists()
