@@ -5,7 +5,10 @@ warning where the page was tried in no browser.
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
 
 import pytest
 from browser import NO_BROWSER
@@ -23,6 +26,27 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
         yield
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run of the tiny joint, two rows of the plug-in `exact`, which nobody may change."""
+    import tiny
+    from rich.console import Console
+
+    from harness.measurement.run import run
+    from harness.planning.suite import read_suite
+
+    folder = tmp_path_factory.mktemp("finished")
+    suite = read_suite(str(tiny.write_suite(folder, tolerances=[1e-6, 1e-8])))
+    assert run(suite, folder / "finished", Console(file=StringIO())) == 0
+    return folder / "finished"
+
+
+@pytest.fixture
+def copy(finished: Path, tmp_path: Path) -> Path:
+    """One that a test may change."""
+    return Path(shutil.copytree(finished, tmp_path / "copy"))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -111,11 +111,9 @@ def question(name: str) -> Question:
     """Of a scene by its name, or the first one of a document, docs/NAME.md."""
     if name.endswith(".md"):
         table = re.search(r"```toml\n(.*?)```", (DOCS / Path(name).name).read_text("utf-8"), re.DOTALL)
-        assert table is not None
         scene = scene_of(tomllib.loads(table[1]))
     else:
         scene = read_scene(name)
-    assert isinstance(scene, JointScene)
     return Question(scene)
 
 

@@ -6,19 +6,16 @@ import json
 import random
 import shutil
 from collections.abc import Callable
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import tiny
 from commands import harness
-from rich.console import Console
 from strip import write_strip
 
-from harness.measurement.run import record_machine, run
-from harness.planning.suite import read_suite, read_written
+from harness.measurement.run import record_machine
+from harness.planning.suite import read_written
 from harness.results import checksums, records
 from harness.results.kinds import refuse_unreadable
 from harness.series import store
@@ -31,12 +28,10 @@ FLIPS = 120  # bytes damaged per file
 
 
 @pytest.fixture(scope="module")
-def directories(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def directories(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """`run`, a directory of results, and `series`."""
     folder = tmp_path_factory.mktemp("whole")
-    text = '[[solver]]\nname = "exact"\nforms = ["dual"]\n'
-    suite = read_suite(str(tiny.write_suite(folder, text, tolerances=[1e-6, 1e-8])))
-    assert run(suite, folder / "run", Console(file=StringIO())) == 0
+    shutil.copytree(finished, folder / "run")
     write_strip(folder)
     words = ["series", folder / "strip.toml", "--cases", 6, "--check", 0, "--out", folder / "series"]
     assert harness(*words).exit_code == 0

@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from commands import harness
-from finished import finished_run
 from typer.testing import Result
 
 from harness.results import records
@@ -19,16 +18,6 @@ from harness.results.sides import measurement
 from harness.verification.baseline import Baseline, read_baseline
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return finished_run(tmp_path_factory)
-
-
-@pytest.fixture
-def copy(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "copy"))
 
 
 def gate(directory: Path, *words: object) -> Result:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
 import tiny
 from commands import harness
-from finished import finished_run
 from typer.testing import Result
 
 from harness.measurement.reproduce import find_row, of_one_process
@@ -19,16 +17,6 @@ pytestmark = pytest.mark.slow
 
 def reproduce(directory: Path, *words: str) -> Result:
     return harness("reproduce", directory, *words)
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return finished_run(tmp_path_factory)
-
-
-@pytest.fixture
-def copy(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "copy"))
 
 
 def test_the_same_code_gives_the_same_answer(finished: Path) -> None:

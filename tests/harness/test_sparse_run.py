@@ -102,14 +102,6 @@ def test_the_difference_of_the_roads_is_recorded_in_either_order(
     assert 0.0 < problem["sparse"].get("from_condensed_mm", 1e-12) <= 1e-9
 
 
-def test_the_gate_judges_both_again(finished: Path) -> None:
-    console = quiet()
-    assert gate(finished, console) == 0
-    said = console.file.getvalue()  # type: ignore[attr-defined]
-    assert "all 2 gated rows" in said
-    assert said.count("within") >= 2
-
-
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 @pytest.mark.parametrize(("moved", "code"), [(5e-8, 0), (2e-7, 1), (np.nan, 1)])
 def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, moved: float, code: int) -> None:

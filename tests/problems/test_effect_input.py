@@ -83,11 +83,6 @@ def test_a_wrong_value_is_named_with_unit_and_range(
     assert allowed in found[0].allowed
 
 
-def test_units_of_a_joint(tmp_path: Path) -> None:
-    (fault,) = faults(tmp_path, joint=JOINT.replace("thickness = 2.0", "thickness = 0", 1))
-    assert fault.allowed.endswith("greater than 0; in mm")
-
-
 MEASURED = "points = [[0, 0, 1], [9, 0, 1], [9, 9, 2]]"
 PAD = 'kind = "local_thickness"\npart = "a"\nthickness = {}\nx = [{}, {}]\ny = [0, 50]'
 CONTRADICTIONS = {
@@ -159,12 +154,6 @@ def test_a_preload_at_an_installed_fastener(tmp_path: Path) -> None:
         (fault,) = faults(tmp_path, *order)
         assert "installed_fasteners" in fault.key
         assert "fasteners acts at the same nodes" in fault.allowed
-
-
-def test_pads_side_by_side_are_no_contradiction(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text("".join(f"[[effect]]\n{PAD.format(3, *x)}\n" for x in ((0, 50), (50, 80))) + JOINT)
-    assert len(read_scene(str(path)).effects) == 2
 
 
 GAPS = 'kind = "measured_gap"\nfile = "gaps.csv"'

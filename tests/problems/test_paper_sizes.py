@@ -20,7 +20,6 @@ def test_sizes(n: int) -> None:
         if name.startswith(f"{n}/"):
             scene = read_scene(name)
             assert scene.expected_size == (n, TABLE_4[n][0])
-            assert scene.joint is not None
             assert scene.joint.contact_matrix().shape == (n, TABLE_4[n][0])
 
 
@@ -60,7 +59,6 @@ def test_active_constraints_of_the_paper(smallest: Prepared, count: int) -> None
     scene = read_scene(f"4386/{count:04}")
     case = load_case(scene)
     lam = solve("newton", "dual", smallest, case)[0].lam
-    assert lam is not None
     assert abs(int((lam > 0).sum()) - count) <= 22  # 1 % of m
     assert lam.min() >= 0
     assert (smallest.Q @ lam - smallest.dual_load(case)).min() > -1e-9

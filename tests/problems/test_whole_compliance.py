@@ -55,7 +55,6 @@ def test_of_few_contacts_without_coordinates_the_approximate_inverse_is_exact(ki
     (block,) = prepared.assembly.K.blocks
     assert isinstance(block, GeneralBlock if kind == "general" else BandedBlock)
     approximate = prepared.approximate_inverse
-    assert approximate is not None
     Q = A.T @ np.linalg.solve(K.toarray(), A.toarray())
     product = np.column_stack([approximate.M.product(column) for column in Q[approximate.M.order].T])
     np.testing.assert_allclose(product[:, approximate.M.order], np.eye(m), atol=1e-10)

@@ -113,8 +113,6 @@ TRIED += [(f"hard/{rung}", *case) for rung in ("conditioning/1e+10", "degeneracy
 def solved(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector, float]:
     """x, λ and the bound on x; where that is large, rounding may keep the method from "solved"."""
     answer, x = solve(name, form, prepared, case)
-    assert x is not None
-    assert answer.lam is not None
     bound = allowed(name, prepared, case, x, answer.lam)
     assert answer.status == "solved" or (answer.status == "inaccurate" and bound > ROUNDING_MM)
     return x, answer.lam, bound

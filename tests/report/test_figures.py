@@ -84,7 +84,6 @@ def test_relative_speed_is_drawn_against_the_size_if_each_size_has_one_scene(tmp
     ]
     results = read(write_rows(tmp_path, rows))
     section = speed(results)
-    assert section is not None
     figure = section.blocks[-1]
     assert len(figure.drawing.axes) == 1  # type: ignore[union-attr]
     line = figure.drawing.axes[0].lines[0]  # type: ignore[union-attr]

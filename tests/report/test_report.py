@@ -254,7 +254,6 @@ def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
     rows = [row(f"4386/{k}", "a", **times(solve_s=1.0)) for k in (100, 200, 400)]
     rows += [row("4386/300", "a", **no_answer("time_limit")), row("4386/300", "b")]
     section = active.section(read(write_rows(tmp_path, rows)))
-    assert section is not None
     (axes,) = section.blocks[0].drawing.axes[:1]  # type: ignore[union-attr]
     seconds = axes.lines[0].get_ydata()
     assert [math.isnan(s) for s in seconds] == [False, False, True, False]

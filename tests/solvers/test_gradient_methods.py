@@ -55,7 +55,6 @@ def test_each_variant_agrees_with_nnls(name: str, options: dict[str, Any], kind:
     assert 0 < np.count_nonzero(lam) < len(lam)
     answer = solved(name, options, prepared, load)
     assert answer.status == "solved"
-    assert answer.lam is not None
     np.testing.assert_allclose(prepared.recover(answer.lam, load), x, rtol=0, atol=1e-8)
 
 
@@ -111,7 +110,6 @@ def test_the_products_that_are_told_are_those_made(
 def test_from_its_own_answer_little_is_left_to_do(name: str, options: dict[str, Any]) -> None:
     prepared, load = strips(120)
     cold = solved(name, options, prepared, load)
-    assert cold.lam is not None
     solver = make_solver(name, options)
     state = solver.prepare(solver.convert(in_form(prepared, "dual")))
     start = WarmStart(load, cold.lam, prepared.Q @ cold.lam - load.p)
@@ -171,18 +169,15 @@ def test_gauss_seidel_converges_for_any_relaxation_below_two(relaxation: float) 
     x, _ = solve_by_nnls(prepared, load)
     answer = solved("projected-gauss-seidel", {"relaxation": relaxation}, prepared, load)
     assert answer.status == "solved"
-    assert answer.lam is not None
     np.testing.assert_allclose(prepared.recover(answer.lam, load), x, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("rung", ["1e+06", "1e+08", "1e+10"])
 def test_gauss_seidel_gives_up_rather_than_be_wrong(rung: str) -> None:
     made = read_scene(f"hard/conditioning/{rung}").made
-    assert made.x is not None
     prepared = Prepared(made.assembly)
     load = LoadCase(made.load.f, made.load.g, prepared.dual_load(made.load))
     answer = solved("projected-gauss-seidel", {}, prepared, load)
-    assert answer.lam is not None
     if answer.status == "solved":
         off = abs(prepared.recover(answer.lam, load) - made.x).max()
         assert off <= conditioned_limit(1e-7, float(rung), abs(made.x).max())

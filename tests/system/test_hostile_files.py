@@ -20,8 +20,7 @@ from small import make_load, make_prepared
 from strip import write_strip
 from typer.testing import Result
 
-from harness.measurement.run import run
-from harness.planning.suite import read_suite, read_written
+from harness.planning.suite import read_written
 from harness.results import records
 from harness.results.kinds import refuse_unreadable
 from harness.scene.exchange import import_, matrices
@@ -38,7 +37,7 @@ PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 QUIET = Console(file=StringIO())
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("RIVETBENCH_CACHE", str(root))
@@ -259,13 +258,21 @@ def test_matrices_beyond_double_precision_are_refused(changes: Any, said: str, t
 COUNT = 12
 
 
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("series")
+    write_strip(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("report.writers.series.write", lambda directory: directory)
+        assert solve_series(folder / "out").exit_code == 0
+    return folder
+
+
 @pytest.fixture
-def series(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def series(solved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The directory of a finished series of COUNT cases; its report is not drawn."""
     monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
-    write_strip(tmp_path)
-    assert solve_series(tmp_path / "out").exit_code == 0
-    return tmp_path / "out"
+    return Path(shutil.copytree(solved, tmp_path / "copy")) / "out"
 
 
 def solve_series(out: Path, *more: object) -> Result:
@@ -392,33 +399,17 @@ def test_contacts_nowhere_on_earth_are_named_and_made_again(place: float | None,
 # --- a directory of results ---------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("run")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
-        text = '[[solver]]\nname = "exact"\nforms = ["dual"]\n'
-        suite = read_suite(str(tiny.write_suite(folder, text, tolerances=[1e-6, 1e-8])))
-        assert run(suite, folder / "finished", QUIET) == 0
-    return folder / "finished"
-
-
-@pytest.fixture
-def results(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "copy"))
-
-
 def measured(directory: Path) -> list[dict[str, Any]]:
     return records.read(directory / records.MEASUREMENTS)
 
 
 @pytest.mark.slow
-def test_the_gate_does_not_pass_what_nobody_planned(results: Path) -> None:
+def test_the_gate_does_not_pass_what_nobody_planned(copy: Path) -> None:
     """Without suite.toml, and with the first row alone."""
-    assert invoke("gate", results).exit_code == 0
-    (results / "suite.toml").unlink()
-    records.rewrite(results / records.MEASUREMENTS, measured(results)[:1])
-    done = invoke("gate", results)
+    assert invoke("gate", copy).exit_code == 0
+    (copy / "suite.toml").unlink()
+    records.rewrite(copy / records.MEASUREMENTS, measured(copy)[:1])
+    done = invoke("gate", copy)
     assert done.exit_code == 1
     assert "suite.toml" in done.output
 
@@ -432,12 +423,12 @@ WRONG: list[tuple[str, Any]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), WRONG)
-def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, results: Path) -> None:
-    rows = measured(results)
+def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, copy: Path) -> None:
+    rows = measured(copy)
     rows[1][name] = value
-    records.rewrite(results / records.MEASUREMENTS, rows)
+    records.rewrite(copy / records.MEASUREMENTS, rows)
     for command in ("gate", "report"):
-        done = invoke(command, results)
+        done = invoke(command, copy)
         if done.exit_code != 0 or command == "gate":
             assert done.exit_code == 2, done.output
             assert f"measurements.jsonl: line 2: {name}" in done.output
@@ -445,23 +436,23 @@ def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, r
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), [("key", None), ("time_limit_s", "a")])
-def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, results: Path) -> None:
-    rows = measured(results)
+def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, copy: Path) -> None:
+    rows = measured(copy)
     rows[1][name] = value
-    records.rewrite(results / records.MEASUREMENTS, rows)
-    words = ["--scene", results.parent / "tiny.npz", "--solver", "gi", "--out", results]
-    tiny.write_problem(results.parent / "tiny.npz")
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    words = ["--scene", copy.parent / "tiny.npz", "--solver", "gi", "--out", copy]
+    tiny.write_problem(copy.parent / "tiny.npz")
     done = invoke("run", "gate", *words)
     assert done.exit_code == 2
     assert f"measurements.jsonl: line 2: {name}" in done.output
 
 
 @pytest.mark.slow
-def test_a_nested_line_is_named(results: Path) -> None:
-    path = results / records.MEASUREMENTS
+def test_a_nested_line_is_named(copy: Path) -> None:
+    path = copy / records.MEASUREMENTS
     path.write_bytes(b"[" * 100_000 + b"\n" + path.read_bytes())
     for command in ("gate", "report"):
-        done = invoke(command, results)
+        done = invoke(command, copy)
         assert done.exit_code == 2
         assert "line 1" in done.output
 
@@ -479,38 +470,38 @@ def test_a_nested_line_is_named(results: Path) -> None:
         *(("machine.json", text) for text in (b"[" * 100_000, b"1", b"\xff")),
     ],
 )
-def test_a_damaged_file_beside_the_rows_is_named(name: str, content: bytes, results: Path) -> None:
-    (results / name).write_bytes(content)
-    done = invoke("report", results)
+def test_a_damaged_file_beside_the_rows_is_named(name: str, content: bytes, copy: Path) -> None:
+    (copy / name).write_bytes(content)
+    done = invoke("report", copy)
     assert done.exit_code in (0, 2), done.output
-    said = done.output if done.exit_code else (results / "report" / "report.md").read_text()
+    said = done.output if done.exit_code else (copy / "report" / "report.md").read_text()
     assert name in said
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("values", [np.full(20, "1.0"), np.full(20, 1.0 + 2j), np.full((20, 2), 1.0)])
-def test_an_answer_of_another_kind_is_none(values: Any, results: Path) -> None:
-    np.savez(results / measured(results)[0]["answer"], x=values, lam=np.zeros(10))
-    done = invoke("gate", results)
+def test_an_answer_of_another_kind_is_none(values: Any, copy: Path) -> None:
+    np.savez(copy / measured(copy)[0]["answer"], x=values, lam=np.zeros(10))
+    done = invoke("gate", copy)
     assert done.exit_code == 1
     assert "missing, damaged or not finite" in done.output
 
 
 @pytest.mark.slow
-def test_an_answer_that_is_a_pipe_is_none(results: Path) -> None:
-    answer = results / measured(results)[0]["answer"]
+def test_an_answer_that_is_a_pipe_is_none(copy: Path) -> None:
+    answer = copy / measured(copy)[0]["answer"]
     answer.unlink()
     os.mkfifo(answer)
-    assert invoke("gate", results).exit_code == 1
+    assert invoke("gate", copy).exit_code == 1
 
 
 @pytest.mark.slow
-def test_text_among_the_arrays_of_a_scene_is_left_out(results: Path) -> None:
-    (path,) = (results / "scenes").iterdir()
+def test_text_among_the_arrays_of_a_scene_is_left_out(copy: Path) -> None:
+    (path,) = (copy / "scenes").iterdir()
     with np.load(path) as file:
         arrays = dict(file)
     np.savez(path, **{name: values.astype(str) for name, values in arrays.items()})
-    assert invoke("report", results).exit_code == 0
+    assert invoke("report", copy).exit_code == 0
 
 
 @pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*/suite.toml")), ids=lambda path: path.parent.name)
