@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tiny
+from long import ASKED
 from rich.console import Console
 from strip import write_strip
 
@@ -46,7 +47,7 @@ from problems.scene import read_scene
 
 pytestmark = pytest.mark.slow
 
-CASES = 60
+CASES = 24
 VERSIONS = versions()
 DASK = importlib.util.find_spec("distributed") is not None
 needs_dask = pytest.mark.skipif(not DASK, reason="needs Dask")
@@ -229,6 +230,7 @@ def test_a_table_is_solved_on_workers_a_case_each_row(cluster: Any, tmp_path: Pa
 
 
 @needs_dask
+@pytest.mark.skipif(not ASKED, reason="long: RIVETBENCH_LONG=1")
 def test_a_suite_on_workers_one_of_which_is_killed(cluster: Any, tmp_path: Path) -> None:
     """Rows and answers are those of a suite that is measured here; the lost measurement is made again."""
     table = '[[solver]]\nname = "{}"\nforms = ["dual"]\n'

@@ -117,11 +117,6 @@ def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
     assert f"{own}: A[:, 2] = 'dependent': must not depend on the columns before it" in said
 
 
-def test_arrays_are_refused_at_once() -> None:
-    with pytest.raises(InputError, match=re.escape("A[:, 2]")):
-        own_matrices(np.eye(N), np.eye(N, 3)[:, [0, 1, 0]], np.ones(N), np.zeros(3))
-
-
 def test_contacts_that_the_rounding_of_Q_makes_dependent_are_said() -> None:
     """Apart by 2⁻¹⁹ in A, but by less than the rounding of K⁻¹ in Q: cond(K) = 10¹²."""
     basis = np.linalg.qr(np.random.default_rng(0).standard_normal((N, N)))[0]

@@ -7,7 +7,6 @@ import pytest
 from solving import solve
 
 from problems.build import load_case, prepared
-from problems.forms.prepared import Prepared
 from problems.scene import read_scene, scene_names
 
 TABLE_2 = (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592)
@@ -38,14 +37,10 @@ def test_every_size_has_from_few_to_many_active_constraints(n: int) -> None:
     assert np.diff(fractions).max() < 0.3
 
 
-@pytest.fixture(scope="module")
-def smallest() -> Prepared:
-    return prepared(read_scene("4386/0052"))
-
-
 @pytest.mark.slow
-def test_condition_of_the_smallest_problem(smallest: Prepared) -> None:
+def test_condition_of_the_smallest_problem() -> None:
     """By all eigenvalues of both blocks, where the build takes a few by Lanczos."""
+    smallest = prepared(read_scene("4386/0052"))
     assert (smallest.assembly.n, smallest.assembly.m) == (4386, 2193)
     values = np.concatenate([np.linalg.eigvalsh(K) for K in smallest.assembly.K.matrices])
     condition = values.max() / values.min()
@@ -55,10 +50,10 @@ def test_condition_of_the_smallest_problem(smallest: Prepared) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", TABLE_2)
-def test_active_constraints_of_the_paper(smallest: Prepared, count: int) -> None:
+def test_active_constraints_of_the_paper(count: int) -> None:
     scene = read_scene(f"4386/{count:04}")
-    case = load_case(scene)
-    lam = solve("newton", "dual", smallest, case)[0].lam
+    data, case = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    lam = solve("newton", "sparse", data, case)[0].lam
     assert abs(int((lam > 0).sum()) - count) <= 22  # 1 % of m
     assert lam.min() >= 0
-    assert (smallest.Q @ lam - smallest.dual_load(case)).min() > -1e-9
+    assert (data.compliance @ lam - data.dual_load(case)).min() > -1e-9

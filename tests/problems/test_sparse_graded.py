@@ -71,17 +71,6 @@ def test_the_junction_and_the_clamped_edges_are_kept(scene: Any) -> None:
         assert (made.plate.y[[0, -1]] == given.plate.y[[0, -1]]).all()
 
 
-def test_the_lines_of_stiff_beams_and_supports_are_kept() -> None:
-    def lines(name: str) -> set[float]:
-        return set(JointModel.of(SCENES[name]).graded().parts[0].plate.y.tolist())
-
-    full = JointModel.of(SCENES["ribs"]).parts[0].plate.y
-    beams = {float(full[np.argmin(abs(full - y))]) for y in (320.0, 520.0)}
-    assert beams <= lines("ribs")
-    assert not beams <= lines("plain")
-    assert lines("plain") < lines("support")
-
-
 def test_without_a_coarser_model_the_answer_is_the_same() -> None:
     """It decides the number of sweeps, not where they end."""
     gap = effect("initial_gap", mean=0.5, random={"sd": 0.1, "correlation_length": 100.0, "seed": 3})

@@ -53,7 +53,7 @@ OTHERS: list[Variant] = [
 
 
 def test_nothing_wrong_is_called_solved_and_no_bound_is_too_small() -> None:
-    log, count, start = Log(), draws(300, 50_000), time.monotonic()
+    log, count, start = Log(), draws(150, 50_000), time.monotonic()
     for index in range(count // LOADS):
         made = exact_problem(SEED, index)
         log.where = f"exact_problem({SEED}, {index}), {made.kind}"

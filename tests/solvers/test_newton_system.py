@@ -76,13 +76,6 @@ def test_the_smallest_eigenvalue_of_v_is_above_one_half(seed: int) -> None:
     assert np.linalg.eigvalsh((found + found.T) / 2)[0] >= 0.5 - 1e-7
 
 
-def test_v_is_exact_without_d() -> None:
-    preconditioner = CholeskyPlusRoot(definite(8, 1))
-    preconditioner.take(np.zeros(8))
-    v = np.arange(1.0, 9.0)
-    np.testing.assert_allclose(preconditioner.multiply(v), v)
-
-
 def test_v_becomes_exact_where_large_d_stands_last() -> None:
     """D = 0 on the first half, huge on the second: the spectrum is 1 in this order, not in the other."""
     Q = definite(SIZE, 3)

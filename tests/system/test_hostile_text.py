@@ -22,7 +22,6 @@ from typer.testing import CliRunner
 from harness.results.records import to_line
 from harness.terminal.console import error_reporting
 from harness.terminal.plain_console import PlainConsole
-from harness.terminal.progress import Display
 from report.document import escape
 from report.figures import style
 from report.figures.answer import answer_figures
@@ -227,14 +226,6 @@ def test_no_text_passes_for_a_line_of_its_own() -> None:
     assert "\nof ours" in screen.getvalue()
 
 
-def test_a_cell_with_control_characters_is_as_wide_as_it_is_shown() -> None:
-    screen = io.StringIO()
-    table = Table("name")
-    table.add_row("\x1b[31m:smile: end")
-    PlainConsole(file=screen, width=80).print(table)
-    assert "│ �[31m:smile: end │" in screen.getvalue()
-
-
 def test_a_name_that_no_file_can_hold_is_named() -> None:
     app = Typer()
 
@@ -246,13 +237,6 @@ def test_a_name_that_no_file_can_hold_is_named() -> None:
     outcome = CliRunner().invoke(app)
     assert outcome.exit_code == 2
     assert "scene a�: a name that is not UTF-8" in outcome.output
-
-
-def test_markup_in_the_name_of_a_scene_is_text_beside_the_bar() -> None:
-    screen = io.StringIO()
-    with Display(PlainConsole(file=screen, force_terminal=True, width=120), [], 0, {}) as display:
-        display.doing("[/b][red]")
-    assert "[/b][red]" in screen.getvalue()
 
 
 def test_a_file_name_that_is_not_utf8_is_kept_in_a_row() -> None:
