@@ -1,7 +1,5 @@
 """A command of the project in this process, its words as a user types them."""
 
-from __future__ import annotations
-
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app

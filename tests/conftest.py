@@ -2,8 +2,6 @@
 warning where the page was tried in no browser.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

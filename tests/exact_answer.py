@@ -1,7 +1,5 @@
 """Whether a manufactured problem's answer satisfies the optimality conditions, without any rounding."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

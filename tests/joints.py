@@ -1,7 +1,5 @@
 """Small joints made in code, and the numbering of the plate's unknowns, written down once more."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How much is tried: a sample, or with RIVETBENCH_LONG all of it."""
 
-from __future__ import annotations
-
 import os
 
 ASKED = int(os.environ.get("RIVETBENCH_LONG") or 0)

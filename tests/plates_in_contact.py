@@ -4,8 +4,6 @@ Refined are the plates, the contacts and the initial gap; the forces stay what t
 that both codes go to the same limit.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from dataclasses import dataclass
@@ -39,7 +37,7 @@ class Found:
     gaps: Array
     reactions: Array
 
-    def apart(self, other: Found) -> tuple[float, float]:
+    def apart(self, other: "Found") -> tuple[float, float]:
         """The largest difference of gaps and of reactions, over the largest here."""
         pairs = ((self.gaps, other.gaps), (self.reactions, other.reactions))
         of_gaps, of_reactions = (float(abs(a - b).max() / abs(a).max()) for a, b in pairs)

@@ -1,7 +1,5 @@
 """A tiny joint as own matrices, and plugins that solve it exactly or misbehave."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`--allow-gap` of `solve` and `series`: what it says against gaps found by another method."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections import Counter

@@ -1,7 +1,5 @@
 """The public interface: what it gives is what the commands give, and what it refuses it names."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

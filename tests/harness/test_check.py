@@ -1,7 +1,5 @@
 """Each solver here has one fault; `check` must name it, and must find nothing in the one without."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

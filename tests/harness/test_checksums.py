@@ -1,7 +1,5 @@
 """Every file of a results or series directory is read as it was written, or refused by name."""
 
-from __future__ import annotations
-
 import json
 import random
 import shutil

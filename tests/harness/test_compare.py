@@ -1,7 +1,5 @@
 """`compare`: rows are changed one by one, and what is said of each is known."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from typing import Any

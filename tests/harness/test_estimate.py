@@ -1,7 +1,5 @@
 """The estimates of a scene's size, memory and time, before anything is built."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """`export --form` and `judge`: problems to other programs, bit for bit, and their answers back."""
 
-from __future__ import annotations
-
 import runpy
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The gate held to an earlier run, and its findings as JSON and JUnit XML."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One measurement, whatever its solver does: a status, and no process left."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import time

@@ -1,7 +1,5 @@
 """Which code a row is of: in a work tree, installed, or neither; each asked of a copy in its own process."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

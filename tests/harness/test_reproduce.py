@@ -1,7 +1,5 @@
 """`reproduce`: a row of a run measured again, with the same or another outcome."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

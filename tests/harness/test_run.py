@@ -1,7 +1,5 @@
 """A run from a suite to rows, answers, report and gate, through real workers on a tiny scene."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

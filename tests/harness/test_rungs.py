@@ -1,7 +1,5 @@
 """Rungs of the ladders in a run: judged by what conditioning allows, and refused where the model refuses."""
 
-from __future__ import annotations
-
 from io import StringIO
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Work on other processes: through a plain executor, and through Dask where it is installed."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

@@ -1,7 +1,5 @@
 """tolerances = "auto" and repeats = "auto": what is measured, and what the report makes of it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from io import StringIO

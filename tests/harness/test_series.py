@@ -1,7 +1,5 @@
 """A suite of series: the cases of a scene in one process, a row each."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """A series from the command line to rows and gaps, against independent answers; ended, resumed, refused."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """What the terminal shows: a line a row, and the time that is left."""
 
-from __future__ import annotations
-
 from io import StringIO
 from typing import Any
 

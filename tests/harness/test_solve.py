@@ -1,7 +1,5 @@
 """`solve` and `validate`: the answer, its files, the ledger, and what was not computed."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The hash of a solver's code: what it does counts, what is said of it does not, nor do other solvers."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from pathlib import Path

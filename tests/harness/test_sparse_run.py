@@ -1,7 +1,5 @@
 """A run of both roads on one scene: measured, judged, recorded beside each other, and gated."""
 
-from __future__ import annotations
-
 import shutil
 from io import StringIO
 from pathlib import Path

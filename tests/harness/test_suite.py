@@ -1,7 +1,5 @@
 """Suite files, the plan made of them, and what the command line changes."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

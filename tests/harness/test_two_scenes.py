@@ -1,7 +1,5 @@
 """`solve A B`, the force in each fastener, and `init`."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

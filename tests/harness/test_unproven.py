@@ -1,7 +1,5 @@
 """Where no bound can be proven, nothing says that one was: no console, no file, no report."""
 
-from __future__ import annotations
-
 import json
 from io import StringIO
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A part alone: a linear solve, which the record says, and no solver of quadratic programs is called."""
 
-from __future__ import annotations
-
 import json
 from io import StringIO
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The cache: whole entries or none, memory-mapped, and rebuilt when what made them changes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Condensation against a dense Schur complement and a full solve, and contact against beam theory."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contacts that depend on one another are refused when they are read, in every form; all others are taken."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Scenes drawn at random: the same wherever they are drawn, others for each version, within the ranges."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from pathlib import Path

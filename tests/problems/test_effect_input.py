@@ -1,7 +1,5 @@
 """What is said of bad effects: file, key, value, unit and what is allowed; contradictions by both names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

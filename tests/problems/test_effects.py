@@ -1,7 +1,5 @@
 """Each effect's one term, and that an effect which no scene names takes no part."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Matrices out to other programs' files and back, and what is said of the files' digits."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from contextlib import suppress

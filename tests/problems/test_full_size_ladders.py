@@ -1,7 +1,5 @@
 """The ladders at full size: as exact as the small ones, made when needed only, and all in the suite."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.linalg as sla

@@ -1,7 +1,5 @@
 """Effects on gaps and forces at the junction: measured gap, shims, tool, clamps, files of positions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

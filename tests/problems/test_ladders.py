@@ -1,7 +1,5 @@
 """The ladders: their answers are exact, what cannot be taken is refused, and the in-house solvers hold."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Load cases of a series: random gaps, a table of measured ones, a sweep; and what is said of bad ones."""
 
-from __future__ import annotations
-
 import pickle
 from pathlib import Path
 

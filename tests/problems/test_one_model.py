@@ -1,7 +1,5 @@
 """The model of a scene is made once, and its file read once, whatever is asked of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """An effect that no scene names is not imported, allocates nothing and changes no bit."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Problems from outside: printed optima, closed forms, convergence; and how they are found and solved."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A user's own sparse K from its files to the answer: nothing dense, and one message for what is wrong."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

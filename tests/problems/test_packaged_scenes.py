@@ -1,7 +1,5 @@
 """The packaged scenes that solvers are compared on: problems/scenes/<n>/<active>.toml, …/scaling/<n>.toml."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from typing import Any

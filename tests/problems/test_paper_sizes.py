@@ -1,7 +1,5 @@
 """The paper's test problems: sizes and condition of Table 4, active constraints of Table 2."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from solving import solve

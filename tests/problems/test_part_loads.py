@@ -1,7 +1,5 @@
 """Weight, heat, shifted supports and pads against beam theory and statics."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

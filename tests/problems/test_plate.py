@@ -1,7 +1,5 @@
 """The plate element against closed forms, beam theory and another code."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

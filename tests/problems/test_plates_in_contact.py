@@ -5,8 +5,6 @@ contacts. The scenes of the gallery are symmetric about the contact, or the midd
 docs/effects.md is not. docs/outside.md has finer meshes, by draw_plates_in_contact.py.
 """
 
-from __future__ import annotations
-
 import pytest
 from long import ASKED
 from plates_in_contact import initial_gap, question

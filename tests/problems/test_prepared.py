@@ -1,7 +1,5 @@
 """K⁻¹ through the Cholesky factors: one column or many, and refined only where the residual asks for it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

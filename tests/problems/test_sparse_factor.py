@@ -1,7 +1,5 @@
 """Factors of a sparse K, each against the dense matrix, and what they say of a mechanism."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

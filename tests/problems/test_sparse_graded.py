@@ -1,7 +1,5 @@
 """The coarser model of the preconditioner: the same junction, nearly the same compliance, no softer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The uncondensed model against the condensed one, whose code for K, loads and springs is another."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Entries of K⁻¹ and Q near the diagonal, from band factors, against the dense inverse."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

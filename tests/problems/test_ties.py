@@ -1,7 +1,5 @@
 """Installed fasteners: springs between the parts, against closed forms and the dense sum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.linalg as sla

@@ -1,7 +1,5 @@
 """Q of few contacts from the factor of a large K is that of the dense matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -3,8 +3,6 @@
 A few hundred problems; RIVETBENCH_LONG=1 takes 50 000 load cases, RIVETBENCH_LONG=N takes N.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

@@ -3,8 +3,6 @@
 Two answers, each within its bound of the truth, are at most the sum of the bounds apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

@@ -3,8 +3,6 @@
 RIVETBENCH_LONG=1 takes thousands of them instead of a few hundred.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

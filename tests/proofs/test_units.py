@@ -1,7 +1,5 @@
 """The change of units: exact, undone on the answer, and the same answer in any units from every solver."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

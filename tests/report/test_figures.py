@@ -1,7 +1,5 @@
 """The figures: colours told apart by all readers, the size of wrong answers, what stands beside what."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 from pathlib import Path

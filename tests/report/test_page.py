@@ -1,7 +1,5 @@
 """The page beside the report: all rows are in it, and no text of theirs is markup."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil

@@ -1,7 +1,5 @@
 """The report, from made-up results whose figures can be worked out by hand."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

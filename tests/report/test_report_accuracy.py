@@ -1,7 +1,5 @@
 """The sections on what accuracy costs, from rows whose facts were planted."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The section on methods for contact problems: seconds and products with Q."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

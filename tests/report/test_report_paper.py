@@ -1,7 +1,5 @@
 """The paper's tables and figures in the report, from made-up rows."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The verdicts on the paper's claims: they hold for made-up rows that say so, and turn with the rows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How the report reads rows: those of older versions, of several forms and of different code."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

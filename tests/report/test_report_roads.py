@@ -1,7 +1,5 @@
 """The section "from scene to answer": stages, totals, and who is the fastest in any form."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -43,12 +41,12 @@ def results(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> Result
     return read(directory)
 
 
-def line_of(lines: pd.DataFrame, method: str) -> pd.Series[Any]:
+def line_of(lines: pd.DataFrame, method: str) -> pd.Series:
     (line,) = (line for _, line in lines.iterrows() if line["method"] == method)
     return line
 
 
-def totals(line: pd.Series[Any]) -> list[float]:
+def totals(line: pd.Series) -> list[float]:
     return [line[f"total_{k}_s"] for k in (1, 10, 1000)]
 
 

@@ -1,7 +1,5 @@
 """The section on speed: ratios of times within one run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Goldfarb–Idnani: its factor, its pivots, and its answers on both forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

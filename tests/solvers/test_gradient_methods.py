@@ -1,7 +1,5 @@
 """MPRGP, projected Newton, Lemke and Gauss–Seidel: steps, what they count, and where they start."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

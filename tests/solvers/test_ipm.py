@@ -1,7 +1,5 @@
 """The interior-point method: its schemes, its stopping rule, and what it says when it cannot."""
 
-from __future__ import annotations
-
 from itertools import product
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """The fast interior-point method: its systems in single precision, and its answers with each ingredient."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small import make_load, make_prepared, solve_by_nnls

@@ -1,7 +1,5 @@
 """Preconditioners, orderings and the conjugate gradients: the Newton systems (Q + D) v = b."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.linalg as sla

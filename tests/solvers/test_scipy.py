@@ -1,7 +1,5 @@
 """SciPy's L-BFGS-B: what it says of its answers, and how far off these are."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small import make_load, make_prepared, make_strips, solve_by_nnls

@@ -1,7 +1,5 @@
 """`mprgp` on the sparse form, where a product with Q is a solution with K's factors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

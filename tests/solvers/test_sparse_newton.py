@@ -1,7 +1,5 @@
 """`newton` on the sparse form: cold, warm, batched, by sets alone, with a band and without."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Starting points: Algorithms 4 and 5, STP1, STP2, Mehrotra's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small import make_load, make_prepared

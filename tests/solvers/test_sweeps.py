@@ -1,7 +1,5 @@
 """A banded M ≈ Q⁻¹, and contact sets with it, corrected by products with Q: cold, warm and batched."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

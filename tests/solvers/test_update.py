@@ -1,7 +1,5 @@
 """Series of load cases: each solver's `update` in the place of `setup`, from a near answer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The CI recipe: the action names what exists, and its script gates a plug-in of another project."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The command line starts fast: help needs none of the libraries that compute or draw."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The documents: what they show works as written, their tables are those of the code, their paths exist."""
 
-from __future__ import annotations
-
 import re
 import sys
 from io import StringIO

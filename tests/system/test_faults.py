@@ -1,7 +1,5 @@
 """Runs among faults: whatever befalls the solvers, the disk or the harness, no finished row is lost."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import resource

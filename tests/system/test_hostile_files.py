@@ -1,7 +1,5 @@
 """Files that are damaged, foreign, missing or in the way: refused by name or mended, and nothing is lost."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

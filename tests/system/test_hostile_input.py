@@ -1,7 +1,5 @@
 """What a hostile user writes into files and options: one clear message, soon, and no traceback."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Plug-ins that misbehave: each command ends, says what happened, and leaves no process and no traceback."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """Titles, names and messages that a hostile user wrote: text in every file and picture, and nothing else."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The page in a browser: its verdicts against the judge's, sorting, filters, the address, the keyboard."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Every figure of a document that comes from the published rows, computed from them again."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import cache

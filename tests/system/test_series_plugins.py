@@ -1,7 +1,5 @@
 """Plug-ins that misbehave in a series: it ends, what was solved is kept, and the same command goes on."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 
