@@ -136,7 +136,7 @@ def cached(root: Path) -> Target:
         folder,
         tuple(files),
         commands,
-        lambda name: name[:3] not in ("out", "cac"),
+        lambda name: not name.startswith(("out", "cache")),
         same_answer,
     )
 

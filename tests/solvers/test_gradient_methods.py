@@ -14,6 +14,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.scene import read_scene
 from solvers.active_set import parametric_path
+from solvers.active_set.banded_sets import OpenFactor
 from solvers.active_set.parametric_path import ParametricPath
 from solvers.base import Answer, WarmStart
 from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
@@ -60,7 +61,11 @@ def metrics(prepared: Prepared) -> dict[str, Diagonal]:
     Q = prepared.Q
     M, d = banded_inverse(Q, None), np.diag(Q).copy()
     alpha = step_length(prepared.compliance, d)
-    return {"band": Band(d, 1.0, M), "face": Face(d, alpha, M), "none": Diagonal(d, alpha)}
+    return {
+        "band": Band(d, 1.0, OpenFactor(M)),
+        "face": Face(d, alpha, OpenFactor(M)),
+        "none": Diagonal(d, alpha),
+    }
 
 
 @pytest.mark.parametrize("kind", ["band", "face", "none"])

@@ -6,6 +6,7 @@ import scipy.linalg as sla
 from long import seeds
 from test_gi import definite
 
+from solvers.interior_point.conjugate_gradients import conjugate_gradients
 from solvers.interior_point.preconditioner import (
     REORDER_AFTER,
     SYSTEMS,
@@ -13,7 +14,6 @@ from solvers.interior_point.preconditioner import (
     OpenLast,
     Preconditioned,
 )
-from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
 
 SIZE = 30
 ORDER = np.random.default_rng(7).permutation(SIZE)
