@@ -365,11 +365,11 @@ def own_scene(path: Path, contacts: int) -> Path:
 
 
 def test_nothing_of_an_older_answer_remains_and_what_is_not_ours_does(tmp_path: Path) -> None:
-    out, run = tmp_path / "out", partial(CliRunner().invoke, app)
-    assert run(["solve", str(own_scene(tmp_path / "one.npz", 1)), "--out", str(out)]).exit_code == 0
+    out = tmp_path / "out"
+    assert harness("solve", own_scene(tmp_path / "one.npz", 1), "--out", out).exit_code == 0
     assert (out / "contacts.csv").exists()
     (out / "mine.txt").write_text("kept")
-    assert run(["solve", str(own_scene(tmp_path / "none.npz", 0)), "--out", str(out)]).exit_code == 0
+    assert harness("solve", own_scene(tmp_path / "none.npz", 0), "--out", out).exit_code == 0
     assert not (out / "contacts.csv").exists()
     assert (out / "mine.txt").read_text() == "kept"
     files = json.loads((out / "solution.json").read_text())["files"]
@@ -377,16 +377,16 @@ def test_nothing_of_an_older_answer_remains_and_what_is_not_ours_does(tmp_path: 
 
 
 def test_a_full_disk_leaves_the_older_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    out, run = tmp_path / "out", partial(CliRunner().invoke, app)
-    scene = str(own_scene(tmp_path / "one.npz", 1))
-    assert run(["solve", scene, "--out", str(out)]).exit_code == 0
+    out = tmp_path / "out"
+    scene = own_scene(tmp_path / "one.npz", 1)
+    assert harness("solve", scene, "--out", out).exit_code == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
 
     def full(*_: object) -> None:
         raise OSError(27, "File too large")
 
     monkeypatch.setattr("report.writers.solution.write_page", full)
-    done = run(["solve", scene, "--out", str(out)])
+    done = harness("solve", scene, "--out", out)
     assert done.exit_code == 2
     assert "File too large" in done.output
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
