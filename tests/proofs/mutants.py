@@ -3,8 +3,6 @@
 Each leaves out, halves or weakens a term of a bound. Where a proof changes, its mutants change with it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 ENCLOSURE = "harness/verification/enclosure.py"

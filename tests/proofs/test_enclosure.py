@@ -1,7 +1,5 @@
 """Residuals against rational arithmetic: the error bounds hold, are small, and each of their terms counts."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

@@ -3,8 +3,6 @@
 The errors are known in closed form. `mutate_proofs.py` takes the terms out in turn.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 
