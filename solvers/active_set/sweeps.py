@@ -110,7 +110,7 @@ class Sweeps:
         return self._sweep([case], tolerance)[0]
 
     def answer(self, case: Case, tolerance: float) -> Answer:
-        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew where
+        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew if
         the rounding that it brought along decides, or a force was below zero.
 
         "solved" if max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm.
