@@ -176,9 +176,10 @@ def test_gate_reads_the_answers_of_an_archive(copy: Path) -> None:
     assert spoilt[0] == 1
     archive = copy / "answers.zip"
     whole = archive.read_bytes()
-    for damaged in (whole[:-30], whole[:200] + bytes(len(whole) - 2000) + whole[-1800:], b""):
-        archive.write_bytes(damaged)
-        assert said_by(gate, copy)[0] == 3
+    archive.write_bytes(whole[:60] + bytes(40) + whole[100:])  # in the first member
+    assert "damaged" in said_by(gate, copy)[1]
+    archive.write_bytes(whole[:-30])
+    assert said_by(gate, copy)[0] == 3
 
 
 def test_gate_lets_a_shift_within_the_limit_pass_and_ignores_what_is_not_gated(copy: Path) -> None:
