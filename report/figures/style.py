@@ -3,7 +3,7 @@
 A solver keeps its colour and marker in every figure of every report. Its forms differ in dashes and in the
 face of the marker, its variants in dashes, tint and the part of the marker that is filled. The colours are
 those of Okabe and Ito (2008), without their yellow; those of our solvers are told apart without their markers
-too, also by colour-blind readers (tests/test_figures.py).
+too, also by colour-blind readers (tests/report/test_figures.py).
 """
 
 from __future__ import annotations

@@ -110,17 +110,18 @@ class Sweeps:
         return self._sweep([case], tolerance)[0]
 
     def answer(self, case: Case, tolerance: float) -> Answer:
-        """Iterations are products with Q, inner iterations contact sets tried with M. With a dense Q, y is
-        computed anew; in the sparse form `with_x` does that.
+        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew where
+        the rounding that it brought along decides, or a force was below zero.
 
         "solved" if max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm.
         """
         order = self.order
         lam, y = np.empty(len(order)), np.empty(len(order))
         lam[order], y[order] = np.maximum(case.trial.lam, 0.0), case.trial.y
-        if self.prepared.assembly.K.dense or (case.trial.lam < 0).any():
+        residual = kkt_residual(lam, y) + case.doubt
+        if residual > tolerance or (case.trial.lam < 0).any():
             y = self.gaps(lam[:, None], [case.load])[:, 0]
-        residual = kkt_residual(lam, y)
+            residual = kkt_residual(lam, y)
         enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
         details: dict[str, Any] = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
         status: Status = "solved" if enough else "inaccurate" if case.settled else "iteration_limit"

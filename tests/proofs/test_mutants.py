@@ -18,4 +18,4 @@ def test_a_mutant_is_one_change_of_the_source(mutant: Mutant) -> None:
 @pytest.mark.parametrize("file", TESTS)
 def test_the_tests_that_kill_them_are_there(file: str) -> None:
     assert any(mutant.file == file for mutant in MUTANTS)
-    assert all((ROOT / f"tests/test_{name}.py").is_file() for name in TESTS[file])
+    assert all((ROOT / "tests" / name).is_file() for name in TESTS[file])

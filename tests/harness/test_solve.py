@@ -29,7 +29,7 @@ from problems.model.scene import JointScene
 from problems.scene import read_scene
 from report.writers.vtu import grid_with_fields, write_vtu
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SCENE = """
 title = "Two panels on a tool"
 [[effect]]

@@ -34,7 +34,7 @@ from problems.model.scene import JointScene
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 QUIET = Console(file=StringIO())
 SCENE = "gallery/installed-fasteners"  # springs join both parts into one block of K
 FOLDERS = ("mtx", "abaqus")

@@ -22,7 +22,7 @@ finally:
 def test_help_imports_nothing_that_is_slow() -> None:
     done = subprocess.run(
         [sys.executable, "-c", SHOW, "--help"],
-        cwd=Path(__file__).parents[1],
+        cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,
         check=True,
@@ -33,7 +33,7 @@ def test_help_imports_nothing_that_is_slow() -> None:
 
 
 def harness(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    paths = {"PYTHONPATH": str(Path(__file__).parents[1]), "RIVETBENCH_CACHE": str(folder / "cache")}
+    paths = {"PYTHONPATH": str(Path(__file__).parents[2]), "RIVETBENCH_CACHE": str(folder / "cache")}
     command = [sys.executable, "-m", "harness", *words]
     done = subprocess.run(
         command, cwd=folder, capture_output=True, text=True, env=os.environ | paths | environment
@@ -51,7 +51,7 @@ def test_a_terminal_of_few_letters_ends_no_command(words: tuple[str, ...], tmp_p
 
 def test_a_closed_terminal_ends_no_command(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "harness", "validate", "gallery/three-part-stack"]
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     done = subprocess.run(["sh", "-c", f"{' '.join(words)} >&-"], cwd=root, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 

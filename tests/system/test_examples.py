@@ -12,7 +12,7 @@ from solvers.base import Solver
 from solvers.plugin import load_plugin
 from solvers.registry import modules
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 TEMPLATE = EXAMPLES / "my_solver.py"
 PRINTED = {
     "fista": 48.585408,

@@ -34,7 +34,7 @@ from problems.formats import pyyeti
 from problems.scene import read_scene
 from problems.storage import cache
 
-PUBLISHED = Path(__file__).parents[1] / "results" / "published"
+PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 QUIET = Console(file=StringIO())
 
 

@@ -24,7 +24,7 @@ from problems.formats import names
 from problems.model.effect import Effect, effect_class, effect_kinds
 from problems.scene import SCENES, read_scene
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
 PAGE = (DOCS / "effects.md").read_text("utf-8")
@@ -142,7 +142,7 @@ def test_the_folders_and_files_of_the_architecture_are_those_of_the_code() -> No
     tree = page[page.index("## The tree") : page.index("## Where do I find")]
     for package in ("problems", "solvers", "harness", "report"):
         part = re.split(r"\n(?=\w)", tree[tree.index(f"\n{package}/") + 1 :])[0]
-        for path in re.findall(rf"\b{package}/[\w/]+\.py", page):
+        for path in re.findall(rf"(?<![\w/]){package}/[\w/]+\.py", page):
             assert (ROOT / path).is_file(), path
         for folder in (ROOT / package).iterdir():
             if folder.is_dir() and folder.name != "__pycache__" and any(folder.iterdir()):

@@ -28,7 +28,7 @@ from harness.verification.gate import gate
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 CONTRACT = {
     "suite", "scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeat",
     "status", "iterations", "inner_iterations", "convert_s", "prepare_s", "setup_s", "solve_s",

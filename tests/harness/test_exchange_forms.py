@@ -23,7 +23,7 @@ from problems.forms.names import Form
 from problems.forms.problem import in_form
 from problems.scene import read_scene
 
-READERS = Path(__file__).parents[1] / "examples" / "readers"
+READERS = Path(__file__).parents[2] / "examples" / "readers"
 EIGEN = Path("/usr/include/eigen3")
 
 

@@ -15,7 +15,7 @@ from problems.model.effect import effect_class, effect_kinds
 from problems.model.scene import JointScene, plain
 from problems.scene import read_scene, scene_names
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 JOINT = """
 [joint]
 junction = { length = 100.0, width = 50.0, nodes = [4, 3] }

@@ -14,7 +14,7 @@ from report.results.reader import Results, read
 from report.writers import headlines
 from report.writers.published import write_index
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PUBLISHED = ROOT / "results" / "published"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 SUITES = [name for name in names() if (PUBLISHED / name / "measurements.jsonl").is_file()]

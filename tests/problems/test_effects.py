@@ -20,7 +20,7 @@ from problems.effects.initial_gap import _square_root as square_root
 from problems.effects.pressure import Pressure
 from problems.model.joint import Joint
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
 POINT = st.tuples(st.floats(0, 400), st.floats(0, 120))

@@ -30,7 +30,7 @@ from problems.scene import read_scene
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 SLOW = tiny.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
 
 

@@ -29,7 +29,7 @@ from harness.results import records
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 #: What a solver may do, and what is said of it.
 FAULTS = {

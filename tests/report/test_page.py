@@ -30,7 +30,7 @@ from report.results.reader import read
 from report.results.series import read as read_series
 from report.writers.series import write as write_series
 
-PUBLISHED = Path(__file__).parents[1] / "results" / "published"
+PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 DIRECTORIES = sorted(path.parent for path in PUBLISHED.glob("*/measurements.jsonl"))
 MOST_BYTES = 2_000_000
 SCENES = {4386: [100, 1500], 11308: [2500]}
@@ -224,9 +224,9 @@ def test_the_banner_of_an_answer_and_of_a_comparison_names_the_code() -> None:
 
 @pytest.mark.slow
 def test_that_no_browser_tried_the_page_is_said_in_the_summary() -> None:
-    file = Path(__file__).with_name("test_page_browser.py")
+    file = Path(__file__).parents[1] / "system/test_page_browser.py"
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file), "-k", "slider"]
     environment = os.environ | {"PATH": "", "PYTEST_ADDOPTS": ""}
-    done = subprocess.run(command, env=environment, cwd=file.parents[1], capture_output=True, text=True)
+    done = subprocess.run(command, env=environment, cwd=file.parents[2], capture_output=True, text=True)
     (line,) = [line for line in done.stdout.splitlines() if "WARNING" in line]
     assert re.search(r"\d+ browser tests skipped, no Chromium with its driver is installed", line)

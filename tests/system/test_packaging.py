@@ -11,7 +11,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SUFFIXES = {".toml", ".j2", ".js", ".css", ".csv"}
 LINTERS = {"ruff", "mypy", "import-linter", "pandas-stubs", "types-psutil"}
 

@@ -1,7 +1,7 @@
 """Takes the terms of every proof out, one at a time, and sees whether the tests notice.
 
-    python tests/mutate_proofs.py            all mutants, a few minutes
-    python tests/mutate_proofs.py batched    those whose file or text contains a word
+    python tests/proofs/mutate_proofs.py            all mutants, a few minutes
+    python tests/proofs/mutate_proofs.py batched    those whose file or text contains a word
 
 Each mutant of `mutants.py` is made in a copy of the tree, where its tests are run until one fails: it is
 killed. If it survives, a term of a bound is not tested. Exits with 1 if one survives, or if a text is not
@@ -20,7 +20,7 @@ from pathlib import Path
 
 from mutants import MUTANTS, TESTS, Mutant
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("harness", "problems", "solvers", "report", "tests")
 LIMIT_S = 300.0
 
@@ -45,7 +45,7 @@ def tested(tree: Path, names: Iterable[str]) -> str:
     for name in names:  # most are killed by the first
         try:
             done = subprocess.run(
-                [*command, f"tests/test_{name}.py"], cwd=tree, env=env, capture_output=True, timeout=LIMIT_S
+                [*command, f"tests/{name}"], cwd=tree, env=env, capture_output=True, timeout=LIMIT_S
             )
         except subprocess.TimeoutExpired:
             return "killed"

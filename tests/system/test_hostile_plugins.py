@@ -36,7 +36,7 @@ from solvers.base import Answer, Problem, Solver
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 START = """
 import atexit, os, sys, threading, time

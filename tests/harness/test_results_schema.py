@@ -15,7 +15,7 @@ from problems.drawn import EXAMPLES
 from problems.manufactured.ladder import LADDERS
 from solvers.base import Status
 
-PUBLISHED = Path(__file__).parents[1] / "results" / "published"
+PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 RESULTS = sorted(path.parent.name for path in PUBLISHED.glob("*/measurements.jsonl"))
 TYPES = {"number": (int, float), "text": str, "flag": bool, "object": dict}
 FORMERLY = {"together": "batched"}
