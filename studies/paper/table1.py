@@ -65,14 +65,9 @@ def _drawn(lines: dict[str, Counts]) -> Figure:
         for name, found in lines.items():
             color, marker, dashes = LOOKS[name]
             face = "white" if "printed" in name else color
-            look: dict[str, Any] = {
-                "color": color,
-                "marker": marker,
-                "markersize": 4,
-                "markerfacecolor": face,
-            }
             values = getattr(found, kind)
-            axes.plot(range(1, len(values) + 1), values, linestyle=dashes, label=name, **look)
+            look: dict[str, Any] = {"marker": marker, "markerfacecolor": face, "linestyle": dashes}
+            axes.plot(range(1, len(values) + 1), values, markersize=4, color=color, label=name, **look)
         axes.set(yscale="log", xlabel="outer iteration", title=kind)
     panels[0].set_ylabel("CG iterations")
     drawing.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", handlelength=3.2)

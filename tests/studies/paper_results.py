@@ -7,10 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from synthetic_results import COND, GRIDS, no_answer, row, write_rows
+from synthetic_results import COND, no_answer, row, write_rows
 
-from report.results.reader import Results, read
+from studies.paper.rows import Study, study
 
 LOADS = {
     4386: (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592),
@@ -107,16 +106,11 @@ def paper_rows() -> Rows:
     return rows
 
 
-def write_paper(directory: Path, rows: Rows, *, name: str = "paper", files: bool = True) -> Path:
-    """A results directory of these rows, with what belongs to its scenes."""
+def write_paper(directory: Path, rows: Rows) -> Path:
+    """A results directory of these rows."""
     write_rows(directory, rows)
-    (directory / "suite.toml").write_text(f'name = "{name}"\ntitle = "Made-up results"\n', "utf-8")
-    scenes = {r["scene"]: r for r in rows}
-    lines = [json.dumps(_problem(r)) + "\n" for r in scenes.values()]
+    lines = [json.dumps(_problem(r)) + "\n" for r in {r["scene"]: r for r in rows}.values()]
     (directory / "problems.jsonl").write_text("".join(lines), "utf-8")
-    if files:
-        _scene_file(directory, "4386/0052", 4386, 60)
-        _scene_file(directory, "11308/0295", 11308, 3)
     return directory
 
 
@@ -125,8 +119,8 @@ def changed(rows: Rows, chosen: Callable[[Row], bool], **figures: Any) -> Rows:
     return [r | {k: v(r) if callable(v) else v for k, v in figures.items()} if chosen(r) else r for r in rows]
 
 
-def results(directory: Path, rows: Rows) -> Results:
-    return read(write_paper(directory, rows, files=False))
+def studied(directory: Path, rows: Rows) -> Study:
+    return study(write_paper(directory, rows))
 
 
 def ipm(option: str = "", value: object = None) -> Callable[[Row], bool]:
@@ -155,17 +149,3 @@ def _problem(of: Row) -> Row:
         "cond_K": COND.get(of["n"], 1e6), "lambda_min": 1.0, "lambda_max": 1e6, "build_s": build,
         "reference_s": 1.0, "reference_bound_mm": 1e-14, "reference_route": "newton, refined",
     }  # fmt: skip
-
-
-def _scene_file(directory: Path, scene: str, n: int, fasteners: int) -> None:
-    nx, ny = GRIDS[n]
-    X, Y = np.meshgrid(np.linspace(0, 4000, nx), np.linspace(0, 400, ny), indexing="ij")
-    places = np.column_stack([np.linspace(500, 3500, fasteners), np.full(fasteners, 200.0)])
-    nearest = np.hypot(*(np.column_stack([X.ravel(), Y.ravel()])[:, None] - places).transpose(2, 0, 1)).min(1)
-    after = 0.6 * (1 - np.exp(-((nearest / 250) ** 2)))
-    (directory / "scenes").mkdir(parents=True, exist_ok=True)
-    np.savez(
-        directory / "scenes" / (scene.replace("/", "_") + ".npz"),
-        contact_nodes=np.column_stack([X.ravel(), Y.ravel()]), gap_before=np.full(nx * ny, 0.6),
-        gap_after=after, lam=np.where(after < 1e-3, 5.0, 0.0), fasteners=places,
-    )  # fmt: skip
