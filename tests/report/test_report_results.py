@@ -81,7 +81,6 @@ LAYERS = ("document", "results", "analysis", "figures", "page", "sections", "wri
 FROM_OUTSIDE = {
     "harness.results.digits",
     "harness.results.provenance",
-    "harness.results.published",
     "harness.results.schema",
 }
 OWN = ("harness", "solvers", "problems", "report")

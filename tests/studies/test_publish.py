@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from harness.cli import publish as command
-from harness.cli.app import app
 from harness.planning.suite import suite_names
-from harness.results import published
 from harness.results.records import MEASUREMENTS, append
 from harness.results.schema import GAPS
-from problems.errors import InputError
+from studies import publish as published
 
 CODE = "c" * 40
 SUITES = ["default", "scaling"]
@@ -44,62 +40,57 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "published"
 
 
-def publish(monkeypatch: pytest.MonkeyPatch, run: Callable[[list[str]], int]) -> tuple[int, str, list[str]]:
-    """Exit code, output, and what was measured, each by `run`, which is given the words of a command."""
+def publish(monkeypatch: pytest.MonkeyPatch, run: Callable[[Sequence[str]], int]) -> tuple[int, list[str]]:
+    """Exit code, and what was measured, each by `run`, which is given the words of a command."""
     asked: list[str] = []
 
-    def ended(words: list[str]) -> int:
-        if words[0] == "report":
-            return 0
+    def ended(words: Sequence[str]) -> int:
         asked.append(words[1])
         return run(words)
 
-    monkeypatch.setattr(command, "_ended", ended)
-    done = CliRunner().invoke(app, ["publish", *SUITES])
-    return done.exit_code, done.output, asked
+    monkeypatch.setattr(published, "ended", ended)
+    return published.main(SUITES), asked
 
 
-def good(words: list[str]) -> int:
+def good(words: Sequence[str]) -> int:
     measured(Path(words[-1]), row(), row(minute=1))
     return 0
 
 
-def test_every_suite_but_those_of_users_and_of_the_ci_is_published_once() -> None:
-    names = published.names()
-    assert sorted(names) == sorted([*set(suite_names()) - {"gate", "scenes"}, "gaps"])
-    assert published.chosen(["hard", "speed"]) == ["speed", "hard"]
-    with pytest.raises(InputError, match=r"NAMES, name = 'sped'|sped"):
-        published.chosen(["sped"])
+def test_every_suite_but_those_of_users_and_of_the_ci_is_published_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert sorted(published.NAMES) == sorted([*set(suite_names()) - {"gate", "scenes"}, "gaps"])
+    with pytest.raises(SystemExit, match="2"):
+        published.main(["sped"])
+    assert "unknown: sped" in capsys.readouterr().err
 
 
 def test_what_is_whole_takes_the_place_of_the_old_and_is_not_measured_again(
     there: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    code, output, asked = publish(monkeypatch, good)
-    assert (code, asked) == (0, SUITES)
-    assert "Suite 1 of 2: default" in output
+    assert publish(monkeypatch, good) == (0, SUITES)
     for name in SUITES:
         assert published.is_of(published.rows_of(there / name), CODE)
-    assert (there / "index.md").read_text("utf-8").startswith(f"# Published results: commit {CODE}\n")
-    assert publish(monkeypatch, good)[::2] == (0, [])
+    lines = (there / "index.md").read_text("utf-8").splitlines()
+    assert [line.split(" | ")[0].strip("| ") for line in lines[-2:]] == [f"[{n}]({n})" for n in SUITES]
+    assert all("cccccccccccc |" in line for line in lines[-2:])
+    assert publish(monkeypatch, good) == (0, [])
 
 
 def test_a_suite_that_is_not_whole_leaves_the_old_and_is_continued(
     there: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stopped(words: list[str]) -> int:
+    def stopped(words: Sequence[str]) -> int:
         if words[1] == "scaling":
             measured(Path(words[-1]), row())
             return 130
         return good(words)
 
-    code, _, asked = publish(monkeypatch, stopped)
-    assert (code, asked) == (130, SUITES)
+    assert publish(monkeypatch, stopped) == (130, SUITES)
     assert published.is_of(published.rows_of(there / "default"), CODE)
     assert published.is_of(published.rows_of(there / "scaling"), "b" * 40)
-    assert len(published.rows_of(published.staged("scaling", CODE))) == 1
-    code, _, asked = publish(monkeypatch, good)
-    assert (code, asked) == (0, ["scaling"])
+    assert publish(monkeypatch, good) == (0, ["scaling"])
     assert len(published.rows_of(there / "scaling")) == 3
 
 
@@ -110,15 +101,16 @@ def test_one_that_fails_or_is_of_changed_code_is_not_published_and_the_others_ar
     assert published.is_of(published.rows_of(there / "default"), "b" * 40)
     assert published.is_of(published.rows_of(there / "scaling"), CODE)
 
-    def changed(words: list[str]) -> int:
+    def changed(words: Sequence[str]) -> int:
         measured(Path(words[-1]), row(clean=False))
         return 0
 
-    assert publish(monkeypatch, changed)[::2] == (1, ["default"])
+    assert publish(monkeypatch, changed) == (1, ["default"])
     assert published.is_of(published.rows_of(there / "default"), "b" * 40)
 
 
-def test_large_files_gaps_and_locks_are_left_out(tmp_path: Path) -> None:
+def test_large_files_gaps_and_locks_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
     kept_kb = published.KEPT_SCENE_KB * 1000
     for name, size in (("small", 1000), ("many", kept_kb), ("large", published.KEPT_MIB * 2**20 + 1)):
         folder = tmp_path / name
@@ -129,38 +121,34 @@ def test_large_files_gaps_and_locks_are_left_out(tmp_path: Path) -> None:
         if name == "many":
             for k in range(published.KEPT_MIB * 2**20 // kept_kb):
                 (folder / f"scenes/{k}.npz").write_bytes(bytes(kept_kb))
-        published.publish(name, folder, tmp_path / "published")
+        published.publish(name, folder)
     kept = {str(path.relative_to(tmp_path / "published")) for path in (tmp_path / "published").rglob("*.*")}
     rows = {f"{name}/{MEASUREMENTS}" for name in ("small", "many", "large")}
     assert kept == rows | {"small/answers/a.npz", "small/scenes/a.npz", "many/answers/a.npz"}
 
 
-@pytest.mark.parametrize(
-    ("known", "why"), [((CODE, False), "not committed"), (("0.1.0", None), "must be in a clone")]
-)
+@pytest.mark.parametrize("known", [(CODE, False), ("0.1.0", None)])
 def test_code_of_no_commit_is_refused(
-    there: Path, monkeypatch: pytest.MonkeyPatch, known: tuple[str, bool | None], why: str
+    there: Path, monkeypatch: pytest.MonkeyPatch, known: tuple[str, bool | None]
 ) -> None:
     monkeypatch.setattr(published, "commit", lambda: known)
-    code, output, asked = publish(monkeypatch, good)
-    assert (code, asked) == (2, [])
-    assert why in output
+    with pytest.raises(SystemExit, match="2"):
+        publish(monkeypatch, good)
 
 
 def test_another_checkout_is_refused(there: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
-    code, output, asked = publish(monkeypatch, good)
-    assert (code, asked) == (2, [])
-    assert "go there" in output
+    with pytest.raises(SystemExit, match="2"):
+        publish(monkeypatch, good)
 
 
 def test_an_interruption_is_not_counted_as_time() -> None:
-    pauses = [row(minute=minute) for minute in (0, 2, 7, 50)]
-    assert published.seconds(pauses) == 7 * 60
-    assert published.seconds([row()]) is None
+    assert published.minutes([row(minute=minute) for minute in (0, 2, 7, 50)]) == 7
+    assert published.minutes([row()]) is None
 
 
 def test_the_commands_exist(tmp_path: Path) -> None:
     """Each is known to the command line, which then names what is missing."""
-    assert command._ended(["run", "no-such-suite", "--out", str(tmp_path)]) == 2
-    assert command._ended([*published.command("gaps", tmp_path), "--solver", "nobody"]) == 2
+    assert published.ended(["run", "no-such-suite", "--out", str(tmp_path)]) == 2
+    words = ["series", *published.SERIES["gaps"], "--out", str(tmp_path)]
+    assert published.ended([*words, "--solver", "nobody"]) == 2
