@@ -153,7 +153,10 @@ def write_index(folder: Path) -> Path:
     for name, rows in found.items():
         taken, verdicts = minutes(rows), Counter(row["verdict"] for row in rows)
         days = sorted({str(row["recorded_at"])[:DAY] for row in rows if row.get("recorded_at")})
-        line: dict[str, Any] = {"suite": f"[{name}]({name})", "what": _title(folder / name)}
+        title, study = _title(folder / name), f"{name}/study/study.md"
+        if (folder / study).is_file():
+            title = f"[{title}]({study})"
+        line: dict[str, Any] = {"suite": f"[{name}]({name})", "what": title}
         line |= {"measured": " to ".join(dict.fromkeys([*days[:1], *days[-1:]]))}
         line |= {"minutes": "–" if taken is None else f"{taken:.0f}", "commit": _commits(rows)}
         lines.append(line | {"rows": len(rows)} | {verdict: verdicts[verdict] for verdict in VERDICTS})
