@@ -31,7 +31,7 @@ from synthetic_results import no_answer
 from report.figures import style
 from studies.paper import __main__ as paper
 from studies.paper import claims, printed
-from studies.paper.evidence import EVIDENCE
+from studies.paper.claims import EVIDENCE
 from studies.paper.figures5_7 import crossings
 
 
