@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from problems.input.bounded import MIB, regular_file
 
 from .checksums import arrays_in
 
+ARCHIVE = "answers.zip"
 ANSWER_MIB = 1024  # the largest file of an answer that is read
 
 
@@ -21,7 +23,7 @@ def read_answer(path: Path) -> dict[str, NDArray[Any]]:
 
     Raises OSError, ValueError or KeyError if there is none, or if it is damaged.
     """
-    archive = path.parent.with_suffix(".zip")
+    archive = path.parent.with_name(ARCHIVE)
     if path.exists() or not archive.is_file():
         return arrays_in(regular_file(path, "answer", ANSWER_MIB).read_bytes())
     try:
@@ -30,7 +32,7 @@ def read_answer(path: Path) -> dict[str, NDArray[Any]]:
             if member.file_size > ANSWER_MIB * MIB:
                 raise ValueError(f"{path.name}: larger than {ANSWER_MIB} MiB")
             return arrays_in(file.read(member))
-    except zipfile.BadZipFile as error:
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError) as error:
         raise ValueError(f"{archive}: {error}") from error
 
 
@@ -39,7 +41,7 @@ def pack(directory: Path) -> None:
     folder = directory / "answers"
     files = sorted(folder.glob("*.npz"))
     if files:
-        with zipfile.ZipFile(folder.with_suffix(".zip"), "w", zipfile.ZIP_DEFLATED) as archive:
+        with zipfile.ZipFile(directory / ARCHIVE, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in files:
                 archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes(), zipfile.ZIP_DEFLATED)
         shutil.rmtree(folder)

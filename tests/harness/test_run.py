@@ -175,7 +175,10 @@ def test_gate_reads_the_answers_of_an_archive(copy: Path) -> None:
     assert said_by(gate, copy) == spoilt
     assert spoilt[0] == 1
     archive = copy / "answers.zip"
-    archive.write_bytes(archive.read_bytes()[:-30])
+    whole = archive.read_bytes()
+    archive.write_bytes(whole[:60] + bytes(40) + whole[100:])  # in the first member
+    assert "damaged" in said_by(gate, copy)[1]
+    archive.write_bytes(whole[:-30])
     assert said_by(gate, copy)[0] == 3
 
 

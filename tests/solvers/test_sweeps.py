@@ -222,6 +222,15 @@ def test_an_ill_conditioned_q_is_solved_near_rounding_in_few_sweeps(rung: str, s
     assert residual(data.Q, load.p, answer.lam) <= TOLERANCE
 
 
+@pytest.mark.parametrize("scale", [1e5, 1e6, 1e7])
+def test_rounding_above_the_target_ends_the_sweeps(scale: float) -> None:
+    """Loads so large that |y_C| stays above a fiftieth of the tolerance: what no longer halves is enough."""
+    Q, p = decaying(), scale * np.random.default_rng(3).standard_normal(LINES * ACROSS)
+    answer = solved(Q, p)
+    assert answer.status == "solved"
+    assert answer.iterations <= 13
+
+
 @pytest.mark.parametrize("size", [1e-13, 1e-9, 1e-5])
 def test_nearly_degenerate_sets(size: float) -> None:
     """A third of the contacts with a force, or a gap, barely above zero."""
