@@ -199,12 +199,9 @@ def test_the_ledger_names_every_effect_and_what_it_added(tmp_path: Path) -> None
     assert added["fasteners", "load"]["amount"] == "a +160 N on 2 nodes"  # through to the tool
     assert "3e+04 N, b -3e+04 N" in added["installed_fasteners", "load"]["amount"]
     assert all(entry["seconds"] > 0 for entry in record["ledger"] if entry["adds"] != "constraints")
-    vectors = [entry for entry in record["ledger"] if entry["adds"] in ("gap", "load")]
-    assert all(entry["mib"] * 2**20 > 8 * 110 for entry in vectors)  # f and g have 110 entries
-    assert added["ribs a", "stiffness"]["mib"] > 0
     constraints = added["rigid_tool b", "constraints"]
     assert constraints["amount"] == "55 contacts of b and tool"
-    assert constraints["seconds"] is constraints["mib"] is None
+    assert constraints["seconds"] is None
     page = (tmp_path / "out" / "answer.md").read_text()
     for entry in record["ledger"]:
         assert f"| {entry['effect']} | {entry['adds']} | {entry['amount']} |" in page
@@ -422,3 +419,37 @@ def test_a_scene_of_own_matrices_has_no_ledger(tmp_path: Path) -> None:
     said = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")]).output
     assert "n = 2, m = 1, blocks of 2" in said
     assert "seem to have 1 digits" in said
+
+
+def own_scene(path: Path, contacts: int) -> Path:
+    np.savez(path, K=np.eye(2), A=np.eye(2, contacts), f=np.full(2, 2.0), g=np.ones(contacts))
+    return path
+
+
+def test_nothing_of_an_older_answer_remains_and_what_is_not_ours_does(tmp_path: Path) -> None:
+    out, run = tmp_path / "out", partial(CliRunner().invoke, app)
+    assert run(["solve", str(own_scene(tmp_path / "one.npz", 1)), "--out", str(out)]).exit_code == 0
+    assert (out / "contacts.csv").exists()
+    (out / "mine.txt").write_text("kept")
+    assert run(["solve", str(own_scene(tmp_path / "none.npz", 0)), "--out", str(out)]).exit_code == 0
+    assert not (out / "contacts.csv").exists()
+    assert (out / "mine.txt").read_text() == "kept"
+    files = json.loads((out / "solution.json").read_text())["files"]
+    assert sorted([*files, "mine.txt"]) == sorted(path.name for path in out.iterdir())
+
+
+def test_a_full_disk_leaves_the_older_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out, run = tmp_path / "out", partial(CliRunner().invoke, app)
+    scene = str(own_scene(tmp_path / "one.npz", 1))
+    assert run(["solve", scene, "--out", str(out)]).exit_code == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def full(*_: object) -> None:
+        raise OSError(27, "File too large")
+
+    monkeypatch.setattr("report.writers.solution.write_page", full)
+    done = run(["solve", scene, "--out", str(out)])
+    assert done.exit_code == 2
+    assert "File too large" in done.output
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.npz", "out"]

@@ -180,3 +180,18 @@ def test_init_overwrites_nothing(tmp_path: Path) -> None:
     assert harness("init", path).exit_code == 2
     assert path.read_text() == "title = 'mine'"
     assert harness("init", tmp_path / "joint.txt").exit_code == 2
+
+
+@pytest.mark.parametrize("other", [{"n": 3}, {"A": -1.0}])
+def test_own_matrices_with_other_rows_are_refused(other: dict[str, float], tmp_path: Path) -> None:
+    """As many contacts, but of other unknowns or the other way round."""
+    paths = []
+    for k, asked in enumerate(({}, other)):
+        n = int(asked.get("n", 2))
+        paths.append(tmp_path / f"{k}.npz")
+        A = asked.get("A", 1.0) * np.eye(n, 1)
+        np.savez(paths[-1], K=np.eye(n), A=A, f=np.full(n, 2.0), g=np.ones(1))
+    done = harness("solve", *paths, "--out", tmp_path / "both")
+    assert done.exit_code == 5, done.output
+    assert "A with" in done.output
+    assert not (tmp_path / "both").exists()
