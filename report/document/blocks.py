@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -75,12 +75,20 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, saved as NAME.png; `caption` explains it."""
+    """A picture, saved as NAME.png; `caption` explains it. data : what it shows, in NAME.csv, if no table
+    has it.
+    """
 
     kind: ClassVar[str] = "figure"
     name: str
     caption: str
     drawing: Drawing
+    data: pd.DataFrame | None = None
+
+    @property
+    def alt(self) -> str:
+        """What the picture shows, without markup: the emphasised beginning of its caption."""
+        return self.caption.split("*")[1].rstrip(".:") if self.caption.startswith("*") else self.name
 
 
 Block = Text | Table | Figure
@@ -89,7 +97,7 @@ Block = Text | Table | Figure
 @dataclass(frozen=True)
 class Section:
     title: str
-    blocks: list[Block]
+    blocks: Sequence[Block]
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,11 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.seconds import seconds_text
-from report.document.blocks import Block, Column, Place, Section, Table, Text, records, word
+from report.analysis.standings import best_tolerances
+from report.document.blocks import Block, Column, Section, Table, Text, records, word
 from report.document.numbers import counted, listed, significant, span, whole
 from report.results.labels import in_order
 from report.results.reader import Results
-
-PLACE = Place(145)
 
 CAPTION = (
     "*Time and products with Q*: seconds per load case, and in brackets the products with Q per load case, "
@@ -28,7 +27,7 @@ def section(results: Results) -> Section | None:
     cells = cells.assign(products=[_products(cell.get("details")) for cell in records(cells)])
     if cells.loc[cells["products"].notna(), "solver"].nunique() < 2:
         return None
-    cells = _of_best_tolerance(cells)
+    cells = best_tolerances(cells)
     scenes = list(cells.sort_values(["n", "active"])["scene"].unique())
     lines = [_line(cells[cells["method"] == method]) for method in in_order(cells, "method")]
     columns = [word("method", "method"), *(Column(scene, _shown(scene)) for scene in scenes)]
@@ -42,16 +41,6 @@ def section(results: Results) -> Section | None:
 def _products(details: object) -> float:
     found = details.get("products") if isinstance(details, Mapping) else None
     return float("nan") if found is None else float(found)
-
-
-def _of_best_tolerance(cells: pd.DataFrame) -> pd.DataFrame:
-    """One cell for each method and scene: of its tolerances the fastest within the limit, else the least
-    wrong.
-    """
-    within = cells["verdict"] == "within"
-    keys = {"missed": ~within, "error": cells["displacement_error_mm"].mask(within, 0)}
-    ranked = cells.assign(**keys).sort_values(["missed", "error", "load_case_s"], kind="stable")
-    return cells.loc[ranked.drop_duplicates(["method", "scene"]).index.sort_values()]
 
 
 def _line(cells: pd.DataFrame) -> dict[str, Any]:

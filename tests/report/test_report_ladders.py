@@ -150,20 +150,6 @@ def test_rungs_and_scenes_are_reported_apart(directory: Path) -> None:
     assert "hard/steep" not in both[both.index("## Summary") : both.index("## Machine")]
 
 
-def test_times_are_shown_of_full_size_only(directory: Path) -> None:
-    write(directory)
-    assert not (directory / "report" / "rungs-seconds.csv").exists()
-    full = "hard-full/steep/4386-1"
-    late = row(full, "a", n=4386, **no_answer("time_limit"), time_limit_s=30.0)
-    timed = {"setup_s": 1.0, "solve_s": 1.5, "form_s": 0.0}
-    write_rows(directory, [*ROWS, row(full, "ipm", n=4386, **timed), late])
-    page = write(directory).read_text("utf-8")
-    assert "*Seconds per load case* (set-up + solve + form), on the rungs of full size." in page
-    table = pd.read_csv(directory / "report" / "rungs-seconds.csv").set_index("scene")
-    assert table.loc[full, ["ipm (dual)", "a (dual)"]].tolist() == [2.5, "> 30"]
-    assert list(table.index) == [full]
-
-
 def test_without_a_rung_there_is_no_section_on_ladders(tmp_path: Path) -> None:
     text = write(write_rows(tmp_path, [any_row("4386/0052", "ipm")])).read_text("utf-8")
     assert "Where each solver fails" not in text

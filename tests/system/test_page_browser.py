@@ -25,7 +25,7 @@ from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
 from report.results.series import read as read_series
-from report.sections.profiles import compared, ratios
+from report.sections.speed import ratios
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
 
@@ -173,7 +173,7 @@ def test_the_profiles_are_those_of_the_report(chromium: Any, tmp_path: Path, lim
     found = read(everything(tmp_path, {4386: [100, 800, 1500], 6112: [300, 2000]}))
     opened(chromium, write(tmp_path / "index.html", "Made up", run_data(found), tmp_path), f"limit={limit}")
     asked = replace(found, cells=found.cells.assign(limit_mm=float(limit)))
-    times = ratios(compared(asked))
+    times = ratios(asked.cells)
     shown = chromium.execute_script(
         "const {ratios, count} = profiles(filtered(), Number(STATE.limit));"
         "const met = list => list.filter(Number.isFinite).sort(d3.ascending);"
