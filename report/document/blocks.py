@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
@@ -98,13 +98,3 @@ Block = Text | Table | Figure
 class Section:
     title: str
     blocks: Sequence[Block]
-
-
-@dataclass(frozen=True)
-class Place:
-    """The place of a section in the report, by increasing `number`, and the results it is given: those on
-    the rungs of ladders, on scenes drawn at random, on all other scenes, or all.
-    """
-
-    number: int
-    about: Literal["scenes", "ladders", "drawn", "all"] = "scenes"

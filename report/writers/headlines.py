@@ -16,12 +16,13 @@ from report.analysis.outcomes import with_outcomes
 from report.analysis.precision import ACCURACIES, swept
 from report.analysis.relative import load_cases
 from report.analysis.roads import roads
-from report.analysis.standings import geometric_mean, recommended
+from report.analysis.standings import geometric_mean
 from report.document.blocks import Table, Text
 from report.document.numbers import listed, power, significant
 from report.results.reader import Results
 from report.sections import methods
 from report.sections.ladders import in_house, libraries
+from report.sections.recommendation import recommended
 from report.sections.series import compared
 
 #: The solver that the README compares with the libraries, in the form of each question.
