@@ -15,7 +15,7 @@ from problems.build import load_case
 from problems.forms.assembly import Vector
 from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect, effect_kinds
 from problems.model.joint import Joint
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 
 BALANCE = 1e-9  # a sum smaller than this, relative to its terms, is rounding

@@ -23,7 +23,7 @@ from harness.verification.gap_error import GapError
 from problems.errors import InputError
 from problems.forms.names import Form
 from problems.model.effect import TieEffect
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene
 from problems.scene import read_scene
 

@@ -24,7 +24,7 @@ from harness.series import session as session_module
 from harness.series import store
 from harness.series.session import Job, SeriesSession
 from problems.build import load_case, prepared
-from problems.forms.dual import Dual
+from problems.forms.problem import Dual
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 

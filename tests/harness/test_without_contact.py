@@ -96,7 +96,7 @@ def test_there_is_nothing_to_measure(path: Path) -> None:
     assert "there is no quadratic program to measure" in done.output
 
 
-@pytest.mark.parametrize("form", [form for form in formats.names() if form != "dmig"])
+@pytest.mark.parametrize("form", [form for form in formats.FORMATS if form != "dmig"])
 def test_there_and_back(form: str, path: Path) -> None:
     """And the matrices, solved by themselves, give the same displacements."""
     file, back = path.parent / PATHS[form], path.parent / "back.npz"

@@ -96,15 +96,9 @@ def test_every_kind_has_a_smallest_scene_here() -> None:
 def test_bits_are_the_same_without_the_other_effects_files(kinds: list[str], tmp_path: Path) -> None:
     """Once with every file there, once from a copy without the files that the scene has no need of."""
     scene = scene_of(tmp_path, *kinds)
-    needs = {
-        "self_weight": {"fem/line_loads"},
-    }
-    needed = set().union(*(needs.get(kind, set()) for kind in kinds))
     shutil.copytree(ROOT / "problems", tmp_path / "problems", ignore=shutil.ignore_patterns("__pycache__"))
     for kind in set(effect_kinds()) - set(kinds):
         (tmp_path / "problems" / "effects" / f"{kind}.py").unlink()
-    for name in {"fem/line_loads"} - needed:
-        (tmp_path / "problems" / f"{name}.py").unlink()
     everything = imported(scene, tmp_path / "all.npz")
     bare = imported(scene, tmp_path / "bare.npz", tmp_path)
     assert bare == everything

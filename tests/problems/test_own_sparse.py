@@ -18,7 +18,7 @@ from harness.cli.app import app
 from harness.planning import own_matrices, road
 from problems import formats
 from problems.build import load_case, prepared
-from problems.formats import pyyeti
+from problems.formats.nastran import pyyeti
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from problems.input import user_matrices

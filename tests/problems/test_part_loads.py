@@ -22,8 +22,7 @@ from problems.forms.prepared import Prepared
 from problems.full_model.joint_model import JointModel
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.joint import Joint
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect, PartModel
 
 E, T = 70e3, 6.0
 #: A strip along y, clamped at y = −200, free at y = 150, bending like a beam since ν = 0.

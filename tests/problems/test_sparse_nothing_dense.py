@@ -70,7 +70,7 @@ for path in sys.argv[1:]:
     known = best_of_candidates(data, load, given=[answer.lam])
     verdict = judge(data, load, known, answer.x, answer.lam, 1e-7).verdict
     proving = peak() - before
-condensation = any(name == "problems.full_model.condensed" for name in sys.modules)
+condensation = any(name == "problems.full_model.condense" for name in sys.modules)
 size = data.assembly.asked, data.assembly.m
 print(answer.status, verdict, *size, known.active.sum(), condensation, solving, proving)
 """

@@ -19,7 +19,7 @@ from harness.verification.judge import conditioned_limit
 from harness.verification.reference import best_of_candidates
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.ladders.units import rescaled
+from problems.ladders.exact import rescaled
 from problems.manufactured.exact import manufacture, spectrum
 from problems.stiffness.operator import Stiffness
 

@@ -173,6 +173,15 @@ def test_the_rounding_of_a_large_matrix_does_not_weigh_on_refined_slacks() -> No
     np.testing.assert_allclose(state.slacks(), 0.25 + 1e13 * 2.0**-50, rtol=1e-12)
 
 
+@pytest.mark.parametrize("pairs", [1, 40])
+def test_the_inverse_is_full_and_symmetric(pairs: int) -> None:
+    prepared = make_prepared(1, pairs)
+    state = GoldfarbIdnani().prepare(in_form(prepared, "dual"))
+    np.testing.assert_allclose(state.G @ prepared.Q, np.eye(pairs), atol=1e-9)
+    np.testing.assert_array_equal(state.G, state.G.T)
+    assert state.G.flags.f_contiguous
+
+
 def two_contacts_of_one_node(Q: np.ndarray, form: Form) -> Answer:
     """A spring of 1 N/mm pulled by 1 N towards two stops at 0.5 and 0.25 mm: x = 0.25 mm, λ = (0, 0.75) N."""
     A = sp.csc_array(np.array([[1.0, 1.0]]))

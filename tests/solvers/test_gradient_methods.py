@@ -17,6 +17,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.scene import read_scene
 from solvers.active_set import parametric_path
+from solvers.active_set.banded_sets import OpenFactor
 from solvers.active_set.parametric_path import ParametricPath
 from solvers.base import Answer, WarmStart
 from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
@@ -64,7 +65,11 @@ def metrics(prepared: Prepared) -> dict[str, Diagonal]:
     Q = prepared.Q
     M, d = banded_inverse(Q, None), np.diag(Q).copy()
     alpha = step_length(prepared.compliance, d)
-    return {"band": Band(d, 1.0, M), "face": Face(d, alpha, M), "none": Diagonal(d, alpha)}
+    return {
+        "band": Band(d, 1.0, OpenFactor(M)),
+        "face": Face(d, alpha, OpenFactor(M)),
+        "none": Diagonal(d, alpha),
+    }
 
 
 @pytest.mark.parametrize("kind", ["band", "face", "none"])
@@ -93,7 +98,7 @@ def test_the_preconditioner_of_a_face_is_the_inverse_of_that_block() -> None:
     F = np.random.default_rng(0).random(300) < 0.6
     expected = np.zeros(300)
     expected[F] = np.linalg.solve(np.linalg.inv(whole)[np.ix_(F, F)], load.p[F])
-    found = Band(np.diag(prepared.Q).copy(), 1.0, M).precondition(F, load.p)
+    found = Band(np.diag(prepared.Q).copy(), 1.0, OpenFactor(M)).precondition(F, load.p)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * abs(expected).max())
 
 

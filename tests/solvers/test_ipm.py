@@ -241,7 +241,8 @@ def test_options_out_of_range_are_named(option: str, value: Any) -> None:
 def test_all_wrong_options_are_named_at_once() -> None:
     with pytest.raises(InputError) as error:
         Ipm(theta=2.0, sigma=-1.0, preconditioner="none", ordering="open_last")
-    assert {fault.key for fault in error.value.faults} == {"theta", "sigma", "ordering"}
+    keys = {fault.key for fault in error.value.faults}
+    assert keys == {"options.theta", "options.sigma", "options.ordering"}
 
 
 def test_a_large_y_does_not_hide_an_overlap() -> None:

@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg as sla
 from test_gi import definite
 
+from solvers.interior_point.conjugate_gradients import conjugate_gradients
 from solvers.interior_point.preconditioner import (
     REORDER_AFTER,
     SYSTEMS,
@@ -14,7 +15,6 @@ from solvers.interior_point.preconditioner import (
     OpenLast,
     Preconditioned,
 )
-from solvers.linear_algebra.conjugate_gradients import conjugate_gradients
 
 SIZE = 30
 ORDER = np.random.default_rng(7).permutation(SIZE)

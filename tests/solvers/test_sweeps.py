@@ -16,7 +16,7 @@ from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.approximate_inverse import of_dense
 from problems.forms.assembly import Assembly, LoadCase
-from problems.forms.banded_inverse import BandedInverse, banded_inverse, order_along_joint
+from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
 from problems.forms.compliance import DenseCompliance
 from problems.forms.prepared import Prepared, dual_alone
 from problems.forms.problem import in_form
@@ -88,19 +88,19 @@ def test_where_forces_act_on_neighbours_alone_m_is_the_inverse() -> None:
 def test_contacts_stand_in_lines_across_the_joint(nx: int, ny: int) -> None:
     x, y = np.meshgrid(10.0 * np.arange(nx), 10.0 * np.arange(ny))
     nodes = np.column_stack([x.ravel(), y.ravel()])[np.random.default_rng(0).permutation(nx * ny)]
-    order, across = order_along_joint(nodes, len(nodes))
-    assert across == min(nx, ny)
-    assert (np.diff(nodes[order, 0 if nx >= ny else 1]) >= 0).all()
-    both, twice = order_along_joint(np.vstack([nodes, nodes]), 2 * len(nodes))  # two contacts at each place
-    assert twice == 2 * across
-    assert sorted(both) == list(range(2 * len(nodes)))
+    lines = Windows.of(nodes, len(nodes))
+    assert lines.across == min(nx, ny)
+    assert (np.diff(nodes[lines.order, 0 if nx >= ny else 1]) >= 0).all()
+    both = Windows.of(np.vstack([nodes, nodes]), 2 * len(nodes))  # two contacts at each place
+    assert both.across == 2 * lines.across
+    assert sorted(both.order) == list(range(2 * len(nodes)))
 
 
 @pytest.mark.parametrize(("dx", "across"), [(0.6, 5), (1.0, 5), (0.15, 15)])
 def test_lines_a_little_closer_than_wide_are_lines_still(dx: float, across: int) -> None:
     x, y = np.meshgrid(dx * np.arange(40), np.arange(5.0))
-    assert order_along_joint(np.column_stack([x.ravel(), y.ravel()]), 200)[1] == across
-    assert order_along_joint(np.zeros((7, 2)), 7)[1] == 7  # all in one place
+    assert Windows.of(np.column_stack([x.ravel(), y.ravel()]), 200).across == across
+    assert Windows.of(np.zeros((7, 2)), 7).across == 7  # all in one place
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
@@ -220,6 +220,15 @@ def test_an_ill_conditioned_q_is_solved_near_rounding_in_few_sweeps(rung: str, s
     assert answer.status == "solved"
     assert answer.iterations <= sweeps_needed
     assert residual(data.Q, load.p, answer.lam) <= TOLERANCE
+
+
+@pytest.mark.parametrize("scale", [1e5, 1e6, 1e7])
+def test_rounding_above_the_target_ends_the_sweeps(scale: float) -> None:
+    """Loads so large that |y_C| stays above a fiftieth of the tolerance: what no longer halves is enough."""
+    Q, p = decaying(), scale * np.random.default_rng(3).standard_normal(LINES * ACROSS)
+    answer = solved(Q, p)
+    assert answer.status == "solved"
+    assert answer.iterations <= 13
 
 
 @pytest.mark.parametrize("size", [1e-13, 1e-9, 1e-5])

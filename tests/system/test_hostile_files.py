@@ -30,7 +30,7 @@ from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.formats import pyyeti
+from problems.formats.nastran import pyyeti
 from problems.scene import read_scene
 from problems.storage import cache
 
@@ -100,14 +100,14 @@ def test_an_import_without_suffix_is_refused_before_it_writes(tmp_path: Path) ->
     assert [path.name for path in tmp_path.iterdir()] == ["mine.npz"]
 
 
-@pytest.mark.parametrize("form", formats.names())
+@pytest.mark.parametrize("form", formats.FORMATS)
 def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path: Path) -> None:
     own = tmp_path / "mine.npz"
     np.savez(own, **own_matrices())
     before = own.read_bytes()
     folder = tmp_path / "folder"
     folder.mkdir()
-    formats.write("mtx", folder, own_matrices())
+    formats.FORMATS["mtx"].write(folder, own_matrices())
     assert Path("/dev/null").is_char_device()
     for out in ("/dev/null", own):
         done = invoke("export", own, "--format", form, "--out", out)
@@ -120,7 +120,7 @@ def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path
 
 
 def test_an_export_into_the_folder_of_its_own_matrices_is_refused(tmp_path: Path) -> None:
-    formats.write("mtx", tmp_path, own_matrices())
+    formats.FORMATS["mtx"].write(tmp_path, own_matrices())
     scene = tmp_path / "scene.toml"
     scene.write_text("[matrices]\n" + "".join(f'{name} = "{name}.mtx"\n' for name in "KAfg"))
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -151,7 +151,7 @@ def stiffness(K: Any) -> pd.DataFrame:
 
 def test_an_absent_matrix_replaces_no_given_one_in_any_order(tmp_path: Path) -> None:
     data = own_matrices()
-    formats.write("mtx", tmp_path, data)
+    formats.FORMATS["mtx"].write(tmp_path, data)
     files = [cards(tmp_path / "konly.pch", K=stiffness(data["K"])), *(tmp_path / f"{x}.mtx" for x in "Afg")]
     for order in list(permutations(map(str, files)))[::5]:
         import_(list(order), tmp_path / "out.npz", QUIET)
@@ -162,7 +162,7 @@ def test_an_absent_matrix_replaces_no_given_one_in_any_order(tmp_path: Path) -> 
 
 def test_a_matrix_in_two_files_is_refused(tmp_path: Path) -> None:
     data = own_matrices()
-    formats.write("mtx", tmp_path / "m", data)
+    formats.FORMATS["mtx"].write(tmp_path / "m", data)
     np.savez(tmp_path / "all.npz", **data)
     for files in permutations([str(tmp_path / "all.npz"), str(tmp_path / "m" / "f.mtx")]):
         with pytest.raises(InputError, match="too; say f=FILE"):
@@ -188,7 +188,7 @@ def test_a_row_at_a_point_that_is_not_there_is_named(changed: Any, said: str, tm
 
 def test_loads_without_their_points_are_not_guessed(tmp_path: Path) -> None:
     data = own_matrices()
-    formats.write("mtx", tmp_path, data)
+    formats.FORMATS["mtx"].write(tmp_path, data)
     loads = cards(tmp_path / "loads.pch", F=frame(np.ones((12, 1)), [*range(1, 12), 20]))
     with pytest.raises(InputError, match="F, point 20"):
         import_([str(loads), *(str(tmp_path / f"{x}.mtx") for x in "KAg")], tmp_path / "out.npz", QUIET)
