@@ -133,7 +133,7 @@ def _marked(axes: Axes, marks: Marks) -> None:
         look: dict[str, Any] = {"linestyle": "", "clip_on": False, "markerfacecolor": "none"}
         look |= {"marker": "." if many else SHAPES.get(kind, "x"), "markersize": 3.0 if many else 4.5}
         axes.plot(x, y, markeredgecolor="#FFFFFF90", markeredgewidth=1.2 if many else 1.6, **look)
-        width = 0.3 if many else 1.0
+        width = 0.6 if many else 1.0
         axes.plot(x, y, markeredgecolor=MARK, markeredgewidth=width, label=kind.replace("_", " "), **look)
 
 
