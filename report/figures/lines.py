@@ -30,8 +30,7 @@ STEP = 0.018  # of the axes: between marks that would coincide
 #: What marks mean, for captions.
 MARKS = (
     "Crosses on a line: outside {limit}. Open triangles: stopped at the time limit; crosses at the upper "
-    "edge: no "
-    "answer for another reason."
+    "edge: no answer for another reason."
 )
 
 

@@ -50,11 +50,9 @@ def costs(results: Results) -> Section | None:
     columns += [Column(f"≤ {tidy_power(x)} mm", partial(_shown, name=tidy_power(x))) for x in ACCURACIES]
     columns.append(number("time factor per digit", "factor_per_digit"))
     caption = (
-        "*Price list*: seconds per load case of the fastest run on each scene with an error of at most "
-        "that of the "
-        "heading, the geometric mean over the scenes; >: stopped at the time limit; not reached: with the "
-        "smallest "
-        "error on the worst scene. Last column: from the solver's own Pareto front."
+        "*Price list*: seconds per load case of the fastest run on each scene with an error of at most that "
+        "of the heading, the geometric mean over the scenes; >: stopped at the time limit; not reached: "
+        "with the smallest error on the worst scene. Last column: from the solver's own Pareto front."
     )
     figures = [
         _diagram(of_size, f"{n:.0f}", results.limit) for n, of_size in cells.groupby("n") if curves(of_size)
@@ -151,9 +149,8 @@ def _diagram(cells: pd.DataFrame, n: str, limit: str) -> Figure:
         axes.plot(across, up, scalex=False, scaley=False, **STAIRCASE)
     style.plain_log(panels[0].yaxis)
     caption = (
-        f"*Time against achieved accuracy, n = {n}*: lower left is better; dotted: {limit}; grey: the "
-        f"Pareto front. "
-        "The tolerances of a solver are joined."
+        f"*Time against achieved accuracy, n = {n}*: lower left is better; dotted: {limit}; grey: the Pareto "
+        "front. The tolerances of a solver are joined."
     )
     return Figure(f"time-accuracy-{n}", caption, drawing)
 
@@ -173,14 +170,12 @@ def tolerances(results: Results) -> Section | None:
     ]
     caption = (
         "*Whose tolerance can be trusted*: the runs that the solver reported as solved, counting every "
-        "repeat. The "
-        "reference error bound is subtracted from the error, in the solver's favour."
+        "repeat. The reference error bound is subtracted from the error, in the solver's favour."
     )
     words = (
         "*Error against the requested tolerance*, the worst over the scenes of each size. Solvers apply "
-        "their "
-        "tolerance to different quantities, so only the slope matters: parallel to the dotted diagonal, or "
-        "level."
+        "their tolerance to different quantities, so only the slope matters: parallel to the dotted "
+        "diagonal, or level."
     )
     sizes, styles = sorted(cells["n"].unique()), styles_of(cells)
     drawing = style.figure(PANEL * len(sizes) + 0.4)
@@ -257,8 +252,8 @@ def residuals(results: Results) -> Section | None:
     drawing.legend(handles=style.legend_entries(styles), loc="outside right upper")
     words = (
         "*Displacement error against the residuals* of every answer. If a small residual implied a small "
-        "error, the "
-        f"upper left would be empty. Dotted: {results.limit}. Zero is drawn at {tidy_power(ZERO_ERROR_MM)}."
+        f"error, the upper left would be empty. Dotted: {results.limit}. Zero is drawn at "
+        f"{tidy_power(ZERO_ERROR_MM)}."
     )
     table = Table("residual-error", caption, lines, columns)
     return Section("Residuals and displacement error", [Figure("residual-error", words, drawing), table])
@@ -298,8 +293,7 @@ def repeats(results: Results) -> Section | None:
     ]
     caption = (
         f"*Unreliable times*: {len(unstable)} of {len(table)} measured repeatedly vary by more than "
-        f"{SPREAD:.0%} of "
-        f"the median; half of them by at most {table['percent'].median():.1f} %."
+        f"{SPREAD:.0%} of the median; half of them by at most {table['percent'].median():.1f} %."
     )
     return Section("Repeatability of the times", [Table("unstable-times", caption, unstable, columns)])
 

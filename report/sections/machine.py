@@ -58,10 +58,8 @@ def section(results: Results) -> Section | None:
     columns = [word("solver", "solver"), word("version", "solver_version"), word("code", "solver_code")]
     method = (
         "Each measurement runs in its own process; thread counts are set before numpy is loaded, and the "
-        "clock starts "
-        f"after the imports. An answer counts if it is within {results.limit} of the reference, whatever "
-        f"the solver "
-        "reports."
+        f"clock starts after the imports. An answer counts if it is within {results.limit} of the reference, "
+        "whatever the solver reports."
     )
     blocks: list[Block] = [
         Table("machine", "*The machine.*", known, [word("what", "what"), word("value", "value")]),

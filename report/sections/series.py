@@ -37,9 +37,8 @@ def section(results: Results) -> Section | None:
     ]
     caption = (
         "*Load cases on one assembly, in one process*: the median over the cases after the first (of "
-        "batches: after "
-        "the first batch); relative to the fastest library, by its update or from the start, the median "
-        "(range)."
+        "batches: after the first batch); relative to the fastest library, by its update or from the start, "
+        "the median (range)."
     )
     return Section("Series of load cases", [Table("series", caption, lines, columns, keys=3)])
 

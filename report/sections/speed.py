@@ -102,10 +102,8 @@ def relative(results: Results) -> Section | None:
     ]
     caption = (
         "*Relative times within the limit*: over those of the fastest library on the same scene in any of "
-        "its forms, "
-        "and over one Cholesky factorisation of Q in the same process. The median over the scenes (range "
-        "of all "
-        "runs); 0.1 is ten times as fast."
+        "its forms, and over one Cholesky factorisation of Q in the same process. The median over the "
+        "scenes (range of all runs); 0.1 is ten times as fast."
     )
     return Section("Relative speed", [Table("speed-ratios", caption, table, columns, keys=3)])
 
@@ -157,8 +155,8 @@ def contacts(results: Results) -> Section | None:
     drawing.legend(handles=entries(cells, styles), loc="outside right upper", handlelength=3.2)
     caption = (
         "*Seconds per load case against the active contacts*, with the best tolerance on each scene; "
-        "methods run on at "
-        f"least half of the scenes.{style.forms_text(cells)} {MARKS.format(limit=results.limit)}"
+        f"methods run on at least half of the scenes.{style.forms_text(cells)} "
+        f"{MARKS.format(limit=results.limit)}"
     )
     return Section("Time against active contacts", [Figure("time-active", caption, drawing)])
 
@@ -198,9 +196,8 @@ def from_scene(results: Results) -> Section | None:
         number("peak, MiB", "peak_rss_mib", whole),
     ]
     caption = (
-        "*From the scene to the answer*, medians of the repeats, totals of several load cases "
-        "extrapolated. Cached "
-        "matrices count with the seconds that they took to make."
+        "*From the scene to the answer*, medians of the repeats, totals of several load cases extrapolated. "
+        "Cached matrices count with the seconds that they took to make."
     )
     blocks: list[Figure | Table] = [Table("roads", caption, table[kept], columns, keys=2)]
     answered = best_tolerances(lines[lines["total_1_s"].notna()])
@@ -209,8 +206,7 @@ def from_scene(results: Results) -> Section | None:
         answered = answered[answered.groupby("scene")["method"].transform("nunique") > 1]
         caption = (
             "*From the scene to the answer of one load case*, the fastest first, in seconds; of each size, "
-            "the "
-            "scenes with the fewest and the most active contacts."
+            "the scenes with the fewest and the most active contacts."
         )
         blocks.insert(0, Figure("roads", caption, stacked(answered, "total_1_s", FROM_SCENE)))
     return Section("From scene to answer", blocks)
@@ -231,8 +227,8 @@ def steps(results: Results) -> Section | None:
         return None
     caption = (
         "*Where the time goes*, within the limit, the fastest first; of each size, the scenes with the "
-        "fewest and the "
-        "most active contacts. The factor of K and Q, which the dense forms share, are not included."
+        "fewest and the most active contacts. The factor of K and Q, which the dense forms share, are not "
+        "included."
     )
     return Section("Where the time goes", [Figure("time-steps", caption, stacked(cells, "total_s", STEPS))])
 
@@ -356,8 +352,8 @@ def profiles(results: Results) -> Section | None:
         columns.append(number(heading, f"within_{factor:g}", whole))
     caption = (
         f"*Performance profiles over {counted(len(times), 'load case')}*: the share that a solver answers "
-        f"within "
-        f"{results.limit}, with the best of its tolerances, in at most τ times the time of the fastest."
+        f"within {results.limit}, with the best of its tolerances, in at most τ times the time of the "
+        "fastest."
     )
     figure = Figure(
         "profiles", caption, _profiles(times, styles_of(results.cells[results.cells["method"].isin(times)]))

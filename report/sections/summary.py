@@ -48,8 +48,7 @@ def advice(results: Results) -> Section | None:
     ]
     caption = (
         "*The fastest solver whose error is small enough on every scene of that size*, by the geometric "
-        "mean of "
-        "its seconds over the scenes."
+        "mean of its seconds over the scenes."
     )
     return Section("Which solver to use", [Table("advice", caption, pd.DataFrame(lines), columns)])
 
@@ -81,8 +80,7 @@ def summary(results: Results) -> Section | None:
         blocks.append(Figure("summary", explained(drawn, table, limit), scoreboard(drawn, table)))
     caption = (
         "*Answers within the limit, then time*, with the best tolerance on each scene. Seconds are "
-        "geometric means "
-        "of the methods within the limit on every scene of the size."
+        "geometric means of the methods within the limit on every scene of the size."
     )
     return Section("Summary", [*blocks, Table("summary", caption, table, columns)])
 
