@@ -27,19 +27,20 @@ def advice(results: Results) -> Section | None:
         return None
     ways = roads(results)
     counted = [(EACH, cells, "load_case_s"), (PREPARED, cells, "total_s"), (FROM_SCENE, ways, "total_1_s")]
-    lines = []
+    lines, sweep = [], swept(results)
     for n in results.sizes:
+        limit = cells.loc[cells["n"] == n, "limit_mm"].max()
         for what, among, seconds in counted:
             if len(of_size := among[among["n"] == n]):
-                lines.append(recommended(of_size, None, seconds) | {"seconds of": what})
-        sweep = swept(results)
-        for accuracy_mm in ACCURACIES if len(sweep := sweep[sweep["n"] == n]) else ():
-            lines.append(recommended(sweep, accuracy_mm) | {"seconds of": EACH})
+                line = recommended(of_size, None, seconds)
+                lines.append(line | {"accuracy_mm": limit, "seconds of": what})
+        of_size = sweep[sweep["n"] == n]
+        for accuracy_mm in ACCURACIES if len(of_size) else ():
+            if accuracy_mm != limit:
+                lines.append(recommended(of_size, accuracy_mm) | {"seconds of": EACH})
     columns = [
         number("n", "n", whole),
-        Column(
-            "error ≤, mm", lambda line: tidy_power(line["accuracy_mm"]).replace(MISSING, results.limit[:-3])
-        ),
+        number("error ≤, mm", "accuracy_mm", tidy_power),
         word("seconds of", "seconds of"),
         word("use", "use"),
         number("s", "seconds"),
