@@ -1,7 +1,5 @@
 """Damaged rows that are compared, held to as a baseline or looked up, and damaged answers that are judged."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Folders of valid files, the commands on them, and what must hold if one succeeds on damaged files."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -82,6 +82,10 @@ class Block(ABC):
         D (size,) : powers of two.
         """
 
+    def largest_compliance(self, D: Vector, kappa: float) -> float:
+        """A proven bound on max (K⁻¹)_ii, mm/N, for κ ≤ λmin(DKD); infinite where none is cheap."""
+        return np.inf
+
     @abstractmethod
     def compliance(self, A: sp.csc_array) -> Matrix:
         """AᵀK⁻¹A, (m, m) mm/N, for A (size, m)."""

@@ -1,25 +1,19 @@
 """Every file of a results or series directory is read as it was written, or refused by name."""
 
-from __future__ import annotations
-
 import json
 import random
 import shutil
 from collections.abc import Callable
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import tiny
-from rich.console import Console
+from commands import harness
 from strip import write_strip
-from typer.testing import CliRunner
 
-from harness.cli.app import app
-from harness.measurement.run import record_machine, run
-from harness.planning.suite import read_suite, read_written
+from harness.measurement.run import record_machine
+from harness.planning.suite import read_written
 from harness.results import checksums, records
 from harness.results.kinds import refuse_unreadable
 from harness.series import store
@@ -28,19 +22,17 @@ from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 
-FLIPS = 400  # bytes damaged per file
+FLIPS = 120  # bytes damaged per file
 
 
 @pytest.fixture(scope="module")
-def directories(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def directories(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """`run`, a directory of results, and `series`."""
     folder = tmp_path_factory.mktemp("whole")
-    text = '[[solver]]\nname = "exact"\nforms = ["dual"]\n'
-    suite = read_suite(str(tiny.write_suite(folder, text, tolerances=[1e-6, 1e-8])))
-    assert run(suite, folder / "run", Console(file=StringIO())) == 0
+    shutil.copytree(finished, folder / "run")
     write_strip(folder)
     words = ["series", folder / "strip.toml", "--cases", 6, "--check", 0, "--out", folder / "series"]
-    assert CliRunner().invoke(app, list(map(str, words))).exit_code == 0
+    assert harness(*words).exit_code == 0
     return folder
 
 
@@ -147,7 +139,7 @@ def test_what_still_reads_well_is_refused_by_report(name: str, old: bytes, new: 
     whole = path.read_bytes()
     assert old in whole
     path.write_bytes(whole.replace(old, new, 1))
-    done = CliRunner().invoke(app, ["report", str(path.parent)])
+    done = harness("report", path.parent)
     assert done.exit_code == 2, done.output
     assert path.name in done.output
     assert "not what was written" in done.output
@@ -165,7 +157,7 @@ def test_what_older_versions_wrote_is_accepted(made: Path) -> None:
     records.append(rows, before[0] | {"key": "new"})
     assert records.read(rows) == [*before, before[0] | {"key": "new"}]
     for name in ("run", "series"):
-        done = CliRunner().invoke(app, ["report", str(made / name)])
+        done = harness("report", made / name)
         assert done.exit_code == 0, done.output
 
 
@@ -191,5 +183,5 @@ def test_fewer_cases_than_before_are_reported_as_that_many(made: Path) -> None:
     out = made / "series"
     facts = store.read_series(out)
     records.replace_object(out / store.SERIES, facts | {"cases": 4})
-    assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
+    assert harness("report", out).exit_code == 0
     assert "4 of 4 cases solved" in (out / "report" / "report.md").read_text()

@@ -1,20 +1,16 @@
 """The estimates of a scene's size, memory and time, before anything is built."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
+from commands import harness
 
-from harness.cli.app import app
 from harness.planning import estimate as estimates
 from harness.planning.estimate import estimated_sparse, refuse_what_cannot_fit
 from harness.scene import validate
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.names import Form
-from problems.model.scene import JointScene
 from problems.scene import read_scene
 from problems.stiffness.banded import half_bandwidth
 
@@ -24,7 +20,6 @@ GALLERY = ("three-part-stack", "installed-fasteners", "sheet-over-former", "plat
 @pytest.mark.parametrize("name", GALLERY)
 def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_made(name: str) -> None:
     scene = read_scene(f"gallery/{name}")
-    assert isinstance(scene, JointScene)
     estimate = estimated_sparse(scene, 1e9)
     data = prepared(scene, form="sparse")
     assert not data.assembly.K.dense
@@ -37,7 +32,6 @@ def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_m
 
 def test_the_time_of_arithmetic_follows_the_machine() -> None:
     scene = read_scene("4386/0107")
-    assert isinstance(scene, JointScene)
     fast, slow = estimated_sparse(scene, 1e10), estimated_sparse(scene, 1e9)
     assert slow.answer_s == pytest.approx(10 * fast.answer_s)
     assert fast.build_s < slow.build_s < 10 * fast.build_s
@@ -50,7 +44,7 @@ def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_validate_offers_the_sparse_form_where_no_dense_one_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     machine_of(24_000, monkeypatch)
-    done = CliRunner().invoke(app, ["validate", "scaling/100352"])
+    done = harness("validate", "scaling/100352")
     said = " ".join(done.output.split())
     assert done.exit_code == 0
     assert "No dense form can hold it: the process would take up to 134606 MiB" in said
@@ -61,7 +55,7 @@ def test_validate_offers_the_sparse_form_where_no_dense_one_fits(monkeypatch: py
 
 def test_validate_gives_both_where_both_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     machine_of(24_000, monkeypatch)
-    said = CliRunner().invoke(app, ["validate", "4386/0107"]).output
+    said = harness("validate", "4386/0107").output
     assert "Dense forms" in said
     assert "Sparse form" in said
 
@@ -85,7 +79,6 @@ def test_each_form_is_refused_by_what_it_needs(form: Form, monkeypatch: pytest.M
 def test_a_wide_band_is_not_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a square grid a fill-reducing order needs far less than the band."""
     scene = read_scene("scaling/100352")
-    assert isinstance(scene, JointScene)
     joint = scene.joint.model_copy(
         update={"junction": scene.joint.junction.model_copy(update={"nodes": (1500, 1500)})}
     )

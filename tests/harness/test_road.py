@@ -1,7 +1,5 @@
 """Which form a scene is solved in by default."""
 
-from __future__ import annotations
-
 import pytest
 
 from harness.planning import road

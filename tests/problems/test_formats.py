@@ -1,7 +1,5 @@
 """Matrices out to other programs' files and back, and what is said of the files' digits."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from contextlib import suppress
@@ -11,17 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.linalg as sla
 import scipy.sparse as sp
+from commands import harness
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joints import untied
 from rich.console import Console
 from scipy.io import FortranFile
 from small import make_load, make_prepared, solve_by_nnls
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.scene.exchange import export, import_, matrices
 from harness.scene.solve import solve
 from problems import formats
@@ -30,7 +25,6 @@ from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.input.digits import apparent_digits, expected_error
-from problems.model.scene import JointScene
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 
@@ -141,17 +135,6 @@ def test_nastrans_reader_leaves_numbers_their_digits(tmp_path: Path) -> None:
     assert str(np.float64(1 / 3)) == repr(1 / 3)
 
 
-def test_the_imported_problem_has_the_scenes_answer(tmp_path: Path) -> None:
-    scene = read_scene("gallery/three-part-stack")
-    export(scene.name, "npz", tmp_path / "stack.npz", QUIET)
-    own = read_scene(str(tmp_path / "stack.npz"))
-    one, two = prepared(scene), prepared(own)
-    np.testing.assert_array_equal(two.Q, one.Q)
-    for K, L in zip(one.assembly.K.matrices, two.assembly.K.matrices, strict=True):
-        np.testing.assert_array_equal(K, L)
-    np.testing.assert_array_equal(load_case(own).f, load_case(scene).f)
-
-
 @pytest.mark.parametrize("shape", ["lower", "upper", "both"])
 @pytest.mark.parametrize("labels", [True, False])
 def test_abaqus_text_in_its_shapes(shape: str, labels: bool, tmp_path: Path) -> None:
@@ -221,31 +204,6 @@ def test_a_name_picks_its_matrix_from_a_file_of_several(tmp_path: Path) -> None:
         import_([f"K={tmp_path / 'none.npz'}"], tmp_path / "out.npz", QUIET)
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"K": -sp.eye_array(12)}, "positive definite"),
-        ({"f": np.ones(11)}, "f.shape"),
-        ({"g": np.full(7, np.nan)}, "NaN"),
-        ({"A": sp.csc_array(np.zeros((12, 7)))}, "each contact must involve an unknown"),
-    ],
-)
-def test_bad_matrices_are_refused_and_nothing_is_left(change: Any, said: str, tmp_path: Path) -> None:
-    files = written(tmp_path / "in", **change)
-    with pytest.raises(InputError, match=said):
-        import_(files, tmp_path / "out.npz", QUIET)
-    assert [path.name for path in tmp_path.iterdir()] == ["in"]
-
-
-def test_an_asymmetric_K_is_refused(tmp_path: Path) -> None:
-    data = matrices(*small())
-    K = data["K"].toarray()
-    K[0, 1] *= 1.1
-    np.savez(tmp_path / "p.npz", K=K, A=data["A"].toarray(), f=data["f"], g=data["g"])
-    with pytest.raises(InputError, match="max"):
-        import_([str(tmp_path / "p.npz")], tmp_path / "out.npz", QUIET)
-
-
 def test_what_is_missing_or_of_no_format_is_named(tmp_path: Path) -> None:
     files = written(tmp_path)
     (tmp_path / "x.txt").write_text("1 2 3")
@@ -254,31 +212,12 @@ def test_what_is_missing_or_of_no_format_is_named(tmp_path: Path) -> None:
         ([str(tmp_path / "x.txt")], ".op4"),
         ([str(tmp_path / "none.mtx")], "no such file"),
     ):
-        done = CliRunner().invoke(app, ["import", *given_files, "--out", str(tmp_path / "out.npz")])
+        done = harness("import", *given_files, "--out", tmp_path / "out.npz")
         assert done.exit_code == 2
         assert said in done.output
-    done = CliRunner().invoke(app, ["export", SCENE, "--format", "xls", "--out", str(tmp_path / "o")])
+    done = harness("export", SCENE, "--format", "xls", "--out", tmp_path / "o")
     assert done.exit_code == 2
     assert "abaqus" in done.output
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no archive", b"%%MatrixMarket nothing\n"])
-@pytest.mark.parametrize("name", ["K.npz", "K.mtx"])
-def test_damaged_files_are_named(content: bytes, name: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError, match=name):
-        formats.read(tmp_path / name)
-
-
-@pytest.mark.parametrize("name", ["K", "g"])
-def test_a_matrix_market_file_that_ends_early(name: str, tmp_path: Path) -> None:
-    """Sparse and array: mmread would take what is missing for zeros."""
-    files = written(tmp_path)
-    file = tmp_path / f"{name}.mtx"
-    file.write_text("\n".join(file.read_text().strip().splitlines()[:-1]))
-    with pytest.raises(InputError, match="truncated") as error:
-        import_(files, tmp_path / "out.npz", QUIET)
-    assert error.value.faults[0].where == str(file)
 
 
 def test_nastran_without_pyyeti_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -348,17 +287,6 @@ def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     shown = StringIO()
     import_([str(tmp_path / "all.npz")], tmp_path / "out2.npz", Console(file=shown, width=200))
     assert "all digits of double precision" in shown.getvalue()
-
-
-def test_a_built_problem_is_exported_with_all_its_terms(tmp_path: Path) -> None:
-    """Springs and loads beyond the junction are in the file, not only what build.py makes."""
-    wanted, found = there_and_back("npz", tmp_path)
-    scene = read_scene(SCENE)
-    assert isinstance(scene, JointScene)
-    base = prepared(untied(scene))
-    bare = sla.block_diag(*base.assembly.K.matrices)
-    assert abs(found["K"] - bare).max() == pytest.approx(5.0)
-    assert abs(wanted["f"]).max() == pytest.approx(2.5)
 
 
 @pytest.mark.parametrize("form", ["op4", "dmig", "npz"])

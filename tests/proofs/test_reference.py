@@ -1,7 +1,5 @@
 """The reference against exact arithmetic, chosen answers and non-negative least squares."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 

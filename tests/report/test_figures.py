@@ -1,7 +1,5 @@
 """The figures: colours told apart by all readers, the size of wrong answers, what stands beside what."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 from pathlib import Path
@@ -78,7 +76,6 @@ def test_the_picture_of_steps_shows_seconds_the_fastest_first(tmp_path: Path) ->
     rows = [row(solver="newton", solve_s=0.5), row(solver="gi", solve_s=54.0)]
     results = read(write_rows(tmp_path, rows))
     section = steps(results)
-    assert section is not None
     (axes,) = section.blocks[0].drawing.axes  # type: ignore[union-attr]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["newton (dual)", "gi (dual)"]
     rows = [[bar for bar in axes.patches if round(bar.get_y() + 0.4) == k] for k in (0, 1)]

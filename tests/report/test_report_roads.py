@@ -1,7 +1,5 @@
 """The section "from scene to answer": stages, totals, and who is the fastest in any form."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -43,12 +41,12 @@ def results(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> Result
     return read(directory)
 
 
-def line_of(lines: pd.DataFrame, method: str) -> pd.Series[Any]:
+def line_of(lines: pd.DataFrame, method: str) -> pd.Series:
     (line,) = (line for _, line in lines.iterrows() if line["method"] == method)
     return line
 
 
-def totals(line: pd.Series[Any]) -> list[float]:
+def totals(line: pd.Series) -> list[float]:
     return [line[f"total_{k}_s"] for k in (1, 10, 1000)]
 
 
@@ -120,7 +118,6 @@ def test_series_and_forms_that_are_not_taken_do_not_count(tmp_path: Path) -> Non
 
 def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
     section = from_scene(results(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
-    assert section is not None
     (table,) = section.blocks
     assert "(outside)" in table.markdown
 
@@ -129,21 +126,18 @@ def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
     own = {"unknowns": 46956, "reference_bound_mm": 1.6e-11, "from_condensed_mm": 3e-12}
     facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
     section = problems.section(results(tmp_path, [sparse(), dense()], **facts, sparse=own))
-    assert section is not None
     scenes = section.blocks[0]
     assert scenes.data["sparse_unknowns"].tolist() == [46956]
     assert "difference of the two references, mm" in scenes.markdown
     assert all(text in scenes.markdown for text in ("46956", "1.60e-11", "3.00e-12", "2.00e-12"))
     assert "condensation" in scenes.caption
     without = problems.section(results(tmp_path / "dense", [dense()], **facts))
-    assert without is not None
     assert "sparse" not in without.blocks[0].markdown + without.blocks[0].caption
 
 
 def test_the_section_has_a_picture_and_a_table_of_all_stages(tmp_path: Path) -> None:
     rows = [r for s in (LOW, HIGH) for r in (sparse(s), dense(s), dense(s, "piqp", solve_s=6.1))]
     section = from_scene(results(tmp_path, rows))
-    assert section is not None
     assert [block.name for block in section.blocks] == ["roads", "roads"]
     write(tmp_path)
     assert (tmp_path / "report" / "roads.png").stat().st_size > 10_000
@@ -156,7 +150,6 @@ def test_the_advice_counts_from_the_scene_on_too(tmp_path: Path) -> None:
     """newton 0.9 s on the sparse form and 11.9 s on the dual; Clarabel 1.8 s on the sparse form."""
     rows = [sparse(), dense(), sparse(solver="clarabel", solve_s=1.1)]
     section = summary.advice(results(tmp_path, rows))
-    assert section is not None
     lines = section.blocks[0].data.set_index("seconds of")
     assert lines["use"].to_dict() == {
         summary.EACH: "newton (dual)",

@@ -1,7 +1,5 @@
 """The section on speed: ratios of times within one run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +41,6 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
     rows += [timed(scene, "newton", s, repeat=k) for scene in seconds for k, s in enumerate(seconds[scene])]
     found = results(tmp_path, rows)
     section, machine = speed.relative(found), speed.machine(found)
-    assert section is not None
-    assert machine is not None
     (table,), (yardsticks,) = section.blocks, machine.blocks
     line = table.data[table.data["method"] == "newton (dual)"].iloc[0]
     found = [line[name] for name in ("to_library", "to_library_least", "to_library_most")]
@@ -59,7 +55,6 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
 def test_without_an_answering_library_there_is_no_ratio_to_it(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0), timed(LOW, "piqp", 8.0) | no_answer("time_limit")]
     section = speed.relative(results(tmp_path, rows))
-    assert section is not None
     assert "–" in section.blocks[0].markdown
 
 
@@ -94,7 +89,6 @@ def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path:
     rows += [timed(scene, "ipm-fast", s, variant="no finish") for scene, s in ((LOW, 3.0), (HIGH, 20.0))]
     rows += [timed(LOW, "ipm-fast", 9.0, variant="bad", verdict="outside")]
     section = speed.variants(results(tmp_path, rows))
-    assert section is not None
     data = section.blocks[0].data.set_index("method")
     line = data.loc["ipm-fast (dual) no finish"]
     assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
@@ -110,7 +104,6 @@ def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: P
         grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
         rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
     section = speed.scaling(results(tmp_path, rows))
-    assert section is not None
     data = section.blocks[1].data.set_index("method")
     assert data.loc["newton (dual)", "load_case_s"] == pytest.approx(1.5)
     assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
@@ -130,7 +123,6 @@ def test_a_size_of_the_sparse_form_alone_leaves_the_benchmarks_of_q_as_they_are(
             figures = {"cholesky_s": 1e-10 * n**3, "product_s": 1e-9 * n**2}
             rows.append(timed(LOW, "newton", 1e-6 * n**2, **figures, **known) | grid)
     section = speed.scaling(results(tmp_path, rows))
-    assert section is not None
     data = section.blocks[1].data.set_index("method")
     assert data.loc["newton (sparse)", "load_case_s"] == pytest.approx(1.0)
     assert data.loc["newton (sparse)", "largest"] == 100_000

@@ -1,7 +1,5 @@
 """Block principal pivoting, and the forces and gaps of a set."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.linalg as sla

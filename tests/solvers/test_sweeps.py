@@ -1,7 +1,5 @@
 """A banded M ≈ Q⁻¹, and contact sets with it, corrected by products with Q: cold, warm and batched."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,7 +67,6 @@ def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = TOLERANCE) -> Answer
 
 
 def residual(Q: np.ndarray, p: np.ndarray, lam: np.ndarray | None) -> float:
-    assert lam is not None
     assert lam.min() >= 0
     y = Q @ lam - p
     return max(float(-y.min()), float(abs(y[lam > 0]).max(initial=0.0)))
@@ -120,7 +117,6 @@ def test_m_has_a_narrow_band_where_q_decays_alone() -> None:
     v = np.random.default_rng(2).standard_normal(len(Q))
     for given, narrow in ((Q, True), (rotated(len(Q), 1e4, 1), False), (Q + 100 * np.outer(v, v), False)):
         M = of_dense(DenseCompliance(np.asfortranarray(given)), None).M
-        assert M is not None
         assert (len(M.band) < len(Q) / 4) == narrow
         if not narrow:
             np.testing.assert_allclose(full(M) @ given, np.eye(len(Q)), atol=1e-8)
@@ -193,7 +189,6 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     second = replace(first, p=first.p + data.Q @ np.where(closed, 1.0, 0.0))  # N more on each closed contact
     own = Sweeps(data)
     one, two = (own([load], TOLERANCE)[0] for load in (first, second))
-    assert one.lam is not None
     assert two.iterations <= 2
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
@@ -212,7 +207,6 @@ def test_no_contact_closed_few_and_all(kept: float) -> None:
 @pytest.mark.parametrize(("rung", "sweeps_needed"), [("conditioning/9e+13", 6), ("duplicates/2e-05", 6)])
 def test_an_ill_conditioned_q_is_solved_near_rounding_in_few_sweeps(rung: str, sweeps_needed: int) -> None:
     made = make_rung(f"hard/{rung}").made
-    assert made is not None
     data = Prepared(made.assembly)
     session = session_of(data, "dual")
     (load,) = session.problem.loads([made.load])
