@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from report.document.blocks import records
+from report.document.escape import short
 from report.document.numbers import significant
 
 from . import style
@@ -17,6 +18,7 @@ from . import style
 COLUMNS = 2  # of panels
 ROW = 0.19  # inches
 MOST = 12  # lines per panel
+LONGEST = 42  # characters of a name
 Looks = Mapping[str, tuple[str, str, str | None]]
 
 
@@ -52,7 +54,7 @@ def stacked(lines: pd.DataFrame, total: str, looks: Looks) -> Figure:
                 text, (left[place], place), (4, 0), textcoords="offset points", va="center", fontsize=8
             )
         axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of_scene) - 0.5, -0.5), xlabel="seconds")
-        axes.set_yticks(places, of_scene["method"])
+        axes.set_yticks(places, [short(name, LONGEST) for name in of_scene["method"]])
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
         n, active = of_scene["n"].iloc[0], of_scene["active"].iloc[0]
