@@ -16,6 +16,7 @@ from typing import Any
 from problems.errors import Fault, InputError
 
 from . import records
+from .answer_files import pack
 from .provenance import ROOT, commit
 from .schema import CASES, GAPS
 
@@ -30,9 +31,8 @@ LAST = ("paper", "accuracy")
 #: For a user's own runs and for the CI.
 NOT_PUBLISHED = ("gate", "scenes")
 DIGITS = 12  # of a commit, in the name of a folder
-#: The answers of a suite are kept, for the gate to judge anew, if they take at most this together; so are the
-#: scenes' arrays, for their pictures, of which each may take at most as many kB.
-KEPT_MIB, KEPT_SCENE_KB = 5, 500
+#: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.
+KEPT_MIB = 5
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
 
@@ -101,6 +101,7 @@ def publish(name: str, directory: Path, published: Path) -> None:
     """Let a whole directory take the place of what is published under that name; both on one disk."""
     for unwanted in _unwanted(directory):
         shutil.rmtree(unwanted) if unwanted.is_dir() else unwanted.unlink()
+    pack(directory)
     target, old = published / name, directory.with_name(f"{name}.old")
     published.mkdir(parents=True, exist_ok=True)
     if target.exists():
@@ -111,12 +112,9 @@ def publish(name: str, directory: Path, published: Path) -> None:
 
 
 def _unwanted(directory: Path) -> Iterator[Path]:
-    """What is not published: locks, gaps of a series, answers and scenes that are large."""
+    """What is not published: locks, gaps of a series, the scenes' arrays, and answers that are large."""
     yield from directory.glob("**/*.lock")
     yield from directory.glob(GAPS)
-    large = [path for path in directory.glob("scenes/*.npz") if path.stat().st_size > KEPT_SCENE_KB * 1000]
-    yield from large
-    for folder in (directory / "answers", directory / "scenes"):
-        sizes = [path.stat().st_size for path in folder.glob("*") if path not in large]
-        if sum(sizes) > KEPT_MIB * 2**20:
-            yield folder
+    yield from directory.glob("scenes")
+    if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_MIB * 2**20:
+        yield directory / "answers"

@@ -1,4 +1,4 @@
-"""Writes the index of the published results: their code, the headline figures, a link to each report."""
+"""Writes the index of the published results: their code, the headline figures, the rows of each suite."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def write_index(folder: Path) -> Path:
     path = folder / "index.md"
     sections = [
         Section("Headlines", _headlines(folder, results)),
-        Section("Reports", [_reports(found, results)]),
+        Section("Suites", [_reports(found, results)]),
     ]
     title = f"Published results: {listed(commits(found))}"
     text = rendered("sections.md.j2", title=title, sections=[_about(found, results), *sections], csv=False)
@@ -149,7 +149,7 @@ def _reports(found: Rows, results: Mapping[str, Results]) -> Text:
         )
         lines.append(
             {
-                "report": f"[{name}]({name}/report/report.md)",
+                "suite": f"[{name}]({name})",
                 "title": title,
                 "rows": len(rows),
                 "within": sum(row["verdict"] == "within" for row in rows),
@@ -158,8 +158,11 @@ def _reports(found: Rows, results: Mapping[str, Results]) -> Text:
                 "commit": "several" if len(state) > 1 else state[0].removeprefix("commit ")[:SHORT],
             }
         )
-    columns = [word("report", "report"), word("what", "title"), number("rows", "rows", whole)]
+    columns = [word("suite", "suite"), word("what", "title"), number("rows", "rows", whole)]
     columns += [number("within the limit", "within", whole), number("minutes", "minutes", whole)]
     columns += [word("measured", "measured"), word("commit", "commit")]
-    caption = "Each report has its rows beside it, in `measurements.jsonl`."
+    caption = (
+        "Each directory has the rows. `python -m harness report results/published/speed` draws the report of "
+        "one from them: report.md with its pictures and tables, and index.html for a browser."
+    )
     return _table(caption, pd.DataFrame(lines), columns)

@@ -115,21 +115,16 @@ def test_one_that_fails_or_is_of_changed_code_is_not_published_and_the_others_ar
     assert published.is_of(published.rows_of(there / "default"), "b" * 40)
 
 
-def test_large_files_gaps_and_locks_are_left_out(tmp_path: Path) -> None:
-    kept_kb = published.KEPT_SCENE_KB * 1000
-    for name, size in (("small", 1000), ("many", kept_kb), ("large", published.KEPT_MIB * 2**20 + 1)):
+def test_scenes_large_answers_gaps_and_locks_are_left_out_and_answers_are_one_archive(tmp_path: Path) -> None:
+    for name, size in (("small", 1000), ("large", published.KEPT_MIB * 2**20 + 1)):
         folder = tmp_path / name
         measured(folder, row())
         for file in ("answers/a.npz", "answers/.lock", ".lock", GAPS, "scenes/a.npz"):
             (folder / file).parent.mkdir(exist_ok=True)
             (folder / file).write_bytes(bytes(10 if file in (".lock", GAPS) else size))
-        if name == "many":
-            for k in range(published.KEPT_MIB * 2**20 // kept_kb):
-                (folder / f"scenes/{k}.npz").write_bytes(bytes(kept_kb))
         published.publish(name, folder, tmp_path / "published")
     kept = {str(path.relative_to(tmp_path / "published")) for path in (tmp_path / "published").rglob("*.*")}
-    rows = {f"{name}/{MEASUREMENTS}" for name in ("small", "many", "large")}
-    assert kept == rows | {"small/answers/a.npz", "small/scenes/a.npz", "many/answers/a.npz"}
+    assert kept == {f"small/{MEASUREMENTS}", f"large/{MEASUREMENTS}", "small/answers.zip"}
 
 
 @pytest.mark.parametrize(

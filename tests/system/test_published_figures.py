@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from harness.results.published import SERIES, names, rows_of, seconds
+from report.document.numbers import listed
 from report.results.reader import Results, read
 from report.writers import headlines
 from report.writers.published import write_index
+from solvers.registry import modules
 
 ROOT = Path(__file__).parents[2]
 PUBLISHED = ROOT / "results" / "published"
@@ -32,12 +34,8 @@ def text(page: str) -> str:
 @pytest.mark.parametrize(
     ("page", "suite", "sentence"),
     [
-        ("README.md", "speed", headlines.ratio_sentence),
-        ("README.md", "speed", headlines.contact_sentence),
-        ("README.md", "uncondensed", headlines.road_sentence),
         ("docs/series.md", "series", headlines.series_sentence),
         ("docs/methods.md", "methods", headlines.methods_advice),
-        ("docs/methods.md", "methods", headlines.methods_table),
     ],
 )
 def test_what_a_page_says_is_what_the_rows_say(
@@ -46,6 +44,38 @@ def test_what_a_page_says_is_what_the_rows_say(
     said = " ".join(sentence(results(suite)).split())
     assert said
     assert said in text(page)
+
+
+def test_the_table_of_methods_is_that_of_the_rows_without_what_was_removed() -> None:
+    lines = headlines.methods_table(results("methods")).splitlines()
+    head, there = lines[:2], [line for line in lines[2:] if line.split()[1] in modules()]
+    assert there
+    assert "\n".join([*head, *there]) + "\n" in (ROOT / "docs/methods.md").read_text("utf-8")
+
+
+def test_how_fast_it_is_from_the_scene_on() -> None:
+    """The seconds at most, and how many times as long others take at least, at each size."""
+    said = headlines.road_sentence(results("uncondensed"))
+    found = re.findall(r"([\d.]+), ([\d.]+) and ([\d.]+)", said)
+    seconds_, sizes, condensed, library = (list(numbers) for numbers in found)
+    assert f"at most {listed(seconds_)} s at n = {listed(sizes)}." in text("README.md")
+    assert f"takes at least {listed(library)} times as long." in text("README.md")
+    for n, s, own, other in zip(sizes, seconds_, condensed, library, strict=True):
+        assert f"| {n} | {s} s | {own} times as long | {other} times as long |" in text("docs/speed.md")
+
+
+def test_on_how_many_problems_from_the_literature_clarabel_is_faster() -> None:
+    rows = results("outside").rows
+    rows = rows[(rows["form"] == "sparse") & (rows["verdict"] == "within")]
+    steps = ["model_s", "convert_s", "prepare_s", "setup_s", "solve_s", "form_s"]
+    spent = rows.assign(s=rows[steps].sum(axis=1)).pivot_table("s", "scene", "solver", "median")
+    both = spent[["clarabel", "newton"]].dropna()
+    said = re.search(
+        r"On the (\w+) scenes that both solve .* faster than `newton` on (\d+)", text("docs/outside.md")
+    )
+    assert said is not None
+    assert (said[1], int(said[2])) == ("ten", (both["clarabel"] < both["newton"]).sum())
+    assert len(both) == 10
 
 
 def test_the_series_of_the_page_is_the_published_one() -> None:
@@ -63,8 +93,8 @@ def test_the_index_is_that_of_the_rows(tmp_path: Path) -> None:
 
 
 def stated_minutes(suite: str) -> float | None:
-    """The time of a suite in the README's table; None if the table calls its times estimates."""
-    page = (ROOT / "README.md").read_text("utf-8")
+    """The time of a suite in the table of docs/suites.md; None if the table calls its times estimates."""
+    page = (ROOT / "docs" / "suites.md").read_text("utf-8")
     if "| time on two cores, estimated |" in page:
         return None
     line = re.search(rf"^\| `{suite}` \|.*\| (?:(\d+) h ?)?(?:(\d+) min)? \|$", page, re.MULTILINE)
