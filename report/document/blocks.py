@@ -49,6 +49,7 @@ class Table:
     """A table: its `columns` in the report, all of `data` with all digits in NAME.csv beside it.
 
     More than WIDEST columns continue in further tables, each of which begins with the first `keys` columns.
+    Without a name it has no CSV file.
     """
 
     kind: ClassVar[str] = "table"

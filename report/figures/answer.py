@@ -9,14 +9,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from report.results.answers import Answer, pair_name
+
 from . import style
 from .maps import CLOSED, LARGER, RIM, Array, Map, Scale, drawn, rooted
-
-Answer = tuple[dict[str, Any], dict[str, Array]]
-
-
-def pair_name(pair: dict[str, Any]) -> str:
-    return " – ".join(pair["pair"])
 
 
 def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:

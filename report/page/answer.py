@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from report.document.numbers import listed, significant
-from report.figures.answer import pair_name
+from report.results.answers import Answer, fasteners, pair_name
 from report.results.series import Array
 
 from .banner import banner
@@ -17,28 +17,35 @@ CODE = ("machine", "commit", "clean", "recorded_at")
 
 def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
     """What the page of one answer shows. record, arrays : of solution.json and solution.npz."""
-    facts = {
+    return {
+        "kind": "answer",
+        "banner": _banner([record]),
+        "headline": headline(record, arrays),
+        "fasteners": fasteners(record).to_numpy().tolist(),
+        "facts": facts(record),
+        "maps": answer_maps(record, arrays),
+    }
+
+
+def facts(record: Data) -> list[list[str]]:
+    """How the scene was solved and judged: names and values, as answer.md has them too."""
+    known = {
         "solved by": record["method"],
         "unknowns n": record["n"],
         "contacts m": record["m"],
         "verdict at 1e-7 mm": record.get("verdict"),
         "solver's report": record.get("status"),
-        "judged error, mm": _known(record.get("judged_error_mm")),
-        "error bound, mm": _known(record.get("error_bound_mm")),
-        "memory, MiB": _known(record.get("peak_rss_mib")),
-        **{f"{step}, s": significant(seconds) for step, seconds in record.get("steps", {}).items()},
+        "judged error, mm": record.get("judged_error_mm"),
+        "error bound, mm": record.get("error_bound_mm"),
+        "gaps proven to, mm": (record.get("allowed_gap") or {}).get("uncertainty_mm"),
+        "memory, MiB": record.get("peak_rss_mib"),
+        **{f"{step}, s": seconds for step, seconds in record.get("steps", {}).items()},
     }
-    return {
-        "kind": "answer",
-        "banner": _banner([record]),
-        "headline": headline(record, arrays),
-        "fasteners": [
-            [entry["kind"], pair_name(entry), entry["x"], entry["y"], entry["force_N"]]
-            for entry in record.get("fasteners", [])
-        ],
-        "facts": [[name, str(value)] for name, value in facts.items() if value is not None],
-        "maps": answer_maps(record, arrays),
-    }
+    return [
+        [name, significant(value) if isinstance(value, float) else str(value)]
+        for name, value in known.items()
+        if value is not None
+    ]
 
 
 def headline(record: Data, arrays: dict[str, Array]) -> Data:
@@ -63,14 +70,13 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     return {"kind": kind, "text": f"{word} at {significant(check['allowed_mm'])} mm: {largest}."}
 
 
-def two_answers_data(records: list[Data], answers: list[dict[str, Array]], names: list[str]) -> Data:
-    """What the page of two answers on one junction shows: records and arrays of both, and their names."""
-    facts = [
-        [which, f"{record['title']}, {record['method']}"]
-        for which, record in zip(("first", "second"), records, strict=True)
-    ]
-    maps = two_answers_maps(records[0], answers)
-    return {"kind": "answer", "banner": _banner(records), "facts": facts, "maps": maps}
+def two_answers_data(answers: list[Answer]) -> Data:
+    """What the page of two answers on one junction shows."""
+    records = [record for record, _ in answers]
+    named = [f"{record['title']}, {record['method']}" for record in records]
+    maps = two_answers_maps(records[0], [arrays for _, arrays in answers])
+    both = [["first", named[0]], ["second", named[1]]]
+    return {"kind": "answer", "banner": _banner(records), "facts": both, "maps": maps}
 
 
 def _banner(records: list[Data]) -> Data:
@@ -80,7 +86,3 @@ def _banner(records: list[Data]) -> Data:
     warned = ["Computed with uncommitted changes to that commit."] if changed else []
     methods = dict.fromkeys(str(record["method"]) for record in records)
     return banner(rows, counts=f"solved by: {listed(list(methods))}", warnings=warned)
-
-
-def _known(value: object) -> str | None:
-    return None if value is None else significant(value)

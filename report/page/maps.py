@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from report.figures.answer import pair_name
+from report.results.answers import pair_name
 from report.results.reader import Results
 from report.results.series import Array, Series
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import jinja2
 
 from report.document.blocks import Figure, Section, Table
 from report.document.escape import csv_frame, markdown, picture, short
-from report.document.numbers import significant
 from report.figures import style
 
 
@@ -22,9 +20,12 @@ def written(path: Path, title: str, sections: Sequence[Section], intro: Sequence
         for block in [block for section in sections for block in section.blocks]:
             if isinstance(block, Figure):
                 picture(block.drawing).savefig(path.parent / f"{block.name}.png", dpi=style.DPI)
-            if isinstance(block, Figure | Table) and block.data is not None:
+            if isinstance(block, Figure | Table) and block.name and block.data is not None:
                 csv_frame(block.data).to_csv(path.parent / f"{block.name}.csv", index=False)
-    path.write_text(rendered("sections.md.j2", title=title, sections=sections, intro=intro), "utf-8")
+    environment = jinja2.Environment(trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+    template = environment.from_string((Path(__file__).parent / "sections.md.j2").read_text("utf-8"))
+    page = template.render(title=short(title, 150), sections=sections, intro=intro)
+    path.write_text(markdown(page), "utf-8")
     return path
 
 
@@ -34,16 +35,3 @@ def emptied(directory: Path) -> Path:
     for stale in [*directory.glob("*.png"), *directory.glob("*.csv")]:
         stale.unlink()
     return directory
-
-
-def rendered(name: str, **content: Any) -> str:
-    """A page from report/writers/templates, in which quoted text is spelled out for Markdown.
-
-    Filters: significant, short.
-    """
-    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
-    environment = jinja2.Environment(
-        loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters |= {"significant": significant, "short": short}
-    return markdown(environment.get_template(name).render(content))

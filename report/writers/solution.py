@@ -1,122 +1,129 @@
-"""Writes the answer of one scene: a page in Markdown, a PNG per field, CSV files of the nodal results, VTU,
-and a page in HTML with the maps.
-
-Reads solution.json and solution.npz of a directory, nothing else.
+"""Writes the answer of one scene: answer.md, a PNG per field, CSV files of the nodal results, VTU, and a page
+in HTML with the maps.
 """
 
 from __future__ import annotations
 
-import csv
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from report.document.escape import csv_cell, picture, quoted
-from report.figures import style
-from report.figures.answer import answer_figures, pair_name
-from report.figures.maps import Array
-from report.page.answer import answer_data, headline
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.escape import csv_frame
+from report.document.numbers import significant
+from report.figures.answer import answer_figures
+from report.page.answer import answer_data, facts, headline
 from report.page.write import write as write_page
+from report.results.answers import contacts, fasteners, nodes, pair_name, read
+from report.results.series import Array
 
-from .pages import rendered
+from .pages import written
 from .vtu import write_vtu
 
-Columns = dict[str, list[Any]]
-Rows = list[dict[str, Any]]
+CAPTIONS = {
+    "gap": "*The gap before and after*, on square-root scales; outlined: closed contacts.",
+    "forces": "*The contact forces*, on a square-root scale; outlined: closed contacts.",
+    "displacement": "*The displacements*, positive from the first part of a contact to the second; hatched: "
+    "the rest of a part; thick: a clamped edge.",
+}
 
 
 def write(directory: Path) -> Path:
-    """Write answer.md, index.html and their files into DIRECTORY and return the path of answer.md."""
-    record = quoted(json.loads((directory / "solution.json").read_text("utf-8")))
-    with np.load(directory / "solution.npz") as saved:
-        arrays = {name: saved[name] for name in saved.files}
-    _write_csv(directory / "nodes.csv", _nodes(record, arrays))
+    """Write answer.md, index.html and their files into DIRECTORY, from its solution.json and solution.npz;
+    returns the path of answer.md.
+    """
+    record, arrays = read(directory)
+    files = {"nodes": nodes(record, arrays)}
     if record["m"]:
-        contacts = _contacts(record, arrays)
-        _write_csv(directory / "contacts.csv", contacts)
-        if check := record.get("allowed_gap"):
-            larger = {name: [column[k] for k in check["contacts"]] for name, column in contacts.items()}
-            _write_csv(directory / "exceeding.csv", larger)
-    if record.get("fasteners"):
-        _write_csv(directory / "fasteners.csv", _fasteners(record["fasteners"]))
-    figures = answer_figures(record, arrays) if "nodes" in arrays else {}
-    with style.applied():
-        for name, drawing in figures.items():
-            picture(drawing).savefig(directory / f"{name}.png", dpi=style.DPI)
+        files["contacts"] = contacts(record, arrays)
+    check = record.get("allowed_gap") or {}
+    if check.get("contacts"):
+        files["exceeding"] = files["contacts"].iloc[check["contacts"]]
+    for name, table in files.items():
+        csv_frame(table).to_csv(directory / f"{name}.csv", index=False)
+    blocks: list[Block] = [Text(_proven(record))]
+    if check.get("exceeded"):
+        larger = f"{len(check['contacts'])} of {record['m']} contacts, {significant(100 * check['share'])} %"
+        text = f"**The gap is larger than {check['allowed_mm']} mm** at {larger} of the junction"
+        blocks.append(Text(f"{text}: [exceeding.csv](exceeding.csv)."))
+    known = pd.DataFrame(facts(record), columns=["what", "value"])
+    blocks += [
+        *_fields(record, arrays),
+        Table("", "*The solve.*", known, [word("what", "what"), word("value", "value")]),
+    ]
     vtu = "not written: the nodes have no coordinates"
     if "nodes" in arrays:
+        figures = answer_figures(record, arrays)
+        blocks += [Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()]
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
-    path = directory / "answer.md"
-    parts, pairs = _summary(record, arrays)
-    first = headline(record, arrays)["text"]
-    content = {"record": record, "parts": parts, "pairs": pairs, "figures": list(figures), "vtu": vtu}
-    page = rendered("solution.md.j2", headline=first, **content)
-    path.write_text(page, "utf-8")
-    write_page(directory / "index.html", str(record["title"]), answer_data(record, arrays))
-    return path
+    links = ", ".join(f"[{name}.csv]({name}.csv)" for name in files)
+    blocks.append(Text(f"Every value: {links}, `solution.npz`. VTU for ParaView: {vtu}."))
+    title = str(record["title"])
+    write_page(directory / "index.html", title, answer_data(record, arrays))
+    sections = [Section("The answer", blocks), Section("What each effect adds", _effects(record))]
+    return written(directory / "answer.md", title, sections, [f"**{headline(record, arrays)['text']}**"])
 
 
-def _nodes(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
-    """One row per node of each part."""
-    names = [part["name"] for part in record["parts"] for _ in range(part["start"], part["stop"])]
-    columns = {"part": names} | _coordinates(arrays.get("nodes"), record["n"])
-    return columns | {"displacement_mm": arrays["x"].tolist()}
+def _proven(record: dict[str, Any]) -> str:
+    bound = record["error_bound_mm"]
+    text = "No bound on the error could be proven."
+    if bound is not None:
+        whose = "The reference" if record["judged_error_mm"] is not None else "Every displacement"
+        text = f"{whose} is within **{significant(bound)} mm** of the exact solution (proven bound)."
+    if record["qp"]:
+        return text
+    why = "the scene has no contact"
+    if record["m"]:
+        closest = significant(record["closest_mm"])
+        why = f"without contact no gap is violated, and the closest contact stays {closest} mm open"
+    return f"No quadratic program was needed: {why}. {text}"
 
 
-def _contacts(record: dict[str, Any], arrays: dict[str, Array]) -> Columns:
-    """One row per contact of each pair."""
-    names = [pair_name(pair) for pair in record["pairs"] for _ in range(pair["start"], pair["stop"])]
-    columns = {"contact": names} | _coordinates(arrays.get("contact_nodes"), record["m"])
-    return columns | {
-        "gap_before_mm": arrays["gap_before"].tolist(),
-        "gap_after_mm": arrays["gap_after"].tolist(),
-        "force_N": arrays["lam"].tolist(),
-    }
-
-
-def _fasteners(entries: list[dict[str, Any]]) -> Columns:
-    """One row per fastener and contact."""
-    return {
-        "kind": [entry["kind"] for entry in entries],
-        "contact": [pair_name(entry) for entry in entries],
-        "x_mm": [entry["x"] for entry in entries],
-        "y_mm": [entry["y"] for entry in entries],
-        "force_N": [entry["force_N"] for entry in entries],
-    }
-
-
-def _coordinates(nodes: Array | None, size: int) -> Columns:
-    if nodes is None:
-        return {"index": list(range(size))}
-    return {"x_mm": nodes[:, 0].tolist(), "y_mm": nodes[:, 1].tolist()}
-
-
-def _write_csv(path: Path, columns: Columns) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(map(csv_cell, row) for row in zip(*columns.values(), strict=True))
-
-
-def _summary(record: dict[str, Any], arrays: dict[str, Array]) -> tuple[Rows, Rows]:
-    """The figures of each part and of each pair on the page."""
-    parts, pairs = [], []
-    for part in record["parts"]:
-        x = arrays["x"][part["start"] : part["stop"]]
-        parts.append({"name": part["name"], "lowest": x.min(), "highest": x.max()})
+def _fields(record: dict[str, Any], arrays: dict[str, Array]) -> list[Block]:
+    """The forces in the fasteners, and the ranges of the fields in each pair and part."""
+    blocks: list[Block] = []
+    if len(forces := fasteners(record)):
+        columns = [word("fastener", "kind"), word("contact", "contact")]
+        columns += [number("x, mm", "x_mm"), number("y, mm", "y_mm"), number("force, N", "force_N")]
+        blocks.append(Table("fasteners", "*The force in each fastener.*", forces, columns))
+    pairs = []
     for pair in record["pairs"]:
         own = slice(pair["start"], pair["stop"])
         before, after, force = (arrays[name][own] for name in ("gap_before", "gap_after", "lam"))
-        pairs.append(
-            {
-                "name": pair_name(pair),
-                "before": (before.min(), before.max()),
-                "after": (after.min(), after.max()),
-                "closed": int((force > 0).sum()),
-                "of": len(force),
-                "force": np.nansum(force),
-            }
+        line = {"contact": pair_name(pair), "before": before, "after": after, "force_N": np.nansum(force)}
+        pairs.append(line | {"closed": f"{(force > 0).sum()} of {len(force)}"})
+    if pairs:
+        columns = [word("contact", "contact"), _range("gap before, mm", "before")]
+        columns += [_range("gap after, mm", "after"), word("closed", "closed")]
+        columns.append(number("sum of contact forces, N", "force_N"))
+        blocks.append(
+            Table("", "*The contacts*, from the smallest to the largest gap.", pd.DataFrame(pairs), columns)
         )
-    return parts, pairs
+    parts = [
+        {"part": part["name"], "x": arrays["x"][part["start"] : part["stop"]]} for part in record["parts"]
+    ]
+    columns = [word("part", "part"), _range("displacement, mm", "x")]
+    return [*blocks, Table("", "*The parts.*", pd.DataFrame(parts), columns)]
+
+
+def _range(heading: str, name: str) -> Column:
+    return Column(heading, lambda row: f"{significant(row[name].min())} … {significant(row[name].max())}")
+
+
+def _effects(record: dict[str, Any]) -> list[Block]:
+    skipped = Text("Skipped:\n\n" + "\n".join(f"- {line}" for line in record["skipped"]))
+    if not record["ledger"]:
+        digits = f" {record['digits']}." if record["digits"] else ""
+        return [Text(f"The matrices were given; no effect was computed.{digits}"), skipped]
+    columns = [
+        word("effect", "effect"),
+        word("adds", "adds"),
+        word("what", "amount"),
+        number("seconds", "seconds"),
+    ]
+    return [
+        Table("", "*The effects*, each measured separately.", pd.DataFrame(record["ledger"]), columns),
+        skipped,
+    ]

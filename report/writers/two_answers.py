@@ -1,11 +1,7 @@
-"""Writes two answers on one junction: comparison.md, maps, tables of contacts and fasteners, and index.html.
-
-Reads solution.json and solution.npz of two directories, nothing else.
-"""
+"""Writes two answers on one junction: comparison.md, maps, tables of contacts and fasteners, index.html."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,14 +10,21 @@ import numpy as np
 import pandas as pd
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
-from report.document.escape import csv_frame, quoted
+from report.document.escape import csv_frame
 from report.document.numbers import significant, whole
-from report.figures.answer import Answer, gap_maps, pair_name
-from report.figures.maps import Array
+from report.figures.answer import gap_maps
 from report.page.answer import two_answers_data
 from report.page.write import write as write_page
+from report.results.answers import Answer, contacts, fasteners, pair_name, read
+from report.results.series import Array
 
 from .pages import written
+
+SIDES = ("first", "second")
+CAPTIONS = {
+    "gaps": "*The remaining gaps.* Outlined in white: closed contacts.",
+    "difference": "*Red: the gap is larger in the second scene. Blue: it is smaller.*",
+}
 
 
 def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
@@ -29,51 +32,39 @@ def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
 
     Returns the path of the former and the figures per pair.
     """
-    first, second = answers = [_read(directory / folder) for folder in folders]
+    (first, one), (second, other) = answers = [read(directory / folder) for folder in folders]
     names = [str(record["scene"]) for record, _ in answers]
     if names[0] == names[1]:
         names = folders
-    pairs = pd.DataFrame([_pair(pair, first[1], second[1]) for pair in first[0]["pairs"]])
+    pairs = pd.DataFrame([_pair(pair, one, other) for pair in first["pairs"]])
     both = "the first scene, then the second"
+    titles = [
+        f"[{record['title']}]({folder}/answer.md)"
+        for (record, _), folder in zip(answers, folders, strict=True)
+    ]
     blocks: list[Block] = [
-        Text(f"First: {first[0]['title']} ([answer]({folders[0]}/answer.md))."),
-        Text(f"Second: {second[0]['title']} ([answer]({folders[1]}/answer.md))."),
+        Text(f"First: {titles[0]}. Second: {titles[1]}. Every contact: [contacts.csv](contacts.csv)."),
         Table("pairs", f"*Gaps, mm, and contact forces, N: {both}.*", pairs, _columns()),
     ]
-    if "contact_nodes" in first[1]:
-        captions = {
-            "gaps": "*The remaining gaps.* Outlined in white: closed contacts.",
-            "difference": "*Red: the gap is larger in the second scene. Blue: it is smaller.*",
-        }
-        blocks += [
-            Figure(name, captions[name], drawing) for name, drawing in gap_maps(answers, names).items()
-        ]
-    fasteners = _fasteners(first[0], second[0])
-    if len(fasteners):
-        columns = {"x, mm": "x_mm", "y, mm": "y_mm", "first": "first_N", "second": "second_N"}
-        shown = [word("kind", "kind"), word("contact", "contact")]
-        shown += [number(heading, name) for heading, name in columns.items()]
-        blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", fasteners, shown))
-    csv_frame(_contacts(first, second)).to_csv(directory / "contacts.csv", index=False)
-    blocks.append(Text("Every contact: [contacts.csv](contacts.csv)."))
+    if "contact_nodes" in one:
+        blocks += [Figure(name, CAPTIONS[name], made) for name, made in gap_maps(answers, names).items()]
+    forces = _fasteners([first, second])
+    if len(forces):
+        columns = [word("kind", "kind"), word("contact", "contact"), number("x, mm", "x_mm")]
+        columns += [number("y, mm", "y_mm"), *(number(side, f"{side}_N") for side in SIDES)]
+        blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", forces, columns))
+    csv_frame(_contacts(answers)).to_csv(directory / "contacts.csv", index=False)
     title = f"{names[0]} and {names[1]}"
-    data = two_answers_data([first[0], second[0]], [first[1], second[1]], names)
-    write_page(directory / "index.html", title, data)
+    write_page(directory / "index.html", title, two_answers_data(answers))
     section = Section("Two scenes on one junction", blocks)
     return written(directory / "comparison.md", title, [section]), pairs
-
-
-def _read(folder: Path) -> Answer:
-    record = quoted(json.loads((folder / "solution.json").read_text("utf-8")))
-    with np.load(folder / "solution.npz") as saved:
-        return record, {name: saved[name] for name in saved.files}
 
 
 def _pair(pair: dict[str, Any], one: dict[str, Array], other: dict[str, Array]) -> dict[str, Any]:
     """The figures of a pair of parts in both scenes."""
     own = slice(pair["start"], pair["stop"])
     line: dict[str, Any] = {"contact": pair_name(pair)}
-    for side, arrays in (("first", one), ("second", other)):
+    for side, arrays in zip(SIDES, (one, other), strict=True):
         gap, force = arrays["gap_after"][own], arrays["lam"][own]
         line |= {
             f"initial_{side}_mm": arrays["gap_before"][own].max(),
@@ -89,7 +80,7 @@ def _pair(pair: dict[str, Any], one: dict[str, Array], other: dict[str, Array]) 
 
 def _columns() -> list[Column]:
     def both(heading: str, name: str, show: Callable[[object], str] = significant) -> Column:
-        first, second = name.format("first"), name.format("second")
+        first, second = (name.format(side) for side in SIDES)
         return Column(heading, lambda row: f"{show(row[first])}, {show(row[second])}")
 
     return [
@@ -104,26 +95,21 @@ def _columns() -> list[Column]:
     ]
 
 
-def _fasteners(one: dict[str, Any], other: dict[str, Any]) -> pd.DataFrame:
+def _fasteners(records: list[dict[str, Any]]) -> pd.DataFrame:
     """One line per place, contact and kind of fastener in either scene; several on one node are added."""
-    forces: dict[tuple[Any, ...], list[float]] = {}
-    for side, record in enumerate((one, other)):
-        for entry in record["fasteners"]:
-            key = entry["kind"], pair_name(entry), entry["x"], entry["y"]
-            both = forces.setdefault(key, [np.nan, np.nan])
-            both[side] = np.nan_to_num(both[side]) + entry["force_N"]
-    names = ["kind", "contact", "x_mm", "y_mm", "first_N", "second_N"]
-    return pd.DataFrame([(*key, *both) for key, both in forces.items()], columns=names)
+    keys = ["kind", "contact", "x_mm", "y_mm"]
+    one, other = (
+        fasteners(record).groupby(keys, sort=False)["force_N"].sum().rename(f"{side}_N")
+        for record, side in zip(records, SIDES, strict=True)
+    )
+    return pd.concat([one, other], axis=1).reset_index()
 
 
-def _contacts(first: Answer, second: Answer) -> pd.DataFrame:
+def _contacts(answers: list[Answer]) -> pd.DataFrame:
     """One line per contact: where it is, and its gaps and forces in both scenes."""
-    (record, one), (_, other) = first, second
-    spans = [(pair_name(pair), pair["stop"] - pair["start"]) for pair in record["pairs"]]
-    table = pd.DataFrame({"contact": [name for name, count in spans for _ in range(count)]})
-    if "contact_nodes" in one:
-        table["x_mm"], table["y_mm"] = one["contact_nodes"].T
-    columns = {"gap_before": "gap_before_{}_mm", "gap_after": "gap_after_{}_mm", "lam": "force_{}_N"}
-    for name, column in columns.items():
-        table[column.format("first")], table[column.format("second")] = one[name], other[name]
-    return table.assign(change_mm=other["gap_after"] - one["gap_after"])
+    first, second = (contacts(*answer) for answer in answers)
+    table = first[[name for name in first if name in ("contact", "x_mm", "y_mm")]].copy()
+    for name in ("gap_before_{}mm", "gap_after_{}mm", "force_{}N"):
+        for side, of_side in zip(SIDES, (first, second), strict=True):
+            table[name.format(f"{side}_")] = of_side[name.format("")]
+    return table.assign(change_mm=second["gap_after_mm"] - first["gap_after_mm"])
