@@ -91,7 +91,8 @@ def run(
     ] = None,
     repeat: Annotated[int | None, option("N", "Number of repeats.", min=1)] = None,
     threads: Annotated[
-        list[int] | None, option("N", "Threads for linear algebra. Repeatable.", min=1)
+        list[int] | None,
+        option("N", "Threads for linear algebra. Repeatable.  [with local:N: cores / N]", min=1),
     ] = None,
     time_limit: Annotated[
         float | None,
@@ -126,6 +127,7 @@ def run(
     """
     with error_reporting() as console:
         from harness.measurement.run import run as run_suite
+        from harness.measurement.scheduler import threads_per_worker
         from harness.planning.overrides import Overrides, overridden, tolerances_of
         from harness.planning.suite import read_suite
         from harness.results.records import MEASUREMENTS
@@ -144,7 +146,12 @@ def run(
             reference_limit_s=reference_limit,
             plugin=plugin,
         )
-        chosen = overridden(read_suite(suite), change)
+        read = read_suite(suite)
+        chosen = overridden(read, change)
+        if not threads and "threads" not in read.model_fields_set:
+            chosen = chosen.model_copy(
+                update={"threads": [threads_per_worker(scheduler) or chosen.threads[0]]}
+            )
         directory = out or Path("results") / chosen.name
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         code = run_suite(chosen, directory, console, scheduler)

@@ -60,7 +60,12 @@ def series(
         int, option("N", "Compare every N-th case with the certified reference; 0: none.", min=0)
     ] = 100,
     threads: Annotated[
-        int | None, option("N", "Threads for linear algebra.  [default: 2; 1 in the sparse form]", min=1)
+        int | None,
+        option(
+            "N",
+            "Threads for linear algebra.  [default: 2; 1 in the sparse form; with local:N: cores / N]",
+            min=1,
+        ),
     ] = None,
     plugin: Plugin = None,
     time_limit: Annotated[
@@ -93,6 +98,7 @@ def series(
     """
     with error_reporting() as console:
         from harness.measurement.describe import described
+        from harness.measurement.scheduler import threads_per_worker
         from harness.planning.road import chosen_form
         from harness.results.schema import CASES
         from harness.scene.allowed_gap import refuse_unusable
@@ -145,7 +151,8 @@ def series(
             from problems.load_cases.random_gaps import random_gaps
 
             chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length, taken)
-        limits, threads = (time_limit, memory_limit), threads or (1 if taken == "sparse" else 2)
+        limits, threads = (time_limit, memory_limit), threads or threads_per_worker(scheduler)
+        threads = threads or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
         facts = {"solver_version": made.version, "solver_code": made.code}
         code = run(job, facts, out, console, scheduler)

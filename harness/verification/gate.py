@@ -36,6 +36,7 @@ from .reference_problem import ReferenceProblem, reference_problem
 NEEDED = ("key", "source", "scene_key", "form", "answer", "status", "message", "gated", "limit_mm")
 NULLABLE = ("answer", "message")
 MAX_CASES = 10**9
+UNREADABLE = "is missing, damaged or not finite"
 
 
 def gate(
@@ -126,10 +127,16 @@ def gated_rows(path: Path) -> dict[str, Row]:
 def judged(
     rows: dict[str, Row], directory: Path, limit_s: float | None = None, baseline: Baseline | None = None
 ) -> Iterator[Finding]:
-    """The rows' answers, judged scene by scene, so that each scene is opened once per road."""
+    """The rows' answers, judged scene by scene, so that each scene is opened once per road; not opened for
+    answers that were not kept.
+    """
     problem: ReferenceProblem | None = None
     opened: tuple[str, str] | None = None
     for row in sorted(rows.values(), key=lambda row: (str(row["source"]), road_of(row["form"]))):
+        if row["answer"] and not (directory / row["answer"]).exists():
+            missing, limit_mm = Judgement("no_answer"), min(row["limit_mm"], LIMIT_MM)
+            yield Finding(row["key"], missing, limit_mm, f"{row['answer']} {UNREADABLE}")
+            continue
         wanted = row["source"], road_of(row["form"])
         if problem is None or wanted != opened:
             problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
@@ -149,7 +156,7 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
     judgement = problem.judge_file(directory / row["answer"], limit)
     match judgement.verdict:
         case "no_answer":
-            why = f"{row['answer']} is missing, damaged or not finite"
+            why = f"{row['answer']} {UNREADABLE}"
         case "cannot_be_judged":
             why = f"the reference is known only to {bound:.0e} mm, not to {REFERENCE_SHARE * limit:.0e}"
         case "outside":

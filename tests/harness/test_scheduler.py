@@ -154,6 +154,16 @@ def test_a_number_of_workers_that_cannot_be(wrong: str) -> None:
         pass
 
 
+@pytest.mark.parametrize(
+    ("where", "each"), [("local:2", 4), ("local:3", 2), ("local:9", 1), ("tcp://a:1", None), (None, None)]
+)
+def test_local_workers_share_the_cores(
+    where: str | None, each: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scheduler, "usable_cores", lambda: 8)
+    assert scheduler.threads_per_worker(where) == each
+
+
 @needs_dask
 def test_workers_of_this_machine_are_processes_of_their_own() -> None:
     with workers("local:2") as (executor, count):
