@@ -179,7 +179,8 @@ def report(
         from harness.planning.suite import read_written
         from harness.results import records
         from harness.results.kinds import refuse_unreadable
-        from harness.series.store import SERIES, refuse_damaged
+        from harness.results.schema import SERIES
+        from harness.results.series_file import refuse_damaged
         from problems.errors import InputError
 
         if (directory / SERIES).is_file():

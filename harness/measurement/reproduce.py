@@ -17,17 +17,15 @@ import numpy as np
 
 from harness.planning.plan import Measurement
 from harness.planning.suite import RandomCases, read_written
-from harness.results.checksums import arrays_in
 from harness.results.incomparable import Incomparable
 from harness.results.kinds import refuse_wrong_kinds
 from harness.results.machine import machine
 from harness.results.provenance import provenance
-from harness.results.records import MEASUREMENTS, Row, read
+from harness.results.records import MEASUREMENTS, Row, read, read_arrays
 from harness.results.schema import FIELDS
 from harness.results.sides import batched
-from harness.verification.reference_problem import ANSWER_MIB, reference_problem
+from harness.verification.reference_problem import reference_problem
 from problems.errors import Fault, InputError
-from problems.input.bounded import regular_file
 from problems.scene import read_scene
 
 from .describe import described
@@ -164,6 +162,6 @@ def _x(directory: Path, row: Row) -> np.ndarray | None:
     if not row.get("answer"):
         return None
     try:
-        return arrays_in(regular_file(directory / row["answer"], "answer", ANSWER_MIB).read_bytes())["x"]
+        return read_arrays(directory / row["answer"])["x"]
     except (OSError, ValueError, KeyError):
         return None

@@ -15,9 +15,9 @@ from typing import Any
 
 from problems.errors import Fault, InputError
 
-from . import records
+from . import records, series_file
 from .provenance import ROOT, commit
-from .schema import CASES, GAPS
+from .schema import SERIES as SERIES_FILE
 
 PUBLISHED = ROOT / "results" / "published"
 STAGED = ROOT / "results" / "publishing"
@@ -78,7 +78,7 @@ def command(name: str, directory: Path) -> list[str]:
 
 def rows_of(directory: Path) -> list[records.Row]:
     """The rows of a suite or a series; none if there is no such directory."""
-    return records.read(directory / CASES) or records.read(directory / records.MEASUREMENTS)
+    return list(series_file.rows(directory)) or records.read(directory / records.MEASUREMENTS)
 
 
 def is_of(rows: Sequence[Mapping[str, Any]], digits: str) -> bool:
@@ -101,6 +101,8 @@ def publish(name: str, directory: Path, published: Path) -> None:
     """Let a whole directory take the place of what is published under that name; both on one disk."""
     for unwanted in _unwanted(directory):
         shutil.rmtree(unwanted) if unwanted.is_dir() else unwanted.unlink()
+    if (directory / SERIES_FILE).exists():
+        series_file.drop_gaps(directory)
     target, old = published / name, directory.with_name(f"{name}.old")
     published.mkdir(parents=True, exist_ok=True)
     if target.exists():
@@ -113,7 +115,6 @@ def publish(name: str, directory: Path, published: Path) -> None:
 def _unwanted(directory: Path) -> Iterator[Path]:
     """What is not published: locks, gaps of a series, answers and scenes that are large."""
     yield from directory.glob("**/*.lock")
-    yield from directory.glob(GAPS)
     large = [path for path in directory.glob("scenes/*.npz") if path.stat().st_size > KEPT_SCENE_KB * 1000]
     yield from large
     for folder in (directory / "answers", directory / "scenes"):

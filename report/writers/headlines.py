@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.results import series_file
 from harness.results.published import rows_of
 from harness.results.schema import DENSE_FORMS
 from report.analysis.outcomes import with_outcomes
@@ -192,4 +192,4 @@ def gaps_sentence(directory: Path) -> str:
 
 
 def _scene(directory: Path) -> str:
-    return str(json.loads((directory / "series.json").read_text("utf-8"))["scene"])
+    return str((series_file.read_facts(directory) or {})["scene"])

@@ -13,7 +13,6 @@ from harness.cli.app import app
 from harness.planning.suite import suite_names
 from harness.results import published
 from harness.results.records import MEASUREMENTS, append
-from harness.results.schema import GAPS
 from problems.errors import InputError
 
 CODE = "c" * 40
@@ -123,9 +122,9 @@ def test_large_files_gaps_and_locks_are_left_out(tmp_path: Path) -> None:
     for name, size in (("small", 1000), ("many", kept_kb), ("large", published.KEPT_MIB * 2**20 + 1)):
         folder = tmp_path / name
         measured(folder, row())
-        for file in ("answers/a.npz", "answers/.lock", ".lock", GAPS, "scenes/a.npz"):
+        for file in ("answers/a.npz", "answers/.lock", ".lock", "scenes/a.npz"):
             (folder / file).parent.mkdir(exist_ok=True)
-            (folder / file).write_bytes(bytes(10 if file in (".lock", GAPS) else size))
+            (folder / file).write_bytes(bytes(10 if file == ".lock" else size))
         if name == "many":
             for k in range(published.KEPT_MIB * 2**20 // kept_kb):
                 (folder / f"scenes/{k}.npz").write_bytes(bytes(kept_kb))
