@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import tiny
 
-from harness.planning.estimate import refuse_limits_too_low
+from harness.planning.memory import refuse_limits_too_low
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, read_suite, suite_from, suite_names, to_toml, validated
@@ -212,7 +212,7 @@ def test_a_memory_limit_holds_for_the_form_that_is_run(tmp_path: Path) -> None:
 
 
 def test_the_largest_joint_is_measured_in_the_sparse_form_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.planning.estimate.physical_memory_mib", lambda: 24_000)
+    monkeypatch.setattr("harness.planning.memory.physical_memory_mib", lambda: 24_000)
     plan = expand(read_suite("scaling"))
     largest = [m for m in plan if m.scene == "scaling/100352"]
     assert [(m.solver, m.form) for m in largest] == [("newton", "sparse")]

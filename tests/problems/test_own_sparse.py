@@ -15,7 +15,7 @@ from sparse_matrices import band_matrix, graph_matrix, renumbered
 from typer.testing import CliRunner
 
 from harness.cli.app import app
-from harness.planning import own_matrices, road
+from harness.planning import form_choice, memory
 from problems import formats
 from problems.build import load_case, prepared
 from problems.formats import pyyeti
@@ -37,8 +37,8 @@ def dense(self: Any) -> None:
 def _nothing_dense(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DenseBlock, "U", property(dense))
     monkeypatch.setattr(Prepared, "Q", property(dense))
-    monkeypatch.setattr(road, "physical_memory_mib", lambda: 150)  # holds the sparse form alone
-    monkeypatch.setattr(own_matrices, "physical_memory_mib", lambda: 200)
+    for module in (form_choice, memory):
+        monkeypatch.setattr(module, "physical_memory_mib", lambda: 200)  # holds the sparse form alone
 
 
 def files(folder: Path, K: sp.csc_array | None = None, scipy_npz: bool = False) -> list[str]:
