@@ -20,6 +20,7 @@ from small import solve_by_nnls
 from typer.testing import CliRunner
 
 from harness.cli.app import app
+from harness.planning.memory import size_of
 from harness.scene.ledger import ledger
 from harness.scene.solve import solve
 from problems.build import load_case, model_of, prepared
