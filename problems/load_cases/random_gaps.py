@@ -10,7 +10,6 @@ from pydantic import ValidationError
 
 from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
-from problems.effects.measured_gap import MeasuredGap
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
@@ -79,7 +78,7 @@ def random_gaps(
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
     options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    around = 0.0 if any(scene.effects_of(MeasuredGap)) else None
+    around = 0.0 if any(effect.kind == "measured_gap" for effect in scene.effects) else None
     own = {"mean": table.get("mean", around)} | (table.get("random") or {})
     given = own | {key: value for key, value in options.items() if value is not None}
     if missing := [key for key in options if given.get(key) is None]:
