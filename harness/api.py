@@ -42,8 +42,7 @@ from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
 from problems.input.stored_matrices import SMALL
 from problems.input.user_matrices import SYMMETRY, checked
-from problems.load_cases.base import LoadCases
-from problems.load_cases.listed import Listed
+from problems.load_cases.base import Listed, LoadCases
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import MadeScene, Scene
 from problems.scene import read_scene, scene_of

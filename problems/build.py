@@ -7,38 +7,39 @@ form needs is imported.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
-from problems.forms.problem import Progress
-from problems.full_model.model import Model
+from problems.forms.problem import Progress, silent
 from problems.model.effect import Effect
 from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
 
-_last: tuple[Scene, Model] | None = None  # of several, only the last one stays in memory
+if TYPE_CHECKING:
+    from problems.full_model.given_model import GivenModel
+    from problems.full_model.joint_model import JointModel
+
+_last: tuple[Scene, JointModel | GivenModel] | None = None  # of several, only the last one stays in memory
 
 
-def model_of(scene: Scene) -> Model:
+def model_of(scene: Scene) -> JointModel | GivenModel:
     """The model of a scene, made once for the same scene object."""
     global _last
     if _last is None or _last[0] is not scene:
-        _last = scene, _model(scene)
+        if isinstance(scene, JointScene):
+            from problems.full_model.joint_model import JointModel
+
+            _last = scene, JointModel.of(scene)
+        else:
+            from problems.full_model.given_model import GivenModel
+
+            assert isinstance(scene, MatricesScene | MadeScene)
+            _last = scene, GivenModel.of(scene)
     return _last[1]
 
 
-def _model(scene: Scene) -> Model:
-    if isinstance(scene, JointScene):
-        from problems.full_model.joint_model import JointModel
-
-        return JointModel.of(scene)
-    from problems.full_model.given_model import GivenModel
-
-    assert isinstance(scene, MatricesScene | MadeScene)
-    return GivenModel.of(scene)
-
-
-def prepared(scene: Scene, progress: Progress = lambda text, fraction: None, form: Form = "dual") -> Prepared:
+def prepared(scene: Scene, progress: Progress = silent, form: Form = "dual") -> Prepared:
     """K and A of a scene, condensed from the cache or now, or as they are for the sparse form.
 
     Factors and Q are made when first needed. Raises InputError if a part can move freely, if a user's

@@ -22,7 +22,7 @@ from pydantic import ValidationError
 
 from problems.drawn import EXAMPLES, drawn_table
 from problems.input.bounded import regular_file, resolved
-from problems.input.validation import UNITS, unknown, validation_faults
+from problems.input.validation import unknown, validation_faults
 from problems.manufactured.ladder import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
@@ -163,7 +163,7 @@ def _joint(
     try:
         joint = Joint.model_validate(table)
     except ValidationError as error:
-        faults += validation_faults(path, Joint, error, units=UNITS)
+        faults += validation_faults(path, Joint, error)
         return None
     new = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
     if new:

@@ -1,4 +1,4 @@
-"""Shared by the adapters of libraries: a quadratic program in a library's format, options, the answer.
+"""Shared by the adapters of libraries: a quadratic program in a library's format, settings, the answer.
 
 Every form is min ½zᵀPz + qᵀz with either rows Gz ≤ h or bounds z ≥ 0 (see problems.forms), so an adapter does
 not depend on it; it only tells sparse blocks of P from dense ones. Relative tolerances are 0 if a library has
@@ -8,18 +8,19 @@ Kx − f + Aλ, mm for Aᵀx − g and Qλ − p; N·mm for the duality gap (`ga
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg as sla
 import scipy.sparse as sp
 
-from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector
 
-from .base import Answer, Problem, Status, WarmStart
+from .base import FORMS, Answer, Form, Problem, Solver, Status, WarmStart
+from .settings import chosen, one_of, require
 
 GAP_ROUNDING = 1e-13  # PIQP comes down to 3e-14 on some scenes, and waits for 1.5e-14 in vain on others
 
@@ -55,6 +56,42 @@ class Converted:
         return answer(status, tolerance, lam, x, **facts)
 
 
+class Library(Solver):
+    """Base of the adapters that hand on a library's own settings.
+
+    choices : the adapter's own options, each with its values, the default first.
+    """
+
+    forms: ClassVar[tuple[Form, ...]] = FORMS
+    choices: ClassVar[dict[str, tuple[Any, ...]]]
+
+    def __init__(self, **options: object) -> None:
+        name = type(self).__name__.lower()
+        self.own: dict[str, Any] = {key: options.pop(key, values[0]) for key, values in self.choices.items()}
+        require(name, self.own, **{key: one_of(self.own[key], self.choices[key]) for key in self.own})
+        self.settings = chosen(name, options, self.defaults())
+
+    @abstractmethod
+    def defaults(self) -> Any:
+        """The library's settings, at their defaults."""
+
+
+def converted(problem: Problem, sparse: bool) -> Converted:
+    """The upper triangle of P and G in CSC, or both dense."""
+    G = problem.G
+    if sparse:
+        return Converted(problem, upper_triangle(problem.blocks), None if G is None else sp.csc_matrix(G))
+    return Converted(problem, dense(problem.blocks), None if G is None else G.toarray(order="F"))
+
+
+def set_absolute(settings: Any, tolerance: float, load: LoadCase) -> None:
+    """Absolute tests only, that of the duality gap included, by the names of PIQP and ProxQP."""
+    settings.eps_abs = tolerance
+    settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
+    settings.eps_rel = settings.eps_duality_gap_rel = 0.0
+    settings.check_duality_gap = settings.compute_timings = True
+
+
 def gap_tolerance(tolerance: float, load: LoadCase) -> float:
     """For the duality gap, which bounds the error ½(x − x*)ᵀK(x − x*): as many N·mm as the tolerance has mm,
     but no looser than the tolerance itself, and no tighter for it than rounding allows.
@@ -74,14 +111,11 @@ def answer(status: Status, tolerance: float, lam: Vector, x: Vector | None = Non
     return Answer(status, lam, None if x is None else np.array(x, dtype=float), **facts)
 
 
-def unknowns(problem: Problem) -> int:
-    """The length of z."""
-    return sum(block.shape[0] for block in problem.blocks)
-
-
 def rows_for_bounds(problem: Problem, sign: float) -> sp.csc_matrix:
     """G, or ±I if a library takes the bounds z ≥ 0 as rows, CSC."""
-    return sp.csc_matrix(sign * sp.eye(unknowns(problem)) if problem.G is None else problem.G)
+    if problem.G is not None:
+        return sp.csc_matrix(problem.G)
+    return sp.csc_matrix(sign * sp.eye(sum(block.shape[0] for block in problem.blocks)))
 
 
 def upper_triangle(blocks: Sequence[Matrix]) -> sp.csc_matrix:
@@ -122,10 +156,3 @@ def dense(blocks: Sequence[Matrix]) -> Matrix:
     """blockdiag(blocks) of dense blocks in Fortran order. No copy of a single C-ordered block."""
     whole = blocks[0] if len(blocks) == 1 else sla.block_diag(*blocks)
     return whole.T  # symmetric
-
-
-def choice(solver: str, key: str, value: object, allowed: Collection[Any]) -> None:
-    """Raise InputError unless `value` is one of `allowed`, of the same type (1 is not True)."""
-    if not any(type(value) is type(good) and value == good for good in allowed):
-        listed = ", ".join(map(repr, allowed))
-        raise InputError.one(f"solver {solver}", f"options.{key}", value, f"must be one of {listed}")

@@ -1,12 +1,14 @@
-"""KKT residual of an approximate dual solution."""
+"""The KKT residual of an approximate dual solution, and the answer that it makes."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 
-from .base import Status
+from .base import Answer, Status
 
 EPS = float(np.finfo(float).eps)
 
@@ -31,6 +33,28 @@ def kkt_status(Q: Matrix, p: Vector, lam: Vector, y: Vector, tolerance: float) -
         return "solved", residual
     rounding = 4 * EPS * float((abs(p) + abs(Q) @ lam).max(initial=0.0))
     return "solved" if residual <= rounding else "inaccurate", residual
+
+
+def judged(
+    status: Status,
+    lam: Vector,
+    residual: float,
+    details: dict[str, Any],
+    limit: str = "",
+    cause: str = "rounding",
+    *,
+    iterations: int,
+    inner_iterations: int | None = None,
+) -> Answer:
+    """The answer λ with its KKT residual in the details, and with the cause if it is not solved.
+
+    limit : the one that stopped the method, if one did: "inaccurate" then becomes "iteration_limit".
+    """
+    details = details | {"kkt_residual_mm": residual}
+    if status != "solved":
+        status = "iteration_limit" if limit else "inaccurate"
+        details["cause"] = f"{limit or cause}: optimal only to {residual:.1e} mm"
+    return Answer(status, lam, None, iterations, inner_iterations, details=details)
 
 
 def largest_rounding(diagonal: Vector, p: Vector, lam: Vector) -> float:

@@ -17,11 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from problems import __version__
-from problems.errors import Fault, InputError
+from problems.errors import InputError
 from problems.input.validation import unknown
 
 from .base import Solver
 from .plugin import load_plugin, own_files, solver_class
+from .settings import require
 
 METHODS, LIBRARIES = "solvers.methods", "solvers.libraries"
 #: The one module for many solvers: all others that qpsolvers finds.
@@ -55,17 +56,20 @@ def make_solver(name: str, options: dict[str, Any], plugin: Path | None = None) 
     Raises InputError if the name, an option or its value is unknown or invalid, or if the plug-in cannot be
     loaded.
     """
-    where = f"solver {name}"
     factory = _factory(name, plugin)
-    faults = _unknown_options(where, factory, options)
-    if faults:
-        raise InputError(faults)
+    parameters = inspect.signature(factory).parameters
+    if not any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
+        known = (
+            f"one of the options {', '.join(parameters)}" if parameters else "this solver takes no options"
+        )
+        wrong = (False, f"unknown option, allowed: {known}")
+        require(name, options, **{key: wrong for key in options if key not in parameters})
     try:
         return factory(**options)
     except InputError:
         raise
     except (TypeError, ValueError) as error:
-        raise InputError.one(where, "options", options, str(error)) from error
+        raise InputError.one(f"solver {name}", "options", options, str(error)) from error
 
 
 def solver_version(name: str, plugin: Path | None = None) -> str:
@@ -114,15 +118,3 @@ def _class_of(name: str) -> type[Solver]:
     except ImportError as error:
         raise InputError.one("solvers", "name", name, f"cannot be imported here ({error})") from error
     return solver_class(module, Path(str(module.__file__)))
-
-
-def _unknown_options(where: str, factory: Callable[..., Solver], options: dict[str, Any]) -> list[Fault]:
-    parameters = inspect.signature(factory).parameters
-    if any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
-        return []
-    allowed = f"one of the options {', '.join(parameters)}" if parameters else "this solver takes no options"
-    return [
-        Fault(where, f"options.{key}", value, f"unknown option, allowed: {allowed}")
-        for key, value in options.items()
-        if key not in parameters
-    ]

@@ -1,8 +1,8 @@
-"""Options of a method, and settings of a library that a user may choose beside them, as OSQP's scaling."""
+"""Options of a method, and settings of a library that a user may choose, as OSQP's scaling."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from problems.errors import Fault, InputError
@@ -15,10 +15,19 @@ DECIDED = (*STOPPING, "verbose", "max_threads", "num_threads", "warm_start", "in
 
 def require(solver: str, options: Mapping[str, object], **rules: tuple[bool, str]) -> None:
     """Raises InputError, all faults at once. rules : by option, whether its value is allowed, and what is."""
-    wrong = {key: allowed for key, (holds, allowed) in rules.items() if not holds}
-    faults = [Fault(solver, key, options[key], allowed) for key, allowed in wrong.items()]
+    faults = [
+        Fault(f"solver {solver}", f"options.{key}", options[key], allowed)
+        for key, (holds, allowed) in rules.items()
+        if not holds
+    ]
     if faults:
         raise InputError(faults)
+
+
+def one_of(value: object, allowed: Collection[object]) -> tuple[bool, str]:
+    """A rule: `value` is one of `allowed`, of the same type (1 is not True)."""
+    found = any(type(value) is type(good) and value == good for good in allowed)
+    return found, f"must be one of {', '.join(map(repr, allowed))}"
 
 
 def chosen(solver: str, given: Mapping[str, object], settings: object) -> dict[str, Any]:
@@ -32,9 +41,7 @@ def chosen(solver: str, given: Mapping[str, object], settings: object) -> dict[s
         if not name.startswith(("_", *DECIDED))
         and isinstance(value := getattr(settings, name), bool | int | float | str)
     }
-    faults = [fault for name, value in given.items() for fault in _faults(solver, name, value, known)]
-    if faults:
-        raise InputError(faults)
+    require(solver, given, **{name: _of_its_type(name, value, known) for name, value in given.items()})
     apply(settings, given)
     return dict(given)
 
@@ -45,12 +52,10 @@ def apply(settings: Any, given: Mapping[str, object]) -> None:
         setattr(settings, name, value)
 
 
-def _faults(solver: str, name: str, value: object, known: Mapping[str, object]) -> list[Fault]:
-    where, key = f"solver {solver}", f"options.{name}"
+def _of_its_type(name: str, value: object, known: Mapping[str, object]) -> tuple[bool, str]:
     if name not in known:
-        return [Fault(where, key, value, unknown("option", name, sorted(known)))]
+        return False, unknown("option", name, sorted(known))
     kind = type(known[name])
     # bool is an int, and an int a float where one is meant.
-    if type(value) is kind or (kind is float and type(value) is int):
-        return []
-    return [Fault(where, key, value, f"must be of the type of its default {known[name]!r}")]
+    fits = type(value) is kind or (kind is float and type(value) is int)
+    return fits, f"must be of the type of its default {known[name]!r}"

@@ -1,7 +1,5 @@
 """Made-up rows of a sweep over tolerances, with facts planted in them. Nothing was ever measured."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from synthetic_results import no_answer, row

@@ -2,8 +2,6 @@
 and the summary says so.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,8 +23,10 @@ def browser(profile: Path) -> Iterator[Any]:
     driver = shutil.which("chromedriver")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if not (driver and chromium):
-        pytest.skip(f"{NO_BROWSER}no Chromium with its driver is installed")
-    webdriver = pytest.importorskip("selenium.webdriver", reason=f"{NO_BROWSER}selenium is not installed")
+        pytest.skip(f"{NO_BROWSER}no Chromium with its driver is installed (apt install chromium-driver)")
+    webdriver = pytest.importorskip(
+        "selenium.webdriver", reason=f"{NO_BROWSER}selenium is missing (pip install selenium)"
+    )
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

@@ -2,10 +2,11 @@
 warning where the page was tried in no browser.
 """
 
-from __future__ import annotations
-
 import os
+import shutil
 from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
 
 import pytest
 from browser import NO_BROWSER
@@ -25,15 +26,36 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run of the tiny joint, two rows of the plug-in `exact`, which nobody may change."""
+    import tiny
+    from rich.console import Console
+
+    from harness.measurement.run import run
+    from harness.planning.suite import read_suite
+
+    folder = tmp_path_factory.mktemp("finished")
+    suite = read_suite(str(tiny.write_suite(folder, tolerances=[1e-6, 1e-8])))
+    assert run(suite, folder / "finished", Console(file=StringIO())) == 0
+    return folder / "finished"
+
+
+@pytest.fixture
+def copy(finished: Path, tmp_path: Path) -> Path:
+    """One that a test may change."""
+    return Path(shutil.copytree(finished, tmp_path / "copy"))
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Quick tests first."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What no test saw is said in one line: judge.js runs in a browser only."""
+    """What no test saw is said aloud: judge.js runs in a browser only."""
     reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
     missing = [reason.partition(NO_BROWSER)[2] for reason in reasons if NO_BROWSER in reason]
     if missing:
-        text = f"WARNING: the page was not tried: {len(missing)} browser tests skipped, {missing[0]}"
-        terminalreporter.write_line(text, yellow=True, bold=True)
+        terminalreporter.write_sep("=", f"{len(missing)} browser tests SKIPPED", yellow=True, bold=True)
+        terminalreporter.write_line(f"The page was not tried: {missing[0]}.", yellow=True)

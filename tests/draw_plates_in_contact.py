@@ -5,8 +5,6 @@
 Writes a picture per scene of the gallery, and prints a row per scene and mesh.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

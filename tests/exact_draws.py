@@ -5,8 +5,6 @@ they are float64. In other units, K' = SKS/v, A' = SAC, f' = aSf/v, g' = aCg wit
 the answer is x' = aS⁻¹x, λ' = aC⁻¹λ/v: nothing is ever rounded.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the fuzzer of exact problems notes: faults by kind, hangs and tracebacks among them."""
 
-from __future__ import annotations
-
 import signal
 from collections import Counter
 from collections.abc import Iterator

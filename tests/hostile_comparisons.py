@@ -1,7 +1,5 @@
 """Damaged rows that are compared, held to as a baseline or looked up, and damaged answers that are judged."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -42,7 +40,7 @@ def judged(root: Path) -> Target:
     """An exact answer in each kind of file."""
     folder = root / "judged"
     folder.mkdir()
-    formats.write("npz", folder / "own.npz", own_matrices())
+    formats.FORMATS["npz"].write(folder / "own.npz", own_matrices())
     data = make_prepared(3, 3, tools=1)
     x, lam = solve_by_nnls(data, make_load(3, data)[0])
     np.save(folder / "x.npy", x)

@@ -1,7 +1,5 @@
 """Folders of valid files, the commands on them, and what must hold if one succeeds on damaged files."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -89,7 +87,7 @@ def own(root: Path, form: str, suffix: str) -> Target:
     folder = root / form
     folder.mkdir()
     made = folder / ("own" if suffix == ".mtx" else f"own{suffix}")
-    formats.write(form, made, own_matrices())
+    formats.FORMATS[form].write(made, own_matrices())
     files = [f"own/{name}.mtx" for name in "KAfg"] if suffix == ".mtx" else [made.name]
     commands = [("import", *(f"@{name}" for name in files), "--out", "@out.npz")] * 2
     if suffix == ".npz":
@@ -115,7 +113,7 @@ def cached(root: Path) -> Target:
     """Own matrices whose cache is damaged: the answer is what it was, or there is none."""
     folder = root / "cached"
     folder.mkdir()
-    formats.write("npz", folder / "own.npz", own_matrices())
+    formats.FORMATS["npz"].write(folder / "own.npz", own_matrices())
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
         assert invoke(folder, ("solve", "@own.npz", "--out", "@answer"))[0] == 0
@@ -215,13 +213,6 @@ def suite(root: Path) -> Target:
 
 
 def all_targets(root: Path) -> list[Target]:
-    forms = {
-        "npz": ".npz",
-        "qpsolvers": ".npz",
-        "mtx": ".mtx",
-        "abaqus": ".mtx",
-        "op4": ".op4",
-        "dmig": ".pch",
-    }
+    forms = {"npz": ".npz", "mtx": ".mtx", "abaqus": ".mtx", "op4": ".op4", "dmig": ".pch"}
     of_formats = [own(root, form, suffix) for form, suffix in forms.items()]
     return [scene(root), cached(root), results(root), series(root), suite(root), *of_formats]

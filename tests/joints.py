@@ -1,7 +1,5 @@
 """Small joints made in code, and the numbering of the plate's unknowns, written down once more."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +16,26 @@ def make_joint(*parts: dict[str, Any], contacts: Any = (), **junction: Any) -> J
     data = {"length": 400.0, "width": 120.0, "nodes": (5, 4)} | junction
     part = [{"name": "a", "thickness": 6.0} | table for table in parts]
     return Joint.model_validate({"junction": data, "part": part, "contacts": contacts})
+
+
+def two_parts(
+    length: float = 100.0, width: float = 50.0, nodes: tuple[int, int] = (4, 3), side: str = "north"
+) -> str:
+    """The table [joint] of parts a and b, 2 and 3 mm thick; `side` is where b goes on and is clamped."""
+    return f"""
+[joint]
+junction = {{ length = {length}, width = {width}, nodes = {list(nodes)} }}
+[[joint.part]]
+name = "a"
+thickness = 2.0
+north = {{ length = 40.0, elements = 2 }}
+clamped = ["north"]
+[[joint.part]]
+name = "b"
+thickness = 3.0
+{side} = {{ length = {40.0 if side == "north" else 60.0}, elements = 2 }}
+clamped = ["{side}"]
+"""
 
 
 def make_scene(joint: Joint, *effects: Effect) -> JointScene:

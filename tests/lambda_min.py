@@ -1,7 +1,5 @@
 """Proven lower bounds on λmin, as the referee asks for them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,11 +1,15 @@
-"""The number of draws of a fuzzer: a few hundred, or with RIVETBENCH_LONG many."""
-
-from __future__ import annotations
+"""How much is tried: a sample, or with RIVETBENCH_LONG all of it."""
 
 import os
 
+ASKED = int(os.environ.get("RIVETBENCH_LONG") or 0)
+
 
 def draws(short: int, long: int) -> int:
-    """`long` if RIVETBENCH_LONG is 1, its value if it is larger, `short` if it is not set."""
-    asked = int(os.environ.get("RIVETBENCH_LONG") or 0)
-    return {0: short, 1: long}.get(asked, asked)
+    """Of a fuzzer: `long` if RIVETBENCH_LONG is 1, its value if it is larger, `short` if it is not set."""
+    return {0: short, 1: long}.get(ASKED, ASKED)
+
+
+def seeds(short: int, long: int) -> range:
+    """Of a parametrised test."""
+    return range(long if ASKED else short)

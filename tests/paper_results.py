@@ -1,7 +1,5 @@
 """Made-up results of the suite `paper`, as the paper would have it unless a test changes them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

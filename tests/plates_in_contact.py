@@ -4,8 +4,6 @@ Refined are the plates, the contacts and the initial gap; the forces stay what t
 that both codes go to the same limit.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from dataclasses import dataclass
@@ -39,7 +37,7 @@ class Found:
     gaps: Array
     reactions: Array
 
-    def apart(self, other: Found) -> tuple[float, float]:
+    def apart(self, other: "Found") -> tuple[float, float]:
         """The largest difference of gaps and of reactions, over the largest here."""
         pairs = ((self.gaps, other.gaps), (self.reactions, other.reactions))
         of_gaps, of_reactions = (float(abs(a - b).max() / abs(a).max()) for a, b in pairs)
@@ -111,11 +109,9 @@ def question(name: str) -> Question:
     """Of a scene by its name, or the first one of a document, docs/NAME.md."""
     if name.endswith(".md"):
         table = re.search(r"```toml\n(.*?)```", (DOCS / Path(name).name).read_text("utf-8"), re.DOTALL)
-        assert table is not None
         scene = scene_of(tomllib.loads(table[1]))
     else:
         scene = read_scene(name)
-    assert isinstance(scene, JointScene)
     return Question(scene)
 
 

@@ -1,7 +1,5 @@
 """How far from the exact answer a solver that calls it solved may be."""
 
-from __future__ import annotations
-
 import numpy as np
 from exact_draws import ExactLoad
 from solving import TOLERANCES

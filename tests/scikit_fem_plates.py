@@ -6,8 +6,6 @@ for the plates' own degrees of freedom u, nothing condensed; e evaluates a defle
 not be a vertex. Of this project nothing is used but the numbers of a joint, not what they are made into.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import clarabel

@@ -3,8 +3,6 @@
 min ½λᵀQλ − pᵀλ, λ ≥ 0 is min ‖Uλ − U⁻ᵀp‖, λ ≥ 0 with Q = UᵀU.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as sla
 import scipy.optimize

@@ -1,7 +1,5 @@
 """Every solver of the registry in each of its forms, and how far from the answer it may end."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from harness.solving.session import SolverSession

@@ -1,7 +1,5 @@
 """Random sparse matrices whose inverses and eigenvalues are those of their dense copies."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 

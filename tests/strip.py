@@ -1,7 +1,5 @@
 """A strip on a rigid tool as a scene file: 45 contacts, a random gap, three fasteners, a pressure."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 STRIP = """

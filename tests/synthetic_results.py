@@ -1,7 +1,5 @@
 """Made-up results directories for the tests of the report. Nothing in them was ever measured."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -42,7 +42,7 @@ def export(
     \b
     Examples:
       python -m harness export 4386/0107 --format npz --out joint.npz
-      python -m harness export gallery/three-part-stack --format qpsolvers --out stack.npz
+      python -m harness export gallery/three-part-stack --format op4 --out stack.op4
       python -m harness export scaling/1170 --form dual --with-reference --out problem
       python -m harness export 4386/0107 4386/1471 --form primal --with-reference --format npz --out problems
 
@@ -77,9 +77,9 @@ def import_(
 ) -> None:
     """Read K, A, f, g from other programs' files, check them, and write one .npz for `run` and `solve`.
 
-    Matrix Market and Abaqus matrix text (.mtx) hold one matrix, named by the file or by NAME=; .npz (also
-    of qpsolvers), Nastran .op4 and DMIG (.pch, .bdf) name theirs. K is checked for symmetry, definiteness and
-    apparent precision.
+    Matrix Market and Abaqus matrix text (.mtx) hold one matrix, named by the file or by NAME=; .npz,
+    Nastran .op4 and DMIG (.pch, .bdf) name theirs. K is checked for symmetry, definiteness and apparent
+    precision.
 
     \b
     Examples:

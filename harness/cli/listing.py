@@ -51,6 +51,6 @@ def _suites() -> Table:
 
 def _formats() -> Table:
     table = Table("format", "what is written")
-    for name in formats.names():
-        table.add_row(name, formats.description(name))
+    for name, each in formats.FORMATS.items():
+        table.add_row(name, each.description)
     return table

@@ -18,7 +18,7 @@ from problems.forms.assembly import LoadCase
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
 from problems.input.digits import DOUBLE
-from problems.input.user_matrices import checked
+from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import MatricesScene
 from problems.scene import read_scene
 
@@ -32,7 +32,7 @@ def places(sources: list[str], out: Path, format: str) -> list[tuple[str, Path]]
     """
     if len(sources) == 1:
         return [(sources[0], out)]
-    suffix = formats.suffix(format) if format in formats.names() else ""
+    suffix = formats.FORMATS[format].suffix if format in formats.FORMATS else ""
     found: dict[Path, str] = {}
     for source in sources:
         path = out / (read_scene(source).name.replace("/", "_") + suffix)
@@ -44,14 +44,16 @@ def places(sources: list[str], out: Path, format: str) -> list[tuple[str, Path]]
 
 def export(source: str, format: str, out: Path, console: Console) -> None:
     """Write K, A, f, g of a scene in a format of problems.formats. Raises InputError."""
-    if format not in formats.names():
-        raise InputError.one("--format", "format", format, f"one of {', '.join(formats.names())}")
+    if format not in formats.FORMATS:
+        raise InputError.one("--format", "format", format, f"one of {', '.join(formats.FORMATS)}")
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
     with into_place(out, [Path(source), *own]) as new:
         data = prepared(scene)
-        formats.write(format, new, matrices(data, load_case(scene)))
-    console.print(f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.description(format)}.")
+        formats.FORMATS[format].write(new, matrices(data, load_case(scene)))
+    console.print(
+        f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.FORMATS[format].description}."
+    )
 
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:
@@ -73,7 +75,7 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     with into_place(out, [path for _, path in given]) as new:
         data, origin = _read_all(given)
         checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)
-        formats.write("npz", new, data | {name: sp.csr_array(data[name]) for name in "KA"})
+        formats.FORMATS["npz"].write(new, data | {name: sp.csr_array(data[name]) for name in "KA"})
         used = _refuse_unusable(new, origin)
     _print_facts(out, used, console)
 
@@ -92,7 +94,7 @@ def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Pa
             if name:
                 found = {name: _named(found, name, path)}
             for key in found:
-                if key not in formats.NAMES:
+                if key not in NAMES:
                     allowed = "K, A, f, g or nodes; say K=FILE where the file has another name"
                     faults.append(Fault(str(path), "matrix", key, allowed))
                 elif key in of_rank:
@@ -104,7 +106,7 @@ def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Pa
             of_rank |= dict.fromkeys(found, path)
         origin |= of_rank
     for name, matrix, axis in (("f", "K", 0), ("g", "A", 1)):
-        if name not in data and matrix in data and formats.omits_zeros(origin[matrix]):
+        if name not in data and matrix in data and formats.format_of(origin[matrix]).omits_zeros:
             data[name], origin[name] = np.zeros(data[matrix].shape[axis]), origin[matrix]
     files = ", ".join(str(path) for _, path in given)
     faults += [Fault(files, name, None, "is in none of the files") for name in "KAfg" if name not in data]

@@ -24,7 +24,7 @@ from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import reference_problem
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.formats import mtx_format
+from problems.formats import text
 from problems.forms.names import FORMS, Form
 from problems.forms.problem import in_form
 from problems.input import sparse_npz
@@ -105,5 +105,5 @@ def _write_mtx(path: Path, program: Program) -> None:
     path.mkdir()
     for name, M in program.arrays.items():
         matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
-        mtx_format.write_one(path / f"{name}.mtx", matrix, "general")
+        text.write_one(path / f"{name}.mtx", matrix, "general")
     (path / "about.json").write_text(json.dumps(program.about, indent=1) + "\n", "utf-8")

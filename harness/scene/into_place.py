@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
+from harness.results.records import replace_text, to_line
 from problems.errors import InputError
 from problems.input.bounded import resolved
+
+RECORD = "solution.json"  # of an answer
 
 
 @contextmanager
 def into_place(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     """A path beside `out` to write a file or a folder to; at the end of the block it moves to `out`.
 
-    Files of the same names are replaced; whatever the block raises, nothing has changed. Raises InputError if
-    `out` is no regular file or folder, is of the other kind, or is one of the inputs.
+    Files of the same names are replaced, and those that an older answer left (see `list_files`) removed;
+    whatever the block raises, nothing has changed. Raises InputError if `out` is no regular file or folder,
+    is of the other kind, or is one of the inputs.
     """
     _check([out], inputs)
     target = resolved(out)
@@ -30,10 +36,28 @@ def into_place(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
         if new.is_dir():
             _check([out / path.name for path in new.iterdir()], inputs)
             target.mkdir(exist_ok=True)
+            for path in _listed(target):
+                path.unlink(missing_ok=True)
             for path in new.iterdir():
                 path.replace(target / path.name)
         else:
             new.replace(target)
+
+
+def list_files(folder: Path, record: dict[str, Any]) -> None:
+    """Write the record into folder/solution.json, with the names of all files there under `files`."""
+    path = folder / RECORD
+    names = sorted({RECORD, *(each.name for each in folder.iterdir())})
+    replace_text(path, to_line(record | {"files": names}) + "\n")
+
+
+def _listed(folder: Path) -> set[Path]:
+    """The files that its record names; none, if there is none to be read."""
+    try:
+        names = json.loads((folder / RECORD).read_text("utf-8"))["files"]
+        return {folder / name for name in names if Path(name).name == name}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
 
 
 def _check(targets: Sequence[Path], inputs: Sequence[Path]) -> None:

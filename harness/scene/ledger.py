@@ -1,11 +1,9 @@
-"""What each effect of a scene adds, measured one by one: stiffness, load, gap or contacts, time, memory."""
+"""What each effect of a scene adds, measured one by one: stiffness, load, gap or contacts, and its time."""
 
 from __future__ import annotations
 
 import time
-import tracemalloc
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +13,7 @@ from problems.build import load_case
 from problems.forms.assembly import Vector
 from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect, effect_kinds
 from problems.model.joint import Joint
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 
 BALANCE = 1e-9  # a sum smaller than this, relative to its terms, is rounding
@@ -23,33 +21,12 @@ BALANCE = 1e-9  # a sum smaller than this, relative to its terms, is rounding
 
 @dataclass(frozen=True)
 class Entry:
-    """One effect and one thing that it adds; seconds and peak MiB, None if nothing was computed."""
+    """One effect and one thing that it adds; seconds: None if nothing was computed."""
 
     effect: str
     adds: str
     amount: str
     seconds: float | None
-    mib: float | None
-
-
-@dataclass
-class Cost:
-    seconds: float = 0.0
-    mib: float = 0.0
-
-
-@contextmanager
-def measured() -> Iterator[Cost]:
-    """The time of a `with` block and the peak of its allocated memory."""
-    cost = Cost()
-    tracemalloc.start()
-    start = time.perf_counter()
-    try:
-        yield cost
-    finally:
-        cost.seconds = time.perf_counter() - start
-        cost.mib = tracemalloc.get_traced_memory()[1] / 2**20
-        tracemalloc.stop()
 
 
 def ledger(scene: Scene, built: bool, junction: NDArray[np.intp] | None = None) -> list[Entry]:
@@ -74,30 +51,33 @@ def _entries(
     joint = scene.joint
     name = " ".join(filter(None, [effect.kind, getattr(effect, "part", None)]))
     for first, second in effect.contacts:
-        yield Entry(name, "constraints", f"{joint.node_count} contacts of {first} and {second}", None, None)
+        yield Entry(name, "constraints", f"{joint.node_count} contacts of {first} and {second}", None)
     if isinstance(effect, StiffnessEffect):
         if not built:
-            yield Entry(name, "stiffness", "in the assembly from the cache", None, None)
+            yield Entry(name, "stiffness", "in the assembly from the cache", None)
             return
         (part,) = (part for part in joint.part if part.name == effect.part)
-        with measured() as cost:
-            term = effect.stiffness(joint.plate(part))
-        yield Entry(name, "stiffness", f"{term.nnz} entries of the plate's K", cost.seconds, cost.mib)
+        start = time.perf_counter()
+        term = effect.stiffness(joint.plate(part))
+        yield Entry(name, "stiffness", f"{term.nnz} entries of the plate's K", time.perf_counter() - start)
         return
     if isinstance(effect, TieEffect):
-        with measured() as cost:
-            T, k = effect.springs(joint)
-        yield Entry(name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", cost.seconds, cost.mib)
-    with measured() as cost:
-        load = load_case(scene, "dual" if junction is None else "sparse", [effect])
+        start = time.perf_counter()
+        T, k = effect.springs(joint)
+        yield Entry(
+            name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", time.perf_counter() - start
+        )
+    start = time.perf_counter()
+    load = load_case(scene, "dual" if junction is None else "sparse", [effect])
+    seconds = time.perf_counter() - start
     if isinstance(effect, GapEffect):
-        yield Entry(name, "gap", _gap(load.g), cost.seconds, cost.mib)
+        yield Entry(name, "gap", _gap(load.g), seconds)
     elif junction is not None and isinstance(effect, PartLoadEffect):
         amount = f"on {np.count_nonzero(load.f)} unknowns of {effect.part}"
-        yield Entry(name, "load", amount, cost.seconds, cost.mib)
+        yield Entry(name, "load", amount, seconds)
     else:
         f = load.f if junction is None else load.f[junction]
-        yield Entry(name, "load", _forces(f, joint), cost.seconds, cost.mib)
+        yield Entry(name, "load", _forces(f, joint), seconds)
 
 
 def _gap(g: Vector) -> str:

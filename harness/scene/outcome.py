@@ -39,10 +39,10 @@ def save(
 
 def show(record: dict[str, Any], entries: list[Entry], known: Reference, console: Console) -> None:
     """Print the ledger, what was skipped, and the answer with its bound."""
-    table = Table("effect", "adds", "what", "s", "MiB", title="What each effect added")
+    table = Table("effect", "adds", "what", "s", title="What each effect added")
     for entry in entries:
-        cost = ("–", "–") if entry.seconds is None else (f"{entry.seconds:.3f}", f"{entry.mib:.1f}")
-        table.add_row(entry.effect, entry.adds, entry.amount, *cost)
+        seconds = "–" if entry.seconds is None else f"{entry.seconds:.3f}"
+        table.add_row(entry.effect, entry.adds, entry.amount, seconds)
     if entries:
         console.print(table)
     if record["digits"]:

@@ -1,5 +1,6 @@
 """One scene from its file to an answer on disk; the report draws it from there.
 
+DIR is written beside its place and moved there when it is whole; what an older answer left is removed.
 DIR/solution.npz holds the arrays, DIR/solution.json what was done: the steps and their time, the ledger of
 the effects, what was skipped, and the error bound of the answer.
 """
@@ -23,13 +24,14 @@ from harness.verification.gap_error import GapError
 from problems.errors import InputError
 from problems.forms.names import Form
 from problems.model.effect import TieEffect
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene
 from problems.scene import read_scene
 
 from . import allowed_gap, solution
 from .fastener_forces import fastener_forces
 from .few_digits import digits_sentence
+from .into_place import into_place, list_files
 from .layout import layout
 from .ledger import Entry, ledger, not_called_for
 from .outcome import save, show
@@ -70,20 +72,21 @@ def solve(
     assembly, load, x = found.problem.prepared.assembly, found.problem.load, found.unknowns
     condensed = any(text.startswith("condensing") for text in built)
     entries = ledger(scene, condensed or found.problem.form == "sparse", assembly.junction)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError.one("--out", "directory", str(out), f"cannot be written: {error}") from error
     record = _record(found, entries, list(_skipped(found, list(built), solver)))
     if allow_gap_mm is not None:
         uncertainty = GapError.of(assembly)(load.g, x, found.error_bound_mm)
         record["allowed_gap"] = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
-    save(out, record, assembly, load, x, found.lam)
-    with console.status(Text("pictures and files")):
-        from report.writers.solution import write  # slow to import: not before the answer is saved
-
-        written = write(out)
     show(record, entries, found.problem.reference, console)
+    try:
+        with console.status(Text("pictures and files")), into_place(out, [Path(source)]) as new:
+            from report.writers.solution import write  # slow to import: not before the answer is shown
+
+            new.mkdir()
+            save(new, record, assembly, load, x, found.lam)
+            written = out / write(new).name
+            list_files(new, record)
+    except OSError as error:
+        raise InputError.one("--out", "directory", str(out), f"cannot be written: {error}") from error
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
     code = DONE if record["verdict"] == "within" else FAILED
     if allow_gap_mm is not None:

@@ -60,8 +60,10 @@ def refuse_other_contacts(first: str, second: str) -> None:
             allowed = f"the contacts of {first}, at least one, at the same nodes"
             raise Incomparable.one(second, "contacts", contacts, allowed)
         return
-    counts = [prepared(scene).assembly.m for scene in (one, other)]
-    if counts[0] != counts[1] or not counts[0]:
-        raise Incomparable.one(
-            second, "contacts", counts[1], f"as many as {first} has, {counts[0]}, at least one"
-        )
+    wanted, found = (prepared(scene).assembly.A for scene in (one, other))
+    if wanted.shape[1] != found.shape[1] or not wanted.shape[1]:
+        allowed = f"as many as {first} has, {wanted.shape[1]}, at least one"
+        raise Incomparable.one(second, "contacts", found.shape[1], allowed)
+    if wanted.shape != found.shape or (wanted != found).nnz:
+        rows, others = (f"A with {A.shape[0]} rows and {A.nnz} entries" for A in (wanted, found))
+        raise Incomparable.one(second, "contacts", others, f"those of {first}, {rows}, entry by entry")

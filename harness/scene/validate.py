@@ -13,7 +13,7 @@ from harness.results.machine import physical_memory_mib
 from problems.build import model_of, prepared
 from problems.forms.names import FORMS
 from problems.model.effect import TieEffect
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 

@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix, stacked
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector, stacked
 from problems.forms.prepared import Prepared
+from problems.stiffness.rounding import gamma
 
 from .definite import independence
-from .enclosure import SAFE, DoubleDouble, Enclosure, Panel, Residual, row_panels
+from .enclosure import SAFE, DoubleDouble, Enclosure, Panel, Residual, exponent, length, row_panels
 
 
 @dataclass(frozen=True)
@@ -57,12 +58,14 @@ class Balanced:
         """K'⁻¹b."""
         return self.assembly.K.solve(b / self.D) / self.D
 
-    def residuals(self, load: LoadCase, x: DoubleDouble, lam: DoubleDouble) -> tuple[Enclosure, Enclosure]:
-        """r = f' − K'x − A'λ (n, k) and s = g' − A'ᵀx (m, k)."""
+    def residuals(
+        self, load: LoadCase, x: DoubleDouble, lam: DoubleDouble, sharp: bool = True
+    ) -> tuple[Enclosure, Enclosure]:
+        """r = f' − K'x − A'λ (n, k) and s = g' − A'ᵀx (m, k). sharp : see `subtract_product`."""
         f = np.broadcast_to(load.f, x.hi.shape)
         total = Residual(np.concatenate([f, load.g]))
         total.subtract_product(row_panels(self.A), _longest(self.A), lam)
-        total.subtract_product(self._panels(), self._longest, x)
+        total.subtract_product(self._panels(), self._longest, x, sharp)
         return self._parts(total)
 
     def moved(self, r: Enclosure, s: Enclosure, dx: Matrix, dlam: Matrix) -> tuple[Enclosure, Enclosure]:
@@ -81,6 +84,17 @@ class Balanced:
         """‖K'‖_∞ or more."""
         D = self.D[:, 0]
         return SAFE * float((self.assembly.K.absolute_sums(D) * D).max(initial=0.0))
+
+    def energy(self, z: Matrix) -> Vector:
+        """‖z‖_K' (k,) or more, for z (n, k).
+
+        |fl(zᵀK'z) − zᵀK'z| ≤ γ_2n |z|ᵀ|K'||z| ≤ γ_2n ‖K'‖_∞ ‖z‖².
+        """
+        scale = np.exp2(exponent(abs(z).max(axis=0, initial=0.0)))
+        w = z / scale  # whose squares do not underflow
+        found = np.maximum((w * (self.D * self.assembly.K.multiply(self.D * w))).sum(axis=0), 0.0)
+        found += gamma(2 * len(z)) * self.stiffest * length(w) ** 2
+        return SAFE * scale * np.sqrt(found)
 
     @cached_property
     def sigma2(self) -> float:

@@ -24,10 +24,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
-from problems.stiffness.rounding import U, gamma
+from problems.stiffness.rounding import SAFE, U, gamma
 
 ETA = 2.0**-1074  # the smallest positive number
-SAFE = 1.01  # for the rounding of the bounds themselves
 TERMS = 5  # of a row of a residual, or fewer: two exact ones of each product, and one
 MORE = 12  # roundings of what is not exact in a product beside those of its sums, or fewer
 ENTRIES_AT_A_TIME = 2**15  # of M: they and what is computed from them stay in the processor's cache
@@ -99,8 +98,13 @@ class Residual:
         # A value in other units may be rounded to a multiple of η.
         self.error = ETA * (value != 0) if error is None else np.array(error)
 
-    def subtract_product(self, panels: Iterable[Panel], longest: int, x: DoubleDouble) -> None:
-        """Mx, x (columns of M, k). panels : of M, no row with more entries."""
+    def subtract_product(
+        self, panels: Iterable[Panel], longest: int, x: DoubleDouble, sharp: bool = True
+    ) -> None:
+        """Mx, x (columns of M, k). panels : of M, no row with more entries.
+
+        sharp : else only M₁x₁ is exact, and (M − M₁)x₁ and M(x − x₁) are rounded, 2⁻ᵇ times smaller.
+        """
         bits = (53 - int(np.ceil(np.log2(2 * longest)))) // 2 + 1
         unit = _units(x.hi)  # M diag(unit) and x / unit have no rounding
         hi, lo = x.hi / unit[:, None], x.lo / unit[:, None]
@@ -113,19 +117,27 @@ class Residual:
         # half of x is left out: a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, where u|Σ| covers γ²|Σ|.
         rounding, again = gamma(longest + MORE), 4 * gamma(TERMS) ** 2
         of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
+        if not sharp:  # γ² is within the 1 % of γ 2⁻ᵇ
+            of_parts = rounding * most_after, rounding * most, 0 * most
         of_each = SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])
         by_first, by_second, k = np.hstack([x1, x2, x3]), np.hstack([x1, after]), x1.shape[1]
         for rows, columns, panel in panels:
             entries, count, above, of_row = _scaled(panel, unit[columns])
-            M1, rest = cut(entries, of_row(above), bits)
-            M2, M3 = cut(rest, of_row(above - bits), bits)
-            first = _with(panel, M1) @ by_first[columns]
-            small, rest = first[:, k : 2 * k], first[:, 2 * k :]
-            if M2.any():
-                second = _with(panel, M2) @ by_second[columns]
-                small, rest = small + second[:, :k], rest + second[:, k:]
-            if M3.any():
-                rest = rest + _with(panel, M3) @ hi[columns]
+            M1, beyond = cut(entries, of_row(above), bits)
+            if sharp:
+                M2, M3 = cut(beyond, of_row(above - bits), bits)
+                first = _with(panel, M1) @ by_first[columns]
+                small, rest = first[:, k : 2 * k], first[:, 2 * k :]
+                if M2.any():
+                    second = _with(panel, M2) @ by_second[columns]
+                    small, rest = small + second[:, :k], rest + second[:, k:]
+                if M3.any():
+                    rest = rest + _with(panel, M3) @ hi[columns]
+            else:
+                first, small = _with(panel, M1) @ x1[columns], 0.0
+                rest = _with(panel, entries) @ after[columns]
+                if beyond.any():
+                    rest = rest + _with(panel, beyond) @ x1[columns]
             value, lost = two_sum(self.hi[rows], -first[:, :k])
             self.hi[rows], error = two_sum(value, -small)
             self.lo[rows] += lost + (error - rest)

@@ -10,6 +10,12 @@ I − P is nonexpansive. So, in balanced units (see `balanced`), with κ ≤ λm
 
     |x_i − x*_i| ≤ D_i/√κ ( ‖r‖₂/√κ + ‖δ‖₂ √(‖K‖_∞/σ²) ).
 
+Any other d with Aᵀd = δ does as well: d = z + A(AᵀA)⁻¹(δ − Aᵀz) is shorter for z ≈ K⁻¹AQ⁻¹δ. And D_i/√κ may
+be √(K⁻¹)_ii. So a bound that is sharp enough for many load cases takes z = K⁻¹AMδ, M ≈ Q⁻¹, instead of a
+refinement:
+
+    |x_i − x*_i| ≤ √(K⁻¹)_ii ( ‖r‖₂/√κ + ‖z‖_K + ‖δ − Aᵀz‖₂ √(‖K‖_∞/σ²) ).
+
 Nothing is assumed about the contact set: weakly active contacts need no special treatment, and it does not
 matter where λ came from. The bound is made small by a refinement of x and λ_C in twice the working precision:
 
@@ -21,7 +27,7 @@ cases are columns, left out when done.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,6 +36,7 @@ from numpy.typing import NDArray
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
+from problems.stiffness.rounding import gamma
 
 from .balanced import Balanced
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length
@@ -61,15 +68,33 @@ class Proven:
 
 
 class Proof:
-    """What the load cases of an assembly share. kappa : κ ≤ λmin(DKD), in balanced units."""
+    """What the load cases of an assembly share.
 
-    def __init__(self, prepared: Prepared, kappa: float) -> None:
-        self.balanced, self.kappa = Balanced.of(prepared), kappa
+    kappa : κ ≤ λmin(DKD), in balanced units. remembered : the figure of that name, or what makes it.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        kappa: float,
+        remembered: Callable[[str, Callable[[], float]], float] = lambda name, make: make(),
+    ) -> None:
+        self.balanced, self.kappa, self.remembered = Balanced.of(prepared), kappa, remembered
 
     @cached_property
     def near(self) -> Near:
         """Made when an answer is first refined."""
         return Near.of(self.balanced.prepared, self.balanced.R[:, 0])
+
+    @cached_property
+    def compliance(self) -> float:
+        """max (K⁻¹)_ii or more, mm/N; infinite without M or where no bound is cheap."""
+        return np.inf if self.near.M is None else self.remembered("compliance", self._largest_compliance)
+
+    def _largest_compliance(self) -> float:
+        K, D = self.balanced.assembly.K, self.balanced.D[:, 0]
+        pairs = zip(K.blocks, K.slices, strict=True)
+        return max(block.largest_compliance(D[rows], self.kappa) for block, rows in pairs)
 
     @cached_property
     def spread(self) -> float:
@@ -95,10 +120,11 @@ class Proof:
         lam = np.maximum(np.column_stack(lams), 0.0) / units.R
         x = units.solve(load.f - units.A @ lam) if xs is None else np.column_stack(list(xs)) / units.D
         x2, lam2 = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
-        r, s = units.residuals(load, x2, lam2)
+        quick = enough_mm > 0 and np.isfinite(self.compliance)
+        r, s = units.residuals(load, x2, lam2, sharp=not quick)
         found = [_Found(x2, lam2, column) for column in range(len(loads))]
         left = np.arange(len(loads))  # the load cases of the columns
-        bounds, rounding = self.bounds(x2, lam2, r, s)
+        bounds, rounding = self.bounds(x2, lam2, r, s, translated=quick)
         for step in range(MAX_PASSES):
             enough = np.maximum(enough_mm, AT_ROUNDING * rounding)
             going = np.zeros(len(left), dtype=bool)
@@ -123,19 +149,37 @@ class Proof:
                 bounds, rounding = self.bounds(x2, lam2, r, s)
         return [self._proven(each) for each in found]
 
-    def bounds(self, x: DoubleDouble, lam: DoubleDouble, r: Enclosure, s: Enclosure) -> tuple[Vector, Vector]:
-        """(k,) mm of each column, and what of it is due to the rounding of x to float64."""
+    def bounds(
+        self, x: DoubleDouble, lam: DoubleDouble, r: Enclosure, s: Enclosure, translated: bool = False
+    ) -> tuple[Vector, Vector]:
+        """(k,) mm of each column, and what of it is due to the rounding of x to float64.
+
+        translated : by z, with a solution with K.
+        """
         units, asked = self.balanced, self.balanced.assembly.at_junction
         pressing = lam.hi > 0
-        delta = np.where(pressing, abs(s.value), np.maximum(-s.value, 0.0))
-        delta = delta + s.error * (pressing | (s.value < s.error))
-        force = length(abs(r.value) + r.error)
-        stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if delta.any() else 0.0
-        error = SAFE * (force / np.sqrt(self.kappa) + length(delta) * stretch) / np.sqrt(self.kappa)
+        delta = np.where(pressing, -s.value, np.maximum(-s.value, 0.0))
+        uncertain = s.error * (pressing | (s.value < s.error))
         D, lo = asked(units.D), abs(asked(x.lo))
-        bounds = SAFE * (D * (error + lo)).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
+        reach, distance = D / np.sqrt(self.kappa), np.zeros(x.hi.shape[1])
+        if translated:
+            reach = np.minimum(reach, np.sqrt(self.compliance))
+            delta, uncertain, distance = self._translated(delta, uncertain)
+        missed, force = length(abs(delta) + uncertain), length(abs(r.value) + r.error)
+        stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0
+        error = SAFE * (force / np.sqrt(self.kappa) + distance + missed * stretch)
+        bounds = SAFE * (reach * error + D * lo).max(axis=0, initial=0.0) + ETA * x.hi.any(axis=0)
         valid = np.isfinite(bounds) & ~(lam.hi < 0).any(axis=0)
         return np.where(valid, bounds, np.inf), (D * lo).max(axis=0, initial=0.0)
+
+    def _translated(self, delta: Matrix, uncertain: Matrix) -> tuple[Matrix, Matrix, Vector]:
+        """δ − Aᵀz (m, k), how uncertain it is, and ‖z‖_K or more (k,)."""
+        units = self.balanced
+        z = units.solve(units.A @ np.column_stack([self.near.product(column) for column in delta.T]))
+        left = delta - units.At @ z
+        roundings = int(np.diff(units.At.indptr).max(initial=0)) + 1
+        rounding = gamma(roundings) * (abs(delta) + abs(units.At) @ abs(z)) + roundings * ETA * z.any(axis=0)
+        return left, uncertain + SAFE * rounding, units.energy(z)
 
     def _corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float) -> tuple[Matrix, Matrix]:
         """dx and dλ. r, s, λ : as they are, a column for each load case."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -20,11 +20,8 @@ class Clamps(Positions, ContactEffect):
     node. `between` names one contact; by default a clamp grips all of them.
     """
 
-    units: ClassVar = {"clamping_force": "N", "radius": "mm", "points": "mm", "edge": "mm"}
-
-    kind: Literal["clamps"]
-    clamping_force: Positive
-    radius: Positive = 20.0
+    clamping_force: Annotated[Positive, "N"]
+    radius: Annotated[Positive, "mm"] = 20.0
 
     def force(self, joint: Joint) -> Vector:
         nodal = np.zeros(joint.node_count)

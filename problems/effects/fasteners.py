@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -21,10 +21,7 @@ class Fasteners(Positions, ContactEffect):
     contact; by default a fastener goes through all of them.
     """
 
-    units: ClassVar = {"preload": "N", "points": "mm", "edge": "mm"}
-
-    kind: Literal["fasteners"]
-    preload: Positive
+    preload: Annotated[Positive, "N"]
 
     def force(self, joint: Joint) -> Vector:
         nodal = np.zeros(joint.node_count)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -19,8 +19,8 @@ SHIFT = 1e-10
 class RandomField(Table):
     """Gaussian field: standard deviation and correlation length in mm, and the seed."""
 
-    sd: Positive
-    correlation_length: Positive
+    sd: Annotated[Positive, "mm"]
+    correlation_length: Annotated[Positive, "mm"]
     seed: Seed
 
 
@@ -33,35 +33,29 @@ class InitialGap(ContactEffect, GapEffect):
     `between` names one contact; by default all of them get the gap, each with its own random field.
     """
 
-    units: ClassVar = {"mean": "mm", "sd": "mm", "correlation_length": "mm"}
-
-    kind: Literal["initial_gap"]
-    mean: Finite
+    mean: Annotated[Finite, "mm"]
     random: RandomField | None = None
 
     def gap(self, joint: Joint) -> Vector:
         g = at_contacts(self.mean, self.pairs(joint), joint)
         if self.random:
             rng = np.random.default_rng(self.random.seed)
-            Lx, Ly = (_square_root(grid, self.random.correlation_length) for grid in (joint.x, joint.y))
+            length = self.random.correlation_length
+            Lx, Ly = (_square_root(grid.tobytes(), length) for grid in (joint.x, joint.y))
             for pair in self.pairs(joint):
                 Z = rng.standard_normal((len(joint.y), len(joint.x)))
                 g[contacts_of(pair, joint)] += self.random.sd * (Ly @ Z @ Lx).ravel()
         return g
 
 
-def _square_root(grid: Vector, correlation_length: float) -> Matrix:
+@lru_cache(maxsize=8)  # a series draws field after field on one grid
+def _square_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     """Symmetric square root of C = exp(−(x_i − x_j)² / 2ℓ²): unique, so that no sign depends on the machine.
 
     √w of an eigenvalue w within rounding of 0 would differ by some 1e-8 from one processor, or number of
     threads, to the next, and the gaps as much. w / √(w + s) differs by rounding / √s; its square is w to
     within s = SHIFT · max w.
     """
-    return _cached_root(grid.tobytes(), correlation_length)
-
-
-@lru_cache(maxsize=8)  # a series draws field after field on one grid
-def _cached_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     grid = np.frombuffer(grid_bytes)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / correlation_length) ** 2)
     w, V = np.linalg.eigh(C)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,11 +24,8 @@ class InstalledFasteners(Positions, ContactEffect, TieEffect):
     junction node. `between` names one contact; by default a fastener ties all that it crosses.
     """
 
-    units: ClassVar = {"stiffness": "N/mm", "approach": "mm", "points": "mm", "edge": "mm"}
-
-    kind: Literal["installed_fasteners"]
-    stiffness: Positive = 1e5
-    approach: Finite = 0.0
+    stiffness: Annotated[Positive, "N/mm"] = 1e5
+    approach: Annotated[Finite, "mm"] = 0.0
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from super().faults(joint)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import scipy.sparse as sp
 
@@ -21,12 +21,9 @@ class LocalThickness(StiffnessEffect):
     The mid-plane stays where it is. self_weight and thermal_bending take it into account.
     """
 
-    units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
-
-    kind: Literal["local_thickness"]
-    thickness: Positive
-    x: tuple[Finite, Finite]
-    y: tuple[Finite, Finite]
+    thickness: Annotated[Positive, "mm"]
+    x: Annotated[tuple[Finite, Finite], "mm"]
+    y: Annotated[tuple[Finite, Finite], "mm"]
 
     @property
     def pad(self) -> tuple[float, Range, Range]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -23,10 +23,7 @@ class MeasuredGap(ContactEffect, GapEffect):
     Points may lie outside the junction. `between` names one contact; by default all of them get the gap.
     """
 
-    units: ClassVar = {"points": "mm"}
-
-    kind: Literal["measured_gap"]
-    points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3)]
+    points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3), "mm"]
 
     @model_validator(mode="before")
     @classmethod

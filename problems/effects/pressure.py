@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
 
@@ -19,8 +19,7 @@ class Pressure(PartEffect, ForceEffect):
     pushes the part in the direction of positive displacements.
     """
 
-    kind: Literal["pressure"]
-    value: Finite
+    value: Annotated[Finite, "N/mm²"]
 
     def force(self, joint: Joint) -> Vector:
         f = np.zeros(joint.size[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated
 
 import scipy.sparse as sp
 from pydantic import Field
@@ -16,10 +16,9 @@ from problems.model.effect import StiffnessEffect
 class Ribs(StiffnessEffect):
     """K += Σ EI ∫ w_xx² dx + GJ ∫ w_xy² dx at each y of `lines`; mm and mm⁴."""
 
-    kind: Literal["ribs"]
-    lines: Annotated[tuple[Finite, ...], Field(min_length=1)]
-    I: Positive  # noqa: E741
-    J: NotNegative = 0.0
+    lines: Annotated[tuple[Finite, ...], Field(min_length=1), "mm"]
+    I: Annotated[Positive, "mm⁴"]  # noqa: E741
+    J: Annotated[NotNegative, "mm⁴"] = 0.0
 
     def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
         south, north = plate.y[[0, -1]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import ClassVar, Literal
+from typing import Annotated
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
@@ -20,12 +20,9 @@ class RigidTool(PartEffect, GapEffect):
     crest = (x_0, y_0) in mm, by default the centre of the junction.
     """
 
-    units: ClassVar = {"distance": "mm", "curvature": "1/mm", "crest": "mm"}
-
-    kind: Literal["rigid_tool"]
-    distance: Finite = 0.0
-    curvature: tuple[Finite, Finite] = (0.0, 0.0)
-    crest: tuple[Finite, Finite] | None = None
+    distance: Annotated[Finite, "mm"] = 0.0
+    curvature: Annotated[tuple[Finite, Finite], "1/mm"] = (0.0, 0.0)
+    crest: Annotated[tuple[Finite, Finite] | None, "mm"] = None
 
     @property
     def contacts(self) -> tuple[Pair, ...]:

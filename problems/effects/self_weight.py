@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 
-from problems.fem.line_loads import line_loads
+from problems.fem.hermite import line_loads
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect, PartModel
 
 KG_PER_M3_TIMES_M_PER_S2 = 1e-9  # N/mm³
 
@@ -22,11 +21,8 @@ class SelfWeight(PartLoadEffect):
     the plate and its pads, not of stringers and ribs.
     """
 
-    units: ClassVar = {"density": "kg/m³", "gravity": "m/s²"}
-
-    kind: Literal["self_weight"]
-    density: Positive = 2700.0
-    gravity: Finite = 9.80665
+    density: Annotated[Positive, "kg/m³"] = 2700.0
+    gravity: Annotated[Finite, "m/s²"] = 9.80665
 
     def load(self, model: PartModel) -> Vector:
         weight = self.density * self.gravity * KG_PER_M3_TIMES_M_PER_S2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,9 @@ class Shims(ContactEffect, GapEffect):
     one contact; by default every contact gets a shim.
     """
 
-    units: ClassVar = {"thickness": "mm", "x": "mm", "y": "mm"}
-
-    kind: Literal["shims"]
-    thickness: Positive
-    x: tuple[Finite, Finite]
-    y: tuple[Finite, Finite]
+    thickness: Annotated[Positive, "mm"]
+    x: Annotated[tuple[Finite, Finite], "mm"]
+    y: Annotated[tuple[Finite, Finite], "mm"]
 
     def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
         yield from super().faults(joint)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,12 +19,11 @@ class Stringers(StiffnessEffect):
     pitch, start, stop in mm; I and J in mm⁴. E and G = E / 2(1 + ν) are the part's.
     """
 
-    kind: Literal["stringers"]
-    pitch: Positive
-    start: Finite
-    stop: Finite
-    I: Positive  # noqa: E741
-    J: NotNegative = 0.0
+    pitch: Annotated[Positive, "mm"]
+    start: Annotated[Finite, "mm"]
+    stop: Annotated[Finite, "mm"]
+    I: Annotated[Positive, "mm⁴"]  # noqa: E741
+    J: Annotated[NotNegative, "mm⁴"] = 0.0
 
     def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
         south, north = plate.y[[0, -1]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -12,8 +12,7 @@ from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.model.effect import Effect
 from problems.model.joint import Joint
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect, PartModel
 
 from .supports import Supports
 
@@ -24,11 +23,8 @@ class SupportShift(PartLoadEffect):
     The spring of a support is then unloaded at w = shift (mm) instead of w = 0.
     """
 
-    units: ClassVar = {"shift": "mm", "points": "mm"}
-
-    kind: Literal["support_shift"]
-    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1)]
-    shift: Finite
+    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), "mm"]
+    shift: Annotated[Finite, "mm"]
 
     def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
         def points(kind: type[SupportShift | Supports]) -> list[tuple[float, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated
 
 import scipy.sparse as sp
 from pydantic import Field
@@ -19,9 +19,8 @@ class Supports(StiffnessEffect):
     points in mm, on the part; stiffness in N/mm.
     """
 
-    kind: Literal["supports"]
-    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1)]
-    stiffness_per_point: Positive = 1e6
+    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), "mm"]
+    stiffness_per_point: Annotated[Positive, "N/mm"] = 1e6
 
     @property
     def held_points(self) -> tuple[tuple[float, float], ...]:

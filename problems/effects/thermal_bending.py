@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import Annotated
 
 import numpy as np
 
-from problems.fem.line_loads import line_loads
+from problems.fem.hermite import line_loads
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect, PartModel
 
 
 class ThermalBending(PartLoadEffect):
@@ -22,11 +21,8 @@ class ThermalBending(PartLoadEffect):
     w_xx = w_yy = −κ, without stress. Stringers and ribs stay at the mean temperature.
     """
 
-    units: ClassVar = {"difference": "K", "expansion": "1/K"}
-
-    kind: Literal["thermal_bending"]
-    difference: Finite
-    expansion: Positive = 23e-6
+    difference: Annotated[Finite, "K"]
+    expansion: Annotated[Positive, "1/K"] = 23e-6
 
     def load(self, model: PartModel) -> Vector:
         plate = model.plate

@@ -77,3 +77,10 @@ def evaluate(grid: Vector, at: float, derivative: int = 0) -> sp.csr_array:
     values = shape(np.array([(at - grid[element]) / h]), h, derivative)[:, 0]
     keep = np.flatnonzero(values)
     return sp.csr_array((values[keep], (np.zeros_like(keep), 2 * element + keep)), shape=(1, 2 * len(grid)))
+
+
+def line_loads(grid: Vector, start: float, stop: float) -> tuple[Vector, Vector]:
+    """∫φ and ∫φ'' over [start, stop], each (2N,): M and B applied to the function 1."""
+    line = line_matrices(grid, start, stop)
+    one = np.tile([1.0, 0.0], len(grid))
+    return line.M @ one, line.B @ one

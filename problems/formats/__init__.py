@@ -1,53 +1,87 @@
-"""File formats of K, A, f, g: one file NAME_format.py each, found by its name. It holds
+"""File formats of K, A, f, g, by name; libraries are imported when a file is read or written.
 
-    DESCRIPTION          what is written: a file, or a folder with one file per matrix
-    SUFFIXES             of the files that are read
-    write(path, data)
-    read(path)           the matrices of a file
-    accepts(path)        whether a file's content is of this format; only if another format shares a suffix
-    OMITS_ZEROS          True if f and g that are zero everywhere are not written; else it may be missing
-
-Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known. Libraries are
-imported when a file is read or written.
+Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from problems.errors import Fault, InputError
+from problems.errors import InputError
+from problems.input import sparse_npz
+from problems.input.stored_matrices import SMALL
+from problems.input.user_matrices import NAMES
+
+from . import nastran, text
 
 Data = dict[str, Any]
-NAMES = ("K", "A", "f", "g", "nodes")
+DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 
 
-def names() -> list[str]:
-    """The formats, by their files."""
-    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return [name.removesuffix("_format") for name in found if name.endswith("_format")]
+@dataclass(frozen=True)
+class Format:
+    """description : of what is written, a file or a folder of one per matrix. suffixes : of files to read.
+
+    read : the matrices of a file by their names in it; a single one by the file's stem. accepts : whether a
+    file is of this format, where another has its suffix. omits_zeros : f and g that are zero everywhere.
+    """
+
+    description: str
+    suffixes: tuple[str, ...]
+    write: Callable[[Path, Data], None]
+    read: Callable[[Path], Data]
+    accepts: Callable[[Path], bool] = lambda path: True
+    omits_zeros: bool = False
+
+    @property
+    def suffix(self) -> str:
+        """Of what it writes; "" if that is a folder."""
+        return "" if self.description.startswith("a folder") else self.suffixes[0]
 
 
-def description(name: str) -> str:
-    """What the format writes."""
-    return str(_module(name).DESCRIPTION)
+def _write_npz(path: Path, data: Data) -> None:
+    """The format that scenes open; K and A of a sparse problem as compressed columns."""
+    n = data["K"].shape[0]
+    if n <= SMALL or data["K"].nnz > DENSEST * n**2:
+        data = data | {name: data[name].toarray() for name in "KA"}
+    sparse_npz.write(path, data)
 
 
-def suffix(name: str) -> str:
-    """The suffix of what the format writes; "" if that is a folder."""
-    module = _module(name)
-    return "" if module.DESCRIPTION.startswith("a folder") else str(module.SUFFIXES[0])
-
-
-def write(name: str, path: Path, data: Data) -> None:
-    """Write data in the format of that name."""
-    _module(name).write(path, data)
+FORMATS = {
+    "abaqus": Format(
+        "a folder: K as Abaqus matrix text, the others as Matrix Market, bit for bit",
+        (".mtx",),
+        text.write_abaqus,
+        text.read_abaqus,
+        lambda path: not text.is_matrix_market(path),
+    ),
+    "dmig": Format(
+        "a file .pch (Nastran DMIG), 10 digits",
+        (".pch", ".bdf", ".nas", ".dat"),
+        nastran.write_dmig,
+        nastran.read_dmig,
+        omits_zeros=True,
+    ),
+    "mtx": Format(
+        "a folder of Matrix Market files, bit for bit",
+        (".mtx",),
+        text.write_matrix_market,
+        text.read_matrix_market,
+        text.is_matrix_market,
+    ),
+    "npz": Format(
+        "a file .npz, bit for bit", (".npz",), _write_npz, lambda path: sparse_npz.read(path, NAMES)
+    ),
+    "op4": Format(
+        "a file .op4 (Nastran OUTPUT4, binary), bit for bit", (".op4",), nastran.write_op4, nastran.read_op4
+    ),
+}
 
 
 def read(path: Path) -> Data:
@@ -58,44 +92,22 @@ def read(path: Path) -> Data:
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
     try:
-        return module_of(path).read(path)
+        found = format_of(path).read(path)
+        return {name: vector(M) if name in ("f", "g") else M for name, M in found.items()}
     except InputError:
         raise
     except Exception as error:  # of the libraries, which raise whatever a damaged file leads to
-        raise InputError.one(
-            path, "file", f"{type(error).__name__}: {error}", "a readable matrix file"
-        ) from error
+        said = f"{type(error).__name__}: {error}"
+        raise InputError.one(path, "file", said, "a readable matrix file") from error
 
 
-def omits_zeros(path: Path) -> bool:
-    """Whether an f or g that a readable file lacks may be zero."""
-    return getattr(module_of(path), "OMITS_ZEROS", False)
-
-
-def module_of(path: Path) -> ModuleType:
+def format_of(path: Path) -> Format:
     """The format of a file, from its suffix and, if that is ambiguous, its content."""
-    modules, suffix = [_module(name) for name in names()], path.suffix.lower()
-    alike = [module for module in modules if suffix in module.SUFFIXES]
-    for module in alike:
-        if len(alike) == 1 or module.accepts(path):
-            return module
-    allowed = ", ".join(dict.fromkeys(known for module in modules for known in module.SUFFIXES))
+    for each in FORMATS.values():
+        if path.suffix.lower() in each.suffixes and each.accepts(path):
+            return each
+    allowed = ", ".join(dict.fromkeys(known for each in FORMATS.values() for known in each.suffixes))
     raise InputError.one(path, "suffix", path.suffix, allowed)
-
-
-def _module(name: str) -> ModuleType:
-    return importlib.import_module(f"problems.formats.{name}_format")
-
-
-def pyyeti(path: Path) -> Any:
-    """pyyeti.nastran, which reads and writes Nastran's files. Raises InputError if it is not installed."""
-    try:
-        with np.printoptions():  # which its import changes for good: text files would have 12 digits
-            from pyyeti import nastran
-    except ModuleNotFoundError:
-        allowed = "Nastran's formats need pyyeti: pip install 'rivetbench[nastran]'"
-        raise InputError([Fault(str(path), "format", path.suffix, allowed)]) from None
-    return nastran
 
 
 def vector(values: Any) -> np.ndarray:

@@ -37,7 +37,7 @@ def of_dense(Q: DenseCompliance, nodes: Vector | None) -> ApproximateInverse:
 
     nodes : (m, 2) of the contacts, mm, or None. Raises LinAlgError if Q is not positive definite.
     """
-    diagonal, m = Q.diagonal(), len(Q.Q)
+    diagonal, m = np.diag(Q.Q).copy(), len(Q.Q)
     windows = Windows.of(nodes, m)
     if (WINDOW_LINES + 1) * windows.across <= WIDEST_WINDOW * m:
         M = of_windows(windows, Q.local(windows.contacts(), False))

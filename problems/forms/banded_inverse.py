@@ -131,7 +131,20 @@ class Windows:
 
     @classmethod
     def of(cls, nodes: Matrix | None, m: int) -> Windows:
-        return cls(*order_along_joint(nodes, m))
+        """Of m contacts in order along the longer side of the joint."""
+        if nodes is None:
+            return cls(np.arange(m), min(DEFAULT_LINE, m))
+        extent = np.ptp(nodes, axis=0)
+        longer, shorter = (0, 1) if extent[0] >= extent[1] else (1, 0)
+        order = np.lexsort((nodes[:, shorter], nodes[:, longer]))
+        x = nodes[order, longer]
+        places = 1 + np.diff(nodes[order], axis=0).any(axis=1).sum()
+        spacing = np.sqrt(np.prod(extent) / places) if extent.all() else extent.max() / places
+        between = extent[longer] / max(np.count_nonzero(np.diff(x) > 1e-9 * spacing), 1)
+        if spacing / 2 <= between <= spacing:  # the contacts stand in lines
+            spacing = between
+        line = np.arange(m) - np.searchsorted(x, x - spacing * (1 - 1e-9)) + 1
+        return cls(order, int(line.max()))
 
     def ranges(self) -> Iterator[tuple[int, int, int]]:
         """For each line of contacts, in the order: where its window begins, where it begins and ends."""
@@ -148,20 +161,3 @@ class Windows:
     def contacts(self) -> list[Contacts]:
         """The contacts of each window."""
         return [self.order[first:stop] for first, _, stop in self.ranges()]
-
-
-def order_along_joint(nodes: Matrix | None, m: int) -> tuple[NDArray[np.intp], int]:
-    """The contacts in order along the longer side of the joint, and the contacts per line across it."""
-    if nodes is None:
-        return np.arange(m), min(DEFAULT_LINE, m)
-    extent = np.ptp(nodes, axis=0)
-    longer, shorter = (0, 1) if extent[0] >= extent[1] else (1, 0)
-    order = np.lexsort((nodes[:, shorter], nodes[:, longer]))
-    x = nodes[order, longer]
-    places = 1 + np.diff(nodes[order], axis=0).any(axis=1).sum()
-    spacing = np.sqrt(np.prod(extent) / places) if extent.all() else extent.max() / places
-    between = extent[longer] / max(np.count_nonzero(np.diff(x) > 1e-9 * spacing), 1)
-    if spacing / 2 <= between <= spacing:  # the contacts stand in lines
-        spacing = between
-    line = np.arange(m) - np.searchsorted(x, x - spacing * (1 - 1e-9)) + 1
-    return order, int(line.max())

@@ -1,8 +1,7 @@
-"""Q = AᵀK⁻¹A, as a matrix or without it, by solutions with K: products, diagonal, principal submatrices."""
+"""Q = AᵀK⁻¹A, (m, m) mm/N, as a matrix, or by solutions with K: products and principal submatrices."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from problems.stiffness.operator import Stiffness
 
-from .assembly import Matrix, Vector
+from .assembly import Matrix
 from .product import product
 
 Rows = NDArray[np.intp]
@@ -20,43 +19,41 @@ Rows = NDArray[np.intp]
 Local = Callable[[Rows], Matrix]
 
 
-class Compliance(ABC):
-    """Q (m, m), mm/N, or a principal submatrix."""
+@dataclass(frozen=True)
+class ComplianceProducts:
+    """By solutions with K."""
 
-    @abstractmethod
+    K: Stiffness
+    A: sp.csc_array
+
     def __matmul__(self, lam: Matrix) -> Matrix:
         """Q λ, λ (m,) or (m, k)."""
+        product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
+        return product
 
-    @abstractmethod
-    def diagonal(self) -> Vector:
-        """(m,) mm/N."""
-
-    @abstractmethod
-    def submatrix(self, rows: Rows) -> Compliance:
+    def submatrix(self, rows: Rows) -> ComplianceProducts:
         """The principal submatrix of some contacts."""
+        return ComplianceProducts(self.K, self.A[:, rows])
 
-    @abstractmethod
     def toarray(self) -> Matrix:
         """The matrix, by columns."""
+        return self.K.compliance(self.A)
 
-    @abstractmethod
     def local(self, windows: Sequence[Rows], single: bool) -> Local | None:
         """Principal submatrices of windows of contacts near each other, in single precision to about four
         digits; None where they cost too much.
         """
+        return self.K.local_compliance(self.A, windows, single)
 
 
 @dataclass(frozen=True)
-class DenseCompliance(Compliance):
+class DenseCompliance:
     """Q : by columns, perhaps memory-mapped."""
 
     Q: Matrix
 
     def __matmul__(self, lam: Matrix) -> Matrix:
         return product(self.Q, lam)
-
-    def diagonal(self) -> Vector:
-        return np.diag(self.Q).copy()
 
     def submatrix(self, rows: Rows) -> DenseCompliance:
         return DenseCompliance(self.Q[np.ix_(rows, rows)].T)
@@ -69,25 +66,4 @@ class DenseCompliance(Compliance):
         return lambda window: rows[np.ix_(window, window)].T
 
 
-@dataclass(frozen=True)
-class ComplianceProducts(Compliance):
-    """By solutions with K."""
-
-    K: Stiffness
-    A: sp.csc_array
-
-    def __matmul__(self, lam: Matrix) -> Matrix:
-        product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
-        return product
-
-    def diagonal(self) -> Vector:
-        return self.toarray().diagonal().copy()
-
-    def submatrix(self, rows: Rows) -> ComplianceProducts:
-        return ComplianceProducts(self.K, self.A[:, rows])
-
-    def toarray(self) -> Matrix:
-        return self.K.compliance(self.A)
-
-    def local(self, windows: Sequence[Rows], single: bool) -> Local | None:
-        return self.K.local_compliance(self.A, windows, single)
+Compliance = ComplianceProducts | DenseCompliance

@@ -1,6 +1,6 @@
 """The forms of the quadratic program, by name. (Imports nothing: the command line lists them.)
 
-A new form is one file beside this one and its name here.
+A new form is a class in problem.py and its name here.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from problems.stiffness.block import scaled
 from problems.stiffness.operator import Stiffness
+from problems.stiffness.scaled import ScaledStiffness
 
 from .approximate_inverse import ApproximateInverse, of_dense, of_products
 from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
@@ -21,18 +22,27 @@ EPS = float(np.finfo(float).eps)
 RESIDUAL_ROUNDING = 32  # of ε: five are usual, whatever the size
 
 
-class Stages:
-    """How the factors of K and Q are made, and what is known of them: here anew, and nothing."""
+class Prepared:
+    """An assembly with what is derived from it, each when first needed; here in memory.
+
+    Parameters
+    ----------
+    assembly : K and A.
+    Q : makes Q (m, m), mm/N, in place of K's own `compliance`.
+    coarser : makes an assembly of similar Q whose factors are cheaper, for M; None if there is none.
+    """
 
     #: The key of the matrices in the cache; None if they are in memory only.
     key: str | None = None
 
-    def factor(self, assembly: Assembly) -> None:
-        """Make the factors of K's blocks."""
-        assembly.K.factor_blocks()
-
-    def Q(self, assembly: Assembly) -> Matrix:
-        return assembly.K.compliance(assembly.A)
+    def __init__(
+        self,
+        assembly: Assembly,
+        Q: Callable[[], Matrix] | None = None,
+        coarser: Callable[[], Assembly] | None = None,
+    ) -> None:
+        self.assembly, self.coarser = assembly, coarser
+        self._make_Q = Q or (lambda: assembly.K.compliance(assembly.A))
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -40,55 +50,23 @@ class Stages:
         return {}
 
     @property
-    def facts(self) -> dict[str, object]:
-        """cond_K, λmin, λmax, …"""
+    def spectrum(self) -> dict[str, object]:
+        """cond_K, lambda_min, … of a K whose factors are in the cache."""
         return {}
 
-
-class Prepared:
-    """An assembly with what is derived from it, each stage computed when first needed.
-
-    Parameters
-    ----------
-    assembly : K and A.
-    stages : how the factors of K and Q are made; by default in memory.
-    Q : makes Q (m, m), mm/N, in place of the stages.
-    coarser : makes an assembly of similar Q whose factors are cheaper, for M; None if there is none.
-    near : makes M ≈ Q⁻¹, in place of this.
-    """
-
-    def __init__(
-        self,
-        assembly: Assembly,
-        stages: Stages | None = None,
-        Q: Callable[[], Matrix] | None = None,
-        coarser: Callable[[], Assembly] | None = None,
-        near: Callable[[], ApproximateInverse] | None = None,
-    ) -> None:
-        self.stages, self.assembly, self.coarser, self.near = stages or Stages(), assembly, coarser, near
-        if stages is not None:
-            K = Stiffness(assembly.K.blocks, lambda _: stages.factor(assembly))
-            self.assembly = replace(assembly, K=K)
-        self._make_Q = Q or (lambda: self.stages.Q(self.assembly))
-
-    @property
-    def key(self) -> str | None:
-        """The key of the matrices in the cache; None if they are in memory only."""
-        return self.stages.key
-
     @property
     def facts(self) -> dict[str, object]:
-        """Facts recorded with the stages: cond_K, λmin, λmax, seconds of each step, …"""
+        """The size, the spectrum, seconds of each step, …"""
         assembly = self.assembly
         size: dict[str, object] = {"n": assembly.asked, "m": assembly.m, "parts": assembly.parts}
         if not assembly.K.dense:
             size["unknowns"] = assembly.n
-        return size | self.stages.facts | {"seconds": self.stages.seconds}
+        return size | self.spectrum | {"seconds": self.seconds}
 
     @property
     def condition(self) -> float:
-        """cond(K) if the stages know it, else about that in balanced units."""
-        known = self.stages.facts.get("cond_K")
+        """cond(K) if it is in the cache, else about that in balanced units."""
+        known = self.spectrum.get("cond_K")
         return float(known) if isinstance(known, float) else self.assembly.K.condition(self.assembly.K.units)
 
     @property
@@ -121,8 +99,6 @@ class Prepared:
     @cached_property
     def approximate_inverse(self) -> ApproximateInverse:
         """M ≈ Q⁻¹, and about the diagonal of Q. Raises LinAlgError if Q is not positive definite."""
-        if self.near is not None:
-            return self.near()
         Q = self.compliance
         if isinstance(Q, DenseCompliance):
             return of_dense(Q, self.assembly.contact_nodes)
@@ -131,13 +107,7 @@ class Prepared:
 
     def scaled(self, D: Vector, R: Vector) -> Prepared:
         """With DKD, by the factors of K, and DAR, for powers of two D (n,) and R (m,)."""
-        K = self.assembly.K if (D == 1).all() else self.assembly.K.scaled(D)
-        assembly = replace(self.assembly, K=K, A=scaled(self.assembly.A, D, R))
-        return Prepared(
-            assembly,
-            Q=lambda: np.asfortranarray(self.Q * R * R[:, None]),
-            near=lambda: self.approximate_inverse.scaled(R),
-        )
+        return _Scaled(self, D, R)
 
     def dual_load(self, load: LoadCase) -> Vector:
         """p = AᵀK⁻¹f − g, (m,), mm: the overlap of the parts if contact is ignored."""
@@ -166,6 +136,18 @@ class Prepared:
         if (abs(r.T) / s).max() <= RESIDUAL_ROUNDING * EPS * (abs(x.T) * s).max():
             return x
         return x + K.solve(r)
+
+
+class _Scaled(Prepared):
+    def __init__(self, base: Prepared, D: Vector, R: Vector) -> None:
+        K = base.assembly.K if (D == 1).all() else ScaledStiffness(base.assembly.K, D)
+        assembly = replace(base.assembly, K=K, A=scaled(base.assembly.A, D, R))
+        super().__init__(assembly, Q=lambda: np.asfortranarray(base.Q * R * R[:, None]))
+        self.base, self.R = base, R
+
+    @cached_property
+    def approximate_inverse(self) -> ApproximateInverse:
+        return self.base.approximate_inverse.scaled(self.R)
 
 
 def dual_alone(Q: Matrix) -> Prepared:

@@ -8,8 +8,6 @@ contact forces λ and the displacements x, the same in every form.
 
 from __future__ import annotations
 
-import importlib
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -25,14 +23,21 @@ from .prepared import Prepared
 Progress = Callable[[str, float], None]
 
 
-class Problem(ABC):
-    """An assembly in one of its forms. The arrays may be memory-mapped and are read-only."""
+def silent(text: str, fraction: float) -> None:
+    """No progress."""
 
-    form: ClassVar[Form]
+
+class Problem:
+    """An assembly in the primal form, min ½xᵀKx − fᵀx, Aᵀx ≤ g, n unknowns; a subclass has another one.
+
+    Needs K and A, no factor. The arrays may be memory-mapped and are read-only.
+    """
+
+    form: ClassVar[Form] = "primal"
     #: Whether bounds z ≥ 0 replace the rows Gz ≤ h.
-    bounded: ClassVar[bool]
+    bounded: ClassVar[bool] = False
     #: What an answer must contain; x, if not among these, is recovered from λ.
-    needs: ClassVar[tuple[str, ...]]
+    needs: ClassVar[tuple[str, ...]] = ("lam", "x")
 
     def __init__(self, prepared: Prepared) -> None:
         self.prepared = prepared
@@ -47,47 +52,51 @@ class Problem(ABC):
         return self.prepared.Q
 
     @property
-    @abstractmethod
     def blocks(self) -> tuple[Any, ...]:
         """The diagonal blocks of P, dense or sparse."""
+        return self.assembly.K.matrices
 
     @property
-    @abstractmethod
     def G(self) -> sp.csr_array | None:
         """The matrix of Gz ≤ h; None if bounds replace it."""
+        return sp.csr_array(self.assembly.A.T)
 
-    @abstractmethod
     def q(self, load: LoadCase) -> Vector:
         """The linear term."""
+        return -load.f
 
-    @abstractmethod
     def h(self, load: LoadCase) -> Vector | None:
         """The right-hand side of Gz ≤ h; None if bounds replace it."""
+        return load.g
 
-    @abstractmethod
     def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
         """The load cases with what this form adds to them, read-only."""
+        return [read_only(case) for case in cases]
 
-    @abstractmethod
     def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
         """(λ, x) of a solution z and the multipliers of its rows; x is None if it must be recovered."""
+        return multipliers, z
 
-    @abstractmethod
     def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector | None, Vector]:
         """(z, multipliers) of a warm start from forces λ, gaps g − Aᵀx and displacements x."""
+        return x, lam
 
-    @abstractmethod
     def gap(self, load: LoadCase, lam: Vector, x: Vector | None) -> Vector:
         """The gaps of an answer, g − Aᵀx = Qλ − p, (m,) mm."""
+        assert x is not None
+        return load.g - self.assembly.A.T @ x
 
-    @abstractmethod
     def distance(self, one: LoadCase, other: LoadCase) -> float:
-        """A distance between load cases, to choose the answer to start from."""
+        """Between load cases, to choose the answer to start from; here the larger of the relative changes of
+        f and g, in their 2-norms.
+        """
+        pairs = ((one.f, other.f), (one.g, other.g))
+        return max(float(np.linalg.norm(a - b) / (np.linalg.norm(b) or 1.0)) for a, b in pairs)
 
     @property
-    @abstractmethod
     def arrays(self) -> list[Matrix]:
         """The matrices that a solver of this form reads."""
+        return self.assembly.K.arrays
 
     @property
     def model_s(self) -> float | None:
@@ -104,10 +113,8 @@ class Problem(ABC):
     ) -> list[Vector | None]:
         """x (n,) mm of each answer: the solver's own, else K⁻¹(f − Aλ), with one pass over K for all."""
         found = list(xs)
-        if "x" in self.needs:
-            return found
         known = [k for k, lam in enumerate(lams) if lam is not None]
-        if known:
+        if known and "x" not in self.needs:
             lam = np.column_stack([np.asarray(lams[k], dtype=float) for k in known])
             x = self.prepared.recover(lam, stacked([cases[k] for k in known])).T
             for k, mine in zip(known, x, strict=True):
@@ -115,11 +122,82 @@ class Problem(ABC):
         return found
 
 
+class Dual(Problem):
+    """min ½λᵀQλ − pᵀλ, λ ≥ 0, m unknowns, with Q = AᵀK⁻¹A and p = AᵀK⁻¹f − g.
+
+    Needs the factors of K, for p and for x = K⁻¹(f − Aλ), and Q.
+    """
+
+    form: ClassVar[Form] = "dual"
+    bounded: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("lam",)
+
+    @property
+    def blocks(self) -> tuple[Matrix, ...]:
+        return (self.Q,)
+
+    @property
+    def G(self) -> None:
+        return None
+
+    def q(self, load: LoadCase) -> Vector:
+        return -load.p
+
+    def h(self, load: LoadCase) -> None:
+        return None
+
+    def loads(self, cases: Sequence[LoadCase]) -> list[LoadCase]:
+        """With p; K⁻¹f is computed once if they share their f."""
+        p = self.prepared.dual_load(stacked(cases)).T
+        pairs = zip(cases, p, strict=True)
+        return [read_only(LoadCase(case.f, case.g, np.ascontiguousarray(mine))) for case, mine in pairs]
+
+    def answer(self, z: Vector, multipliers: Vector | None) -> tuple[Vector | None, Vector | None]:
+        return z, None
+
+    def start(self, lam: Vector, gap: Vector, x: Vector | None) -> tuple[Vector | None, Vector]:
+        return lam, gap
+
+    def gap(self, load: LoadCase, lam: Vector, x: Vector | None) -> Vector:
+        return self.Q @ lam - load.p
+
+    def distance(self, one: LoadCase, other: LoadCase) -> float:
+        """‖p − p'‖₂, mm."""
+        return float(np.linalg.norm(one.p - other.p))
+
+    @property
+    def arrays(self) -> list[Matrix]:
+        K = self.assembly.K
+        return [*K.arrays, *K.factors, self.Q]
+
+
+class Sparse(Problem):
+    """min ½ûᵀK̂û − f̂ᵀû, Bᵀû ≤ g over all N unknowns of the model, K̂ and B sparse.
+
+    Nothing is condensed: x is û at the junction, and λ is that of the other forms. Needs K̂ and B, no factor.
+    prepared : any; if its blocks are dense, a sparse copy.
+    """
+
+    form: ClassVar[Form] = "sparse"
+
+    def __init__(self, prepared: Prepared) -> None:
+        given = prepared.assembly
+        K = given.K.as_sparse(given.nodes)
+        super().__init__(prepared if K is given.K else Prepared(replace(given, K=K)))
+
+    @property
+    def model_s(self) -> float | None:
+        return self.prepared.seconds.get("model")
+
+    @property
+    def yardstick(self) -> None:
+        return None
+
+
 def in_form(prepared: Prepared, form: Form) -> Problem:
-    """The problem in the form of that name: the subclass of Problem in the file of the same name."""
-    module = importlib.import_module(f"problems.forms.{form}")
-    problem: Problem = getattr(module, form.title())(prepared)
-    return problem
+    """The problem in the form of that name."""
+    classes: dict[Form, type[Problem]] = {"primal": Problem, "dual": Dual, "sparse": Sparse}
+    return classes[form](prepared)
 
 
 def read_only(load: LoadCase) -> LoadCase:

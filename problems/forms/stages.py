@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -14,11 +15,12 @@ import numpy as np
 from problems.errors import InputError
 from problems.stiffness import dense, operator
 from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
 from .assembly import Assembly, Matrix
-from .prepared import Stages
+from .prepared import Prepared
 from .problem import Progress
 
 LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
@@ -26,38 +28,48 @@ LARGEST_CONDITION = 1e14  # beyond it no digit of a displacement can be proven
 SourceOf = Callable[[str], object]
 
 
-class SparseStages(Stages):
+class SparsePrepared(Prepared):
     """Factors of a sparse K, in memory.
 
     Parameters
     ----------
     key : of K in the cache, where what is proven about it is kept. model_s : seconds in which K was made.
     source_of : the origin of "K" or "A", for error messages. own : a user's K, refused if nearly singular.
+
+    Factors raise InputError if K is not positive definite.
     """
 
-    def __init__(self, key: str, model_s: float, source_of: SourceOf, own: bool) -> None:
-        self.key, self.source_of, self.own = key, source_of, own
-        self.model_s = model_s
+    def __init__(
+        self,
+        assembly: Assembly,
+        key: str,
+        model_s: float,
+        source_of: SourceOf,
+        own: bool = False,
+        coarser: Callable[[], Assembly] | None = None,
+    ) -> None:
+        K = Stiffness(assembly.K.blocks, self._factor)
+        super().__init__(replace(assembly, K=K), coarser=coarser)
+        self.key, self.model_s, self.source_of, self.own = key, model_s, source_of, own
 
     @property
     def seconds(self) -> dict[str, float]:
         return {"model": self.model_s}
 
-    def factor(self, assembly: Assembly) -> None:
-        """Raises InputError if K is not positive definite."""
-        K, nodes = assembly.K, assembly.nodes
+    def _factor(self, K: Stiffness) -> None:
+        nodes = self.assembly.nodes
         try:
             K.factor_blocks()
         except NotPositiveDefinite as error:
             where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[error.unknown])
             key, moves = f"x[{error.unknown}]{where}", "moves without a force"
             raise indefinite(self.source_of("K"), key, moves) from error
-        if self.own and (condition := K.condition(K.units)) > LARGEST_CONDITION:
+        if self.own and (condition := Stiffness(K.blocks).condition(K.units)) > LARGEST_CONDITION:
             raise indefinite(self.source_of("K"), "cond(K), in balanced units", condition)
 
 
-class CachedStages(Stages):
-    """Stages of a dense K, memory-mapped from the cache, or computed and stored there.
+class DensePrepared(Prepared):
+    """Factors of a dense K and Q, memory-mapped from the cache, or computed and stored there.
 
     Parameters
     ----------
@@ -76,59 +88,55 @@ class CachedStages(Stages):
         source_of: SourceOf,
         progress: Progress,
     ) -> None:
-        self.assembly, A = assembly, assembly.A
+        super().__init__(replace(assembly, K=Stiffness(assembly.K.blocks, self._open_factors)))
+        self.blocks, A = [b for b in assembly.K.blocks if isinstance(b, dense.DenseBlock)], assembly.A
         code = fingerprint([Path(__file__), Path(dense.__file__), Path(operator.__file__)])
         self.factors_key = cache.digest("factors", key, code)
         parts = (A.data, A.indices, A.indptr)
         self.key = cache.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
-        self.before = before
-        self.source_of, self.progress = source_of, progress
+        self.before, self.source_of, self.progress = before, source_of, progress
 
     @property
     def built(self) -> bool:
-        """Whether every stage is in the cache."""
+        """Whether the factors and Q are in the cache."""
         return None not in (cache.load(self.factors_key), cache.load(str(self.key)))
 
     @property
-    def facts(self) -> dict[str, object]:
+    def spectrum(self) -> dict[str, object]:
         return {name: fact for name, fact in self._factored[1].items() if name != "seconds"}
 
     @property
     def seconds(self) -> dict[str, float]:
-        Q = self._Q if "_Q" in vars(self) else cache.load(str(self.key))
+        Q = self._schur if "_schur" in vars(self) else cache.load(str(self.key))
         return self.before | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
 
-    def factor(self, assembly: Assembly) -> None:
-        arrays, _ = self._factored
-        for k, block in enumerate(self._blocks):
-            block.U = arrays[f"U{k}"]
+    @cached_property
+    def Q(self) -> Matrix:
+        return self._schur[0]["Q"]
 
-    def Q(self, assembly: Assembly) -> Matrix:
-        return self._Q[0]["Q"]
-
-    @property
-    def _blocks(self) -> list[dense.DenseBlock]:
-        return [block for block in self.assembly.K.blocks if isinstance(block, dense.DenseBlock)]
+    def _open_factors(self, K: Stiffness) -> None:
+        for k, block in enumerate(self.blocks):
+            block.U = self._factored[0][f"U{k}"]
 
     @cached_property
     def _factored(self) -> cache.Entry:
-        return cache.load_or_make(self.factors_key, self._factor)
+        return cache.load_or_make(self.factors_key, self._make_factors)
 
     @cached_property
-    def _Q(self) -> cache.Entry:
-        return cache.load_or_make(str(self.key), self._schur)
+    def _schur(self) -> cache.Entry:
+        return cache.load_or_make(str(self.key), self._make_schur)
 
-    def _factor(self) -> cache.Entry:
+    def _make_factors(self) -> cache.Entry:
         self.progress("Cholesky factors of K", 0.0)
         start = time.perf_counter()
-        for block, name in zip(self._blocks, self.assembly.parts, strict=True):
+        for block, name in zip(self.blocks, self.assembly.parts, strict=True):
             try:
                 block.factor()
             except NotPositiveDefinite as error:
                 raise indefinite(self.source_of("K"), f"K of {name}", str(error)) from error
         factored = time.perf_counter()
         self.progress("condition number", 0.0)
-        spectrum = [block.extreme_eigenvalues() for block in self._blocks]
+        spectrum = [block.extreme_eigenvalues() for block in self.blocks]
         least, largest = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
         if largest > LARGEST_CONDITION * least:
             raise indefinite(self.source_of("K"), "cond(K)", largest / least if least > 0 else np.inf)
@@ -139,10 +147,10 @@ class CachedStages(Stages):
             "cond_blocks": [s[1] / s[0] for s in spectrum],
             "seconds": {"cholesky": factored - start, "condition": time.perf_counter() - factored},
         }
-        return {f"U{k}": block.U for k, block in enumerate(self._blocks)}, facts
+        return {f"U{k}": block.U for k, block in enumerate(self.blocks)}, facts
 
-    def _schur(self) -> cache.Entry:
-        self.factor(self.assembly)
+    def _make_schur(self) -> cache.Entry:
+        _ = self.assembly.K.factors
         self.progress("Q = AᵀK⁻¹A", 0.0)
         start = time.perf_counter()
         Q = self.assembly.K.compliance(self.assembly.A)

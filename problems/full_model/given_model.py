@@ -9,15 +9,12 @@ from pathlib import Path
 
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase
-from problems.forms.prepared import Prepared
-from problems.forms.problem import Progress
-from problems.forms.stages import CachedStages, SparseStages
+from problems.forms.problem import Progress, silent
+from problems.forms.stages import DensePrepared, SparsePrepared
 from problems.model.effect import Effect
 from problems.model.scene import MadeScene, MatricesScene
 from problems.storage.cache import digest
 from problems.storage.fingerprint import fingerprint
-
-from .model import Model
 
 DENSEST = 0.25  # of a block's entries: a denser K gains nothing from the sparse form
 SMALL = 200  # unknowns up to which any K is taken
@@ -25,7 +22,9 @@ CODE = ("problems/model", "problems/full_model", "problems/input", "problems/for
 
 
 @dataclass(frozen=True)
-class GivenModel(Model):
+class GivenModel:
+    """As JointModel, of the scene's own K, A, f and g."""
+
     scene: MatricesScene | MadeScene
 
     @classmethod
@@ -37,7 +36,7 @@ class GivenModel(Model):
             refuse_dependent(scene.made.assembly.A, scene.source_of("A"))
         return cls(scene)
 
-    def sparse(self) -> Prepared:
+    def sparse(self) -> SparsePrepared:
         """Raises InputError also if K is dense."""
         start, scene = time.perf_counter(), self.scene
         given, *_ = self._given(sparse=True)
@@ -50,26 +49,21 @@ class GivenModel(Model):
         seconds = time.perf_counter() - start
         key = digest("sparse", scene.assembly_key, fingerprint([Path(__file__)], CODE))
         own = isinstance(scene, MatricesScene)
-        stages = SparseStages(key, seconds, scene.source_of, own)
-        return Prepared(replace(given, K=K), stages)
+        return SparsePrepared(replace(given, K=K), key, seconds, scene.source_of, own)
 
-    def dense(self, progress: Progress) -> Prepared:
-        stages = self._stages(progress)
-        return Prepared(stages.assembly, stages)
-
-    def _stages(self, progress: Progress) -> CachedStages:
+    def dense(self, progress: Progress = silent) -> DensePrepared:
         given, _, seconds, key = self._given(sparse=False)
         K = given.K.as_dense()
         if K is not given.K:
             given = replace(given, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))
-        return CachedStages(given, key, {"condensation": seconds}, self.scene.source_of, progress)
+        return DensePrepared(given, key, {"condensation": seconds}, self.scene.source_of, progress)
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         return self._given(sparse)[1]
 
     @property
     def built(self) -> bool:
-        return self._stages(lambda text, fraction: None).built
+        return self.dense().built
 
     def _given(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
         """The matrices and loads, the seconds that reading them took, and their key."""

@@ -19,12 +19,10 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.prepared import Prepared
-from problems.forms.problem import Progress
-from problems.forms.stages import CachedStages, SparseStages, indefinite
-from problems.model.effect import Effect, TieEffect
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.forms.problem import Progress, silent
+from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
+from problems.model.effect import Effect, ForceEffect, GapEffect, TieEffect
+from problems.model.part import PartLoadEffect, PartModel
 from problems.model.scene import JointScene
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.operator import Stiffness
@@ -33,7 +31,6 @@ from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
 from .graded import graded
-from .model import Model
 from .numbering import Numbering, Unknowns
 
 CODE = ("problems/fem", "problems/model", "problems/effects", "problems/full_model")
@@ -41,7 +38,7 @@ WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model tha
 
 
 @dataclass(frozen=True)
-class JointModel(Model):
+class JointModel:
     """The parts of a scene as finite elements."""
 
     scene: JointScene
@@ -52,44 +49,43 @@ class JointModel(Model):
         joint = scene.joint
         return cls(scene, tuple(PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part))
 
-    def sparse(self) -> Prepared:
+    def sparse(self) -> SparsePrepared:
+        """K̂ and B. Raises InputError, where factors are first needed, if K̂ is not positive definite."""
         start = time.perf_counter()
         assembly, coarser = self.assembly(), self.graded()
         seconds = time.perf_counter() - start
         key = cache.digest("sparse", self.scene.assembly_key, fingerprint([Path(__file__)], CODE))
-        stages = SparseStages(key, seconds, self.scene.source_of, own=False)
-        worth = coarser.work < WORTH * self.work
-        return Prepared(assembly, stages, coarser=coarser.assembly if worth else None)
-
-    def dense(self, progress: Progress) -> Prepared:
-        stages = self._condensed(progress)
-        return Prepared(stages.assembly, stages)
+        like = coarser.assembly if coarser.work < WORTH * self.work else None
+        return SparsePrepared(assembly, key, seconds, self.scene.source_of, coarser=like)
 
     @property
     def built(self) -> bool:
-        from .condensed import part_key  # of the dense forms only
+        """Whether every dense matrix is in the cache; computes nothing."""
+        from .condense import part_key  # of the dense forms only
 
         known = [*map(part_key, self.parts)]
         if self.springs is not None:
             known.append(self._spring_key(cache.digest(known)))
-        return None not in map(cache.load, known) and self._condensed(lambda text, fraction: None).built
+        return None not in map(cache.load, known) and self.dense().built
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
         joint, given = self.scene.joint, self.scene.effects if effects is None else tuple(effects)
-        f, g = self.scene.junction_load(given)
-        loads = [effect for effect in given if isinstance(effect, PartLoadEffect)]
+        f, g = np.zeros(self.numbering.size if sparse else joint.size[0]), np.zeros(joint.size[1])
+        here = self.junction if sparse else slice(None)
+        for effect in given:
+            if isinstance(effect, ForceEffect):
+                f[here] += effect.force(joint)
+            elif isinstance(effect, GapEffect):
+                g += effect.gap(joint)
         names = [part.name for part in joint.part]
-        if sparse:
-            at_junction, f = f, np.zeros(self.numbering.size)
-            f[self.junction] = at_junction
-        for load in loads:
+        for load in (effect for effect in given if isinstance(effect, PartLoadEffect)):
             k = names.index(load.part)
             if sparse:
                 place, force = self.numbering.places[k], load.load(self.parts[k])
                 f[place[place >= 0]] += force[place >= 0]
             else:
-                from .condensed import condensed_load  # of the dense forms only
+                from .condense import condensed_load  # of the dense forms only
 
                 own = condensed_load(load, self.parts[k], partial(self.interior, k))
                 f[joint.unknowns(load.part)] += own
@@ -138,7 +134,7 @@ class JointModel(Model):
         """K̂, a sparse block for each part or for parts that springs join, and B (N, m)."""
         blocks = []
         ends = np.cumsum([0, *self.numbering.sizes])
-        for parts, start, stop in zip(self.numbering.blocks, ends[:-1], ends[1:], strict=True):
+        for parts, start, stop in zip(self.tied, ends[:-1], ends[1:], strict=True):
             K = self._block(parts, int(start), int(stop - start))
             if self.springs is not None:
                 T, k = self.springs
@@ -147,13 +143,13 @@ class JointModel(Model):
                 K = K + (added + added.T) / 2  # the order of products is another in K_ji: proofs see it
             blocks.append(sp.csc_array(K))
         B, nodes = self._at_junction(self.scene.joint.contact_matrix()), self._nodes()
-        names = self._names(self.numbering.blocks)
+        names = self._names(self.tied)
         return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, names, junction=self.junction)
 
     def _names(self, blocks: Iterable[Iterable[int]]) -> tuple[str, ...]:
         return tuple(" + ".join(self.scene.joint.part[part].name for part in parts) for parts in blocks)
 
-    def _block(self, parts: tuple[int, ...], start: int, size: int) -> sp.csc_array:
+    def _block(self, parts: list[int], start: int, size: int) -> sp.csc_array:
         """The stiffness of some parts, (size, size), on the unknowns from `start` on."""
         own = [self.parts[part].stiffness() for part in parts]
         K = own[0] if len(own) == 1 else sp.csr_array(sp.block_diag(own, format="csr"))
@@ -162,13 +158,10 @@ class JointModel(Model):
         order = np.empty(size, dtype=np.int32)
         order[place[free]] = free
         K = K[order]
-        column, ends = place[K.indices], K.indptr
-        if size < len(place):
-            kept = column >= 0
-            column, data, ends = column[kept], K.data[kept], np.append(0, np.cumsum(kept))[ends]
-        else:
-            data = K.data
-        found = sp.csc_array((data, column, ends), shape=(size, size))  # symmetric
+        column = place[K.indices]
+        kept = column >= 0
+        ends = np.append(0, np.cumsum(kept))[K.indptr]
+        found = sp.csc_array((K.data[kept], column[kept], ends), shape=(size, size))  # symmetric
         found.sort_indices()
         return found
 
@@ -202,9 +195,11 @@ class JointModel(Model):
     def _interiors(self) -> dict[int, tuple[Unknowns, SparseBlock]]:
         return {}
 
-    def _condensed(self, progress: Progress) -> CachedStages:
-        """K, a dense block for each part, or for parts from the first to the last that springs join."""
-        from .condensed import condensed_stiffness, part_key  # of the dense forms only
+    def dense(self, progress: Progress = silent) -> DensePrepared:
+        """K and A, memory-mapped from the cache or computed now: a dense block of K for each part, or for
+        parts from the first to the last that springs join. Raises InputError as `sparse` does.
+        """
+        from .condense import condensed_stiffness, part_key  # of the dense forms only
 
         joint, source_of = self.scene.joint, self.scene.source_of
         blocks, seconds, keys = [], {}, [*map(part_key, self.parts)]
@@ -222,7 +217,7 @@ class JointModel(Model):
             blocks, before["ties"] = self._with_springs(key, blocks, groups, progress)
         nodes = np.tile(joint.nodes, (len(joint.part), 1))
         assembly = Assembly(Stiffness.of(*blocks), joint.contact_matrix(), nodes, self._names(groups))
-        return CachedStages(assembly, key, before, source_of, progress)
+        return DensePrepared(assembly, key, before, source_of, progress)
 
     def _ranges(self) -> list[list[int]]:
         """The parts of each dense block, consecutive: from the first to the last that springs join."""

@@ -1,4 +1,4 @@
-"""The unknowns of the uncondensed model, numbered so that K̂ has a narrow band.
+"""The unknowns of the full model, numbered so that K̂ has a narrow band.
 
 The unknowns û of a part are those of its plate that are not built in: deflection, slopes and twist at each
 node. They are numbered line by line across the shorter direction of the grid, and the parts that springs
@@ -22,11 +22,10 @@ Unknowns = NDArray[np.intp]
 class Numbering:
     """places : for each part (plate.size,), the number of each of its plate's unknowns; −1 where built in.
 
-    blocks : the parts of each diagonal block of K̂. sizes : its number of unknowns.
+    sizes : the number of unknowns of each diagonal block of K̂.
     """
 
     places: tuple[Unknowns, ...]
-    blocks: tuple[tuple[int, ...], ...]
     sizes: tuple[int, ...]
 
     @classmethod
@@ -35,21 +34,18 @@ class Numbering:
         places = [np.full(model.plate.size, -1) for model in models]
         sizes, offset = [], 0
         for block in blocks:
-            free = {part: free_unknowns(models[part]) for part in block}
-            keys = {part: _line_and_rest(models[part], free[part]) for part in block}
-            along_x = min((0, 1), key=lambda axis: _widest_line([keys[part][axis] for part in block])) == 0
-            line, across = (
-                np.concatenate([keys[part][axis] for part in block])
-                for axis in ((0, 1) if along_x else (1, 0))
-            )
-            owner = np.repeat(np.arange(len(block)), [free[part].size for part in block])
+            free = [free_unknowns(models[part]) for part in block]
+            grid = [_grid_lines(models[part], own) for part, own in zip(block, free, strict=True)]
+            x, y = (np.concatenate(numbers) for numbers in zip(*grid, strict=True))
+            line, across = (x, y) if _widest(x) <= _widest(y) else (y, x)
+            owner = np.repeat(np.arange(len(block)), [own.size for own in free])
             rank = np.empty(len(line), dtype=np.intp)
             rank[np.lexsort((np.arange(len(line)), across, owner, line))] = np.arange(len(line))
             for k, part in enumerate(block):
-                places[part][free[part]] = offset + rank[owner == k]
+                places[part][free[k]] = offset + rank[owner == k]
             sizes.append(len(line))
             offset += len(line)
-        return cls(tuple(places), tuple(map(tuple, blocks)), tuple(sizes))
+        return cls(tuple(places), tuple(sizes))
 
     @property
     def size(self) -> int:
@@ -62,7 +58,7 @@ def free_unknowns(model: PartModel) -> Unknowns:
     return np.concatenate([model.plate.line_dofs(line) for line in model.free_lines])
 
 
-def _line_and_rest(model: PartModel, unknowns: Unknowns) -> tuple[Unknowns, Unknowns]:
+def _grid_lines(model: PartModel, unknowns: Unknowns) -> tuple[Unknowns, Unknowns]:
     """The number of the grid line x = const, and that of y = const, on which each unknown lies."""
     nx, ny = len(model.plate.x), len(model.plate.y)
     iy, _, ix, _ = np.unravel_index(unknowns, (ny, 2, nx, 2))
@@ -70,7 +66,6 @@ def _line_and_rest(model: PartModel, unknowns: Unknowns) -> tuple[Unknowns, Unkn
     return ix, iy - model.junction.start
 
 
-def _widest_line(lines: Sequence[Unknowns]) -> int:
-    """The most unknowns on a line of these numbers, all parts together."""
-    numbers = np.concatenate(lines)
-    return int(np.bincount(numbers - numbers.min()).max())
+def _widest(lines: Unknowns) -> int:
+    """The most unknowns on a line of these numbers."""
+    return int(np.bincount(lines - lines.min()).max())

@@ -21,21 +21,11 @@ def apparent_digits(values: Vector) -> int:
     v = values[values != 0]
     if len(v) > SAMPLE_SIZE:
         v = np.random.default_rng(0).choice(v, SAMPLE_SIZE, replace=False)
+    some = v.tolist()
     for d in range(1, DOUBLE):
-        if _unchanged_by_rounding(v, d):
+        if all(float(f"{value:.{d - 1}e}") == value for value in some):
             return d
     return SINGLE if np.array_equal(v, v.astype(np.float32)) else DOUBLE
-
-
-def _unchanged_by_rounding(v: Vector, digits: int) -> bool:
-    some = v[:50]
-    if not np.array_equal(_rounded(some, digits), some):
-        return False
-    return bool(np.array_equal(_rounded(v, digits), v))
-
-
-def _rounded(v: Vector, digits: int) -> Vector:
-    return np.array([float(f"{value:.{digits - 1}e}") for value in v])
 
 
 def expected_error(prepared: Prepared, x: Vector, lam: Vector, digits: int) -> float:

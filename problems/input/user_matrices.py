@@ -19,6 +19,7 @@ from . import sparse_npz
 from .bounded import LARGEST
 from .dependent_contacts import refuse_dependent
 
+NAMES = ("K", "A", "f", "g", "nodes")
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
 LONGEST_LINE = 60  # characters quoted in a message
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
@@ -33,13 +34,17 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
     with (K + Kᵀ)/2 for a K that is symmetric but for rounding; `Assembly.notes` say so. Raises InputError
     with all faults.
     """
-    where = {key: str(path) for key, path in files.items()}
-    if "problem" in files:
-        data = _read_npz(files["problem"])
-        where = {key: str(files["problem"]) for key in (*"KAfg", "nodes")}
-    else:
-        data = {key: _read_mtx(path, key) for key, path in files.items()}
-    return checked(data, where, sparse)
+    data: dict[str, Any] = {}
+    for key, path in files.items():
+        try:
+            found = sparse_npz.read(path, NAMES) if key == "problem" else {key: read_mtx(path)}
+        except Exception as error:  # zipfile and pickle raise their own kinds
+            kind = ".npz with K, A, f, g" if key == "problem" else "Matrix Market file"
+            where = "file" if key == "problem" else key
+            raise InputError.one(path, where, str(error), f"a readable {kind}") from error
+        data |= found
+    data |= {key: data[key].toarray() for key in "fg" if sp.issparse(data.get(key))}
+    return checked(data, {key: str(files.get("problem") or files.get(key)) for key in NAMES}, sparse)
 
 
 def checked(
@@ -130,21 +135,6 @@ def _fits(given: Any) -> bool:
         return bool((nearest == values).all())  # compared in the wider of the two
     inside = nearest < float(np.iinfo(values.dtype).max)  # 2⁶³ or 2⁶⁴, which would not convert back
     return bool(inside.all() and (nearest.astype(values.dtype) == values).all())
-
-
-def _read_npz(path: Path) -> dict[str, Any]:
-    try:
-        return sparse_npz.read(path, (*"KAfg", "nodes"))
-    except Exception as error:  # zipfile and pickle raise their own kinds
-        raise InputError.one(path, "file", str(error), "a readable .npz with K, A, f, g") from error
-
-
-def _read_mtx(path: Path, key: str) -> Any:
-    try:
-        found = read_mtx(path)
-        return found.toarray() if sp.issparse(found) and key in "fg" else found
-    except (OSError, ValueError) as error:
-        raise InputError.one(path, key, str(error), "a readable Matrix Market file") from error
 
 
 CHUNK = 2**20  # bytes of lines that are checked at once

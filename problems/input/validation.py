@@ -3,35 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
-from types import MappingProxyType
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from problems.errors import Fault
 
-#: Units of the keys of joints and stiffeners; an effect gives those of its own parameters.
-UNITS = {
-    **dict.fromkeys(["length", "width", "thickness", "points", "lines", "pitch", "start", "stop"], "mm"),
-    **dict.fromkeys(["I", "J"], "mm⁴"),
-    **dict.fromkeys(["young", "value"], "N/mm²"),
-    "stiffness_per_point": "N/mm",
-}
 #: Tags of what may be a value or a word, such as "auto"; left out of the keys in messages.
 VALUE, WORD = "a value", "a word"
-NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 
 def validation_faults(
-    where: object,
-    model: type[BaseModel],
-    error: ValidationError,
-    prefix: str = "",
-    units: Mapping[str, str] = NO_UNITS,
+    where: object, model: type[BaseModel], error: ValidationError, prefix: str = ""
 ) -> Iterator[Fault]:
-    """The faults of a table that is not a valid `model`. units : of the keys that have one."""
+    """The faults of a table that is not a valid `model`, each with the unit its key is annotated with."""
     items = error.errors()
     for item in items:
         depth = len(item["loc"])
@@ -41,7 +28,7 @@ def validation_faults(
             filter(None, [prefix, *(str(part) for part in item["loc"] if part not in (VALUE, WORD))])
         )
         value = None if item["type"] == "missing" else item["input"]
-        unit = next((units[str(part)] for part in reversed(item["loc"]) if part in units), None)
+        unit = _unit(model, item["loc"])
         allowed = _allowed(item, model)
         yield Fault(str(where), key or "file", value, f"{allowed}; in {unit}" if unit else allowed)
 
@@ -79,6 +66,14 @@ def _table(model: type[BaseModel], path: Sequence[object]) -> type[BaseModel]:
         if key in model.model_fields:
             model = _model_in(model.model_fields[str(key)].annotation) or model
     return model
+
+
+def _unit(model: type[BaseModel], path: Sequence[object]) -> str | None:
+    """The unit of what is at a path inside a model: the innermost that is given."""
+    for k in reversed(range(len(path))):
+        if field := _table(model, path[:k]).model_fields.get(str(path[k])):
+            return next((unit for unit in field.metadata if isinstance(unit, str)), None)
+    return None
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

@@ -39,17 +39,19 @@ def _perturbed(title: str, lam: float, gap: float) -> Scene:
     return matrices(title, replace(made, load=load, lam=made.lam + np.where(weak, lam, 0.0)))
 
 
-RUNGS: Ladder = {
-    "random-gap": partial(_random, "Gaps of 0 to 0.5 mm", 0.0, 0.5),
-    "no-contact": partial(_random, "Gaps of 1000 mm: no contact closes", 1000.0),
-    "everywhere": lambda: matrices("Every contact closed", _parts(seed=8, closed=1.0)),
-    "zero-gap": partial(_random, "No gap", 0.0),
-    "gap-1e-09": partial(_random, "Gaps of 1e-9 mm", 1e-9),
-    "overclosure": partial(_random, "Overlaps of 0 to 0.5 mm", 0.0, -0.5),
-    "huge-force": partial(_random, "Forces of 1e9 N", 0.1, force=1e9),
-    "tiny-force": partial(_random, "Forces of 1e-9 N, no gap", 0.0, force=1e-9),
-    "no-load": partial(_random, "Gaps of 0.1 mm, no load", 0.1, force=0.0),
-    "nothing": partial(_random, "No gap, no load", 0.0, force=0.0),
-    "flip-open": partial(_perturbed, "A third of the contacts open by 1e-12 mm", 0.0, PERTURBATION),
-    "flip-closed": partial(_perturbed, "A third of the contacts closed by 1e-12 N", PERTURBATION, 0.0),
+RUNGS: dict[str, Ladder] = {
+    "loads": {
+        "random-gap": partial(_random, "Gaps of 0 to 0.5 mm", 0.0, 0.5),
+        "no-contact": partial(_random, "Gaps of 1000 mm: no contact closes", 1000.0),
+        "everywhere": lambda: matrices("Every contact closed", _parts(seed=8, closed=1.0)),
+        "zero-gap": partial(_random, "No gap", 0.0),
+        "gap-1e-09": partial(_random, "Gaps of 1e-9 mm", 1e-9),
+        "overclosure": partial(_random, "Overlaps of 0 to 0.5 mm", 0.0, -0.5),
+        "huge-force": partial(_random, "Forces of 1e9 N", 0.1, force=1e9),
+        "tiny-force": partial(_random, "Forces of 1e-9 N, no gap", 0.0, force=1e-9),
+        "no-load": partial(_random, "Gaps of 0.1 mm, no load", 0.1, force=0.0),
+        "nothing": partial(_random, "No gap, no load", 0.0, force=0.0),
+        "flip-open": partial(_perturbed, "A third of the contacts open by 1e-12 mm", 0.0, PERTURBATION),
+        "flip-closed": partial(_perturbed, "A third of the contacts closed by 1e-12 N", PERTURBATION, 0.0),
+    }
 }

@@ -69,14 +69,17 @@ def _vertex(n: int) -> Scene:
     return matrices(f"A vertex of {n} contacts on {n} unknowns, a third with a force", made)
 
 
-RUNGS: Ladder = {
-    **{
-        f"fathi-{m:03d}": partial(_triangular, "Fathi", np.ones(m))
-        for m in (8, 16, 32, 48, 64, 128, 256, 512)
-    },
-    **{
-        f"murty-{m:02d}": partial(_triangular, "Murty", 2.0 - np.exp2(-np.arange(m))) for m in (8, 16, 32, 48)
-    },
-    **{f"chain-{m:02d}": partial(_chain, m) for m in (8, 16, 24, 32)},
-    **{f"vertex-{n:03d}": partial(_vertex, n) for n in (16, 64, 256)},
+RUNGS: dict[str, Ladder] = {
+    "pivoting": {
+        **{
+            f"fathi-{m:03d}": partial(_triangular, "Fathi", np.ones(m))
+            for m in (8, 16, 32, 48, 64, 128, 256, 512)
+        },
+        **{
+            f"murty-{m:02d}": partial(_triangular, "Murty", 2.0 - np.exp2(-np.arange(m)))
+            for m in (8, 16, 32, 48)
+        },
+        **{f"chain-{m:02d}": partial(_chain, m) for m in (8, 16, 24, 32)},
+        **{f"vertex-{n:03d}": partial(_vertex, n) for n in (16, 64, 256)},
+    }
 }

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from problems.forms.assembly import LoadCase
+from problems.storage.cache import digest
 
 
 class LoadCases(ABC):
@@ -29,3 +31,21 @@ class LoadCases(ABC):
     def parameters(self, k: int) -> dict[str, float | str]:
         """What distinguishes case k, for its row."""
         return {}
+
+
+@dataclass(frozen=True)
+class Listed(LoadCases):
+    """Case k is cases[k]. Cases with the same forces should share the array f: K⁻¹f is then computed once."""
+
+    cases: tuple[LoadCase, ...]
+
+    @property
+    def count(self) -> int:  # type: ignore[override]
+        return len(self.cases)
+
+    @property
+    def key(self) -> str:
+        return digest(*(array.tobytes() for case in self.cases for array in (case.f, case.g)))
+
+    def load(self, k: int) -> LoadCase:
+        return self.cases[k]

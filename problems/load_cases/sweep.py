@@ -15,15 +15,13 @@ from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
 from problems.input.validation import validation_faults
-from problems.model.effect import TieEffect
+from problems.model.effect import StiffnessEffect, TieEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
 from .base import LoadCases
 
 SYNTAX = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
-
-
 MOST, MOST_CASES = 100_000, 10_000_000  # values of a key; combinations
 NOTHING, OTHER = "the scene has no force or gap to sweep", "what changes K would be another assembly"
 
@@ -74,7 +72,7 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
                 effect = _changed(scene.effects[step.effect], step, value)
             except ValidationError as error:
                 effect, name = scene.effects[step.effect], effect_name(scene, step.effect)
-                faults += validation_faults(f"--sweep {step.name}", type(effect), error, name, effect.units)
+                faults += validation_faults(f"--sweep {step.name}", type(effect), error, name)
                 continue
             faults += [Fault(f"--sweep {step.name}", *fault) for fault in effect.faults(scene.joint)]
     names = [step.name for step in steps]
@@ -95,14 +93,6 @@ def effect_name(scene: JointScene, index: int) -> str:
     return kind if len(alike) == 1 else f"{kind}.{alike.index(index)}"
 
 
-def _changes_K(scene: JointScene, index: int) -> bool:
-    """Whether K or A depends on an effect."""
-    if isinstance(scene.effects[index], TieEffect):
-        return True
-    others = tuple(effect for i, effect in enumerate(scene.effects) if i != index)
-    return replace(scene, effects=others).assembly_key != scene.assembly_key
-
-
 def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
     name, equals, values = text.partition("=")
     numbers = _values(values)
@@ -110,11 +100,11 @@ def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
         allowed = f"at most {MOST} values" if len(numbers) > MOST else SYNTAX
         faults.append(Fault("--sweep", "sweep", text, allowed))
         return None
-    effects = {effect_name(scene, i): i for i in range(len(scene.effects)) if not _changes_K(scene, i)}
     keys = {
-        f"{prefix}.{'.'.join(path)}": Step(name, i, path, numbers)
-        for prefix, i in effects.items()
-        for path in _numbers(scene.effects[i].model_dump())
+        f"{effect_name(scene, i)}.{'.'.join(path)}": Step(name, i, path, numbers)
+        for i, effect in enumerate(scene.effects)
+        if not isinstance(effect, StiffnessEffect | TieEffect)  # on which K depends
+        for path in _numbers(effect.model_dump())
     }
     if name not in keys:
         allowed = f"one of {', '.join(keys)}" if keys else NOTHING

@@ -1,8 +1,8 @@
 """Ladders: problems that grow harder rung by rung, to see where a solver fails and whether it reports that.
 
-A ladder is a file of problems/ladders with RUNGS, its rungs by name, the easiest first; each is a function
-that makes the same rung at every call. A rung is a scene, `hard/<ladder>/<rung>`; those in FULL_SIZE, where a
-ladder has them, are `hard-full/<ladder>/<n>-<rung>`, at the sizes of the paper: n = 4386, 6112 and 11308. The
+A rung is a scene, `hard/<ladder>/<rung>`. A file of problems/ladders has RUNGS, ladders by name, of each its
+rungs by name, the easiest first: functions that make the same rung at every call. Those in FULL_SIZE, where a
+file has it, are `hard-full/<ladder>/<n>-<rung>`, at the sizes of the paper: n = 4386, 6112 and 11308. The
 problems of others in problems/outside are found likewise, `outside/<problem>/<size>`.
 """
 
@@ -32,11 +32,11 @@ matrices = partial(MadeScene, "")
 
 @cache
 def ladders(prefix: str) -> dict[str, Ladder]:
-    """All ladders of a prefix by name: the files of its package that have such rungs."""
+    """All ladders of a prefix by name."""
     package, rungs = PREFIXES[prefix]
-    names = sorted(module.name for module in pkgutil.iter_modules(importlib.import_module(package).__path__))
-    found = {name: getattr(importlib.import_module(f"{package}.{name}"), rungs, {}) for name in names}
-    return {name: ladder for name, ladder in found.items() if ladder}
+    names = [module.name for module in pkgutil.iter_modules(importlib.import_module(package).__path__)]
+    files = (importlib.import_module(f"{package}.{name}") for name in names)
+    return dict(sorted(pair for file in files for pair in getattr(file, rungs, {}).items()))
 
 
 def rung_names(prefix: str) -> list[str]:

@@ -6,7 +6,7 @@ Its module is imported only when a scene names it.
     StiffnessEffect   to the stiffness of one part, before condensation
     ForceEffect       forces on the junction nodes
     Positions         (positions.py) forces at points of the junction
-    PartLoadEffect    (part_load.py) a load anywhere on one part, condensed onto its junction nodes
+    PartLoadEffect    (part.py) a load anywhere on one part, condensed onto its junction nodes
     GapEffect         to the initial gap; it may add the contact that it acts on
     TieEffect         springs between the junction nodes of two parts, and their installation forces
 
@@ -19,7 +19,7 @@ import importlib
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 import scipy.sparse as sp
@@ -52,9 +52,7 @@ EXCLUDED = {
 
 
 class Effect(Table):
-    """Parameters of an effect, in mm and N."""
-
-    units: ClassVar[dict[str, str]] = {}
+    """Parameters of an effect, each with its unit, as in Annotated[Positive, "mm"]."""
 
     kind: str
 

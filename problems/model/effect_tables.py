@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from problems.errors import Fault
-from problems.input.validation import UNITS, unknown, validation_faults
+from problems.input.validation import unknown, validation_faults
 
 from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
 from .joint import Joint
@@ -48,8 +48,7 @@ class EffectTable:
             context = {"folder": self.where.parent, "files": self.files}
             self.effect = effect.model_validate(self.content, context=context)
         except ValidationError as error:
-            units = UNITS | effect.units
-            for fault in validation_faults(self.where, effect, error, self._name, units):
+            for fault in validation_faults(self.where, effect, error, self._name):
                 if not self._is_consequence(fault.key.removeprefix(self._name).lstrip(".")):
                     yield fault
         for rows in self.files:

@@ -38,15 +38,15 @@ class Table(BaseModel):
 class Junction(Table):
     """The strip where the parts meet: length along x and width along y in mm, nodes along each."""
 
-    length: Positive
-    width: Positive
+    length: Annotated[Positive, "mm"]
+    width: Annotated[Positive, "mm"]
     nodes: tuple[Nodes, Nodes]
 
 
 class Extension(Table):
     """The part's plate beyond the junction: its length in mm and its elements across that length."""
 
-    length: Positive
+    length: Annotated[Positive, "mm"]
     elements: Annotated[int, Field(ge=1, le=MOST)]
 
 
@@ -57,8 +57,8 @@ class Part(Table):
     """
 
     name: Name
-    thickness: Positive
-    young: Positive = 70e3
+    thickness: Annotated[Positive, "mm"]
+    young: Annotated[Positive, "N/mm²"] = 70e3
     poisson: Annotated[float, Field(ge=0, lt=0.5)] = 0.33
     south: Extension | None = None
     north: Extension | None = None

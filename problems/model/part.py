@@ -6,6 +6,7 @@ from here: the deflections at the junction nodes, those at built-in edges, and t
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,8 +17,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from problems.fem.plate import Plate
+from problems.forms.assembly import Vector
 
-from .effect import Range, StiffnessEffect
+from .effect import PartEffect, Range, StiffnessEffect
 from .joint import Joint, Part
 
 Unknowns = NDArray[np.intp]
@@ -90,3 +92,11 @@ class PartModel:
                 thickness, x, y = effect.pad
                 yield 1.0, thickness, x, y
                 yield -1.0, self.plate.thickness, x, y
+
+
+class PartLoadEffect(PartEffect):
+    """Adds a load on one part, in the junction or beyond it."""
+
+    @abstractmethod
+    def load(self, model: PartModel) -> Vector:
+        """(plate.size,) generalised force on each degree of freedom: N, N·mm, N·mm²."""

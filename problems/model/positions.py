@@ -22,13 +22,13 @@ class Pattern(Table):
 
     columns: Annotated[int, Field(ge=1, le=10_000)]
     rows: Annotated[int, Field(ge=1, le=10_000)]
-    edge: NotNegative = 0.0
+    edge: Annotated[NotNegative, "mm"] = 0.0
 
 
 class Positions(ForceEffect):
     """Forces at `points`, a list of (x, y) in mm; or `file`, a CSV with columns x and y; or a `pattern`."""
 
-    points: tuple[tuple[Finite, Finite], ...] = ()
+    points: Annotated[tuple[tuple[Finite, Finite], ...], "mm"] = ()
     pattern: Pattern | None = None
 
     @model_validator(mode="before")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,11 +11,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Matrix
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem, made
 from problems.storage.cache import digest
 
-from .effect import Effect, ForceEffect, GapEffect, StiffnessEffect
+from .effect import Effect, ForceEffect, StiffnessEffect
 from .joint import Joint, Table
 
 E = TypeVar("E", bound=Effect)
@@ -97,17 +97,6 @@ class JointScene(Scene):
     @property
     def expected_size(self) -> tuple[int, int]:
         return self.joint.size
-
-    def junction_load(self, effects: Iterable[Effect]) -> tuple[Vector, Vector]:
-        """f (n,) N of the forces on the junction, and the initial gaps g (m,) mm, of some effects."""
-        n, m = self.joint.size
-        f, g = np.zeros(n), np.zeros(m)
-        for effect in effects:
-            if isinstance(effect, ForceEffect):
-                f += effect.force(self.joint)
-            elif isinstance(effect, GapEffect):
-                g += effect.gap(self.joint)
-        return f, g
 
     def marks(self) -> Matrix:
         own = [effect.marks(self.joint) for effect in self.effects_of(ForceEffect)]

@@ -60,4 +60,6 @@ def _rung(cells: int) -> Scene:
     return membrane(f"A membrane over a hemisphere, {cells} × {cells} cells", len(at), make, len(covered))
 
 
-RUNGS: Ladder = {f"{cells}": partial(_rung, cells) for cells in (8, 20, 40, 80, 160, 320)}
+RUNGS: dict[str, Ladder] = {
+    "hemisphere": {f"{cells}": partial(_rung, cells) for cells in (8, 20, 40, 80, 160, 320)}
+}

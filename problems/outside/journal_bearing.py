@@ -51,13 +51,15 @@ def _rung(nx: int, ny: int, eccentricity: float = 0.1, printed: PrintedOptimum |
     return membrane(title, nx * ny, partial(problem, nx, ny, eccentricity), printed=printed)
 
 
-RUNGS: Ladder = {
-    **{f"{cells}": partial(_rung, cells - 1, cells - 1) for cells in (20, 40, 80, 160, 320)},
-    **{
-        f"cutest-{side}": partial(
-            _rung, side - 2, side - 2, printed=PrintedOptimum(value, 5, "CUTEst, JNLBRNG1.SIF")
-        )
-        for side, value in CUTEST.items()
-    },
-    **{f"petsc-{name}": partial(_rung, *given) for name, given in PETSC.items()},
+RUNGS: dict[str, Ladder] = {
+    "journal_bearing": {
+        **{f"{cells}": partial(_rung, cells - 1, cells - 1) for cells in (20, 40, 80, 160, 320)},
+        **{
+            f"cutest-{side}": partial(
+                _rung, side - 2, side - 2, printed=PrintedOptimum(value, 5, "CUTEst, JNLBRNG1.SIF")
+            )
+            for side, value in CUTEST.items()
+        },
+        **{f"petsc-{name}": partial(_rung, *given) for name, given in PETSC.items()},
+    }
 }

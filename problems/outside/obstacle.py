@@ -30,10 +30,12 @@ def _obstacle(line: Vector) -> Matrix:
 
 _rung = partial(unit_square, "A membrane on an obstacle", 1.0, -1.0, _obstacle)
 
-RUNGS: Ladder = {
-    **{f"{cells}": partial(_rung, cells) for cells in (20, 40, 80, 160, 320)},
-    **{
-        f"cutest-{side}": partial(_rung, side - 1, 0.5, PrintedOptimum(value, 9, "CUTEst, OBSTCLAE.SIF"))
-        for side, value in CUTEST.items()
-    },
+RUNGS: dict[str, Ladder] = {
+    "obstacle": {
+        **{f"{cells}": partial(_rung, cells) for cells in (20, 40, 80, 160, 320)},
+        **{
+            f"cutest-{side}": partial(_rung, side - 1, 0.5, PrintedOptimum(value, 9, "CUTEst, OBSTCLAE.SIF"))
+            for side, value in CUTEST.items()
+        },
+    }
 }

@@ -34,11 +34,13 @@ def _distance(line: Vector) -> Matrix:
 
 _rung = partial(unit_square, "Elastic–plastic torsion", COUPLE, 1.0, _distance)
 
-RUNGS: Ladder = {
-    **{f"{cells}": partial(_rung, cells) for cells in (20, 40, 80, 160, 320)},
-    "cops-50x50": partial(_rung, 51, printed=PrintedOptimum(-4.18087e-1, 6, COPS)),
-    **{
-        f"cutest-{side}": partial(_rung, side - 1, 0.5, PrintedOptimum(value, 8, "CUTEst, TORSION1.SIF"))
-        for side, value in CUTEST.items()
-    },
+RUNGS: dict[str, Ladder] = {
+    "torsion": {
+        **{f"{cells}": partial(_rung, cells) for cells in (20, 40, 80, 160, 320)},
+        "cops-50x50": partial(_rung, 51, printed=PrintedOptimum(-4.18087e-1, 6, COPS)),
+        **{
+            f"cutest-{side}": partial(_rung, side - 1, 0.5, PrintedOptimum(value, 8, "CUTEst, TORSION1.SIF"))
+            for side, value in CUTEST.items()
+        },
+    }
 }

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
 from .band_solve import band_solve
-from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector
-from .local_compliance import BlockPart, Rows
+from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector, scaled
 from .rounding import U, gamma
-from .selected_inverse import band_blocks
+from .selected_inverse import BlockPart, Rows, band_blocks
 
 COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
 
@@ -61,7 +60,7 @@ class BandedBlock(SparseBlock):
 
     def shifted(self, D: Vector, s: float) -> float | None:
         """As for a dense block, but no sum has more than b + 1 terms (Higham 2002, theorem 10.3)."""
-        band = lower_band(self._ordered(self.balanced(D)))
+        band = lower_band(self._ordered(scaled(self.matrix, D, D)))
         band[0] -= s
         largest = float(abs(band[0]).max())
         L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .local_compliance import BlockPart, Rows
+from .selected_inverse import BlockPart, Rows
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -82,6 +82,10 @@ class Block(ABC):
         D (size,) : powers of two.
         """
 
+    def largest_compliance(self, D: Vector, kappa: float) -> float:
+        """A proven bound on max (K⁻¹)_ii, mm/N, for κ ≤ λmin(DKD); infinite where none is cheap."""
+        return np.inf
+
     @abstractmethod
     def compliance(self, A: sp.csc_array) -> Matrix:
         """AᵀK⁻¹A, (m, m) mm/N, for A (size, m)."""
@@ -120,12 +124,8 @@ class SparseBlock(Block):
             yield slice(start, stop), sp.csr_array(parts, shape=(stop - start, self.size))
             start = stop
 
-    def balanced(self, D: Vector) -> sp.csc_array:
-        """DKD, without rounding for powers of two."""
-        return scaled(self.matrix, D, D)
-
 
 def scaled(M: sp.csc_array, rows: Vector, columns: Vector) -> sp.csc_array:
-    """diag(rows) M diag(columns)."""
+    """diag(rows) M diag(columns), without rounding for powers of two."""
     entries = M.data * rows[M.indices] * np.repeat(columns, np.diff(M.indptr))
     return sp.csc_array((entries, M.indices, M.indptr), shape=M.shape)

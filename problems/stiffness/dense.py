@@ -14,8 +14,8 @@ from scipy.linalg import blas, lapack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from .block import ENTRIES_AT_A_TIME, Block, Matrix, NotPositiveDefinite, Vector
+from .rounding import SAFE, gamma
 from .rounding import U as ROUNDING
-from .rounding import gamma
 
 SMALL = 50  # unknowns below which eigenvalues are computed densely
 LEAST_ROWS = 16  # of a panel
@@ -77,6 +77,25 @@ class DenseBlock(Block):
             return None
         largest = float(abs(diagonal).max())
         return gamma(2 * (self.size + 1)) * _norm(R) + ROUNDING * (largest + abs(s))
+
+    def largest_compliance(self, D: Vector, kappa: float) -> float:
+        """The factor has UᵀU = K + E with |E| ≤ γ|U|ᵀ|U| (see `shifted`), so that ‖DED‖₂ ≤ e with
+        e = γ/(1 − γ) tr(DKD), and
+
+            K⁻¹ ⪯ (1 + e/κ) (UᵀU)⁻¹,    ((UᵀU)⁻¹)_ii = ‖row i of U⁻¹‖².
+
+        The computed inverse X has |XU − I| ≤ γ|X||U| or |UX − I| ≤ γ|U||X| (Higham, Accuracy and Stability of
+        Numerical Algorithms, 2002, 14.2), so that ‖X − U⁻¹‖_F ≤ ε ‖U⁻¹‖_F with ε = γ ‖X‖_F ‖U‖_F.
+        """
+        X, info = lapack.dtrtri(self.U)
+        error = gamma(2 * (self.size + 1))
+        relative = SAFE * error / (1 - error) * float(D**2 @ self.diagonal()) / kappa if kappa > 0 else np.inf
+        length, size = (float(np.linalg.norm(np.triu(each))) for each in (X, self.U))
+        epsilon = SAFE * gamma(3 * self.size) * length * size
+        if info or not np.isfinite(relative) or not epsilon < 0.5:
+            return np.inf
+        row = float(np.sqrt((np.triu(X) ** 2).sum(axis=1).max())) + epsilon / (1 - epsilon) * length
+        return SAFE * (1 + relative) * row**2
 
     def compliance(self, A: sp.csc_array) -> Matrix:
         inverse, info = lapack.dpotri(self.U)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector
+from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector, scaled
 from .rounding import U as ROUNDING
 from .rounding import gamma
 
@@ -62,7 +62,7 @@ class GeneralBlock(SparseBlock):
 
         as LPLᵀ is positive definite. Both norms are at most √(‖·‖₁‖·‖_∞), by products with a vector of ones.
         """
-        shifted = sp.csc_array(self.balanced(D) - s * sp.eye_array(self.size))
+        shifted = sp.csc_array(scaled(self.matrix, D, D) - s * sp.eye_array(self.size))
         largest = float(abs(shifted.diagonal()).max())
         try:
             lu = _factored(shifted, self.lost)

@@ -15,8 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from .balance import POWER_STEPS, balanced_units, least_eigenvalue
 from .block import Block, Matrix, NotPositiveDefinite, Vector
 from .dense import DenseBlock
-from .local_compliance import LocalCompliance, Rows
-from .scaled import ScaledBlock
+from .selected_inverse import BlockPart, Rows
 from .sparse import sparse_block
 
 DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
@@ -32,7 +31,7 @@ class Stiffness:
         them from a cache, or say in an error whose K it is.
     """
 
-    def __init__(self, blocks: Sequence[Block], factor: Callable[[Stiffness], None] | None = None) -> None:
+    def __init__(self, blocks: Sequence[Block], factor: Callable[[Stiffness], object] | None = None) -> None:
         self.blocks = tuple(blocks)
         self._make = factor or Stiffness.factor_blocks
         ends = np.cumsum([0, *(block.size for block in self.blocks)])
@@ -163,15 +162,6 @@ class Stiffness:
         least = min(self.least_eigenvalues(D))
         return float((self.absolute_sums(D) * D).max()) / least if least > 0 else np.inf
 
-    def scaled(self, D: Vector) -> Stiffness:
-        """DKD of sparse blocks, by the factors of K. D (n,) : powers of two."""
-        blocks = [ScaledBlock(block, D[rows]) for block, rows in self._own_rows()]
-
-        def factor(_: Stiffness) -> None:
-            self.factors  # noqa: B018  # made when first asked for
-
-        return Stiffness(blocks, factor)
-
     def compliance(self, A: sp.csc_array) -> Matrix:
         """Q = AᵀK⁻¹A, (m, m), mm/N, by columns."""
         m = A.shape[1]
@@ -184,18 +174,25 @@ class Stiffness:
 
     def local_compliance(
         self, A: sp.csc_array, windows: Sequence[Rows], single: bool = True
-    ) -> LocalCompliance | None:
-        """Q_WW of windows of contacts, in single precision to four digits, for a preconditioner; None unless
-        every block has a band along which the contacts of a window are near each other.
+    ) -> Callable[[Rows], Matrix] | None:
+        """Q_WW (k, k) mm/N, by columns, of windows W of contacts, in single precision to four digits, for a
+        preconditioner; None unless every block has a band along which those of a window are near each other.
         """
         _ = self.factors
-        parts = []
+        parts: list[BlockPart] = []
         for block, rows in self._own_rows():
             part = block.local_compliance(sp.csc_array(A[rows]), windows, single)
             if part is None:
                 return None
             parts.append(part)
-        return LocalCompliance(tuple(parts))
+
+        def local(contacts: Rows) -> Matrix:
+            Q = np.zeros((len(contacts), len(contacts)), order="F")
+            for part in parts:
+                part.add_to(Q, contacts)
+            return Q
+
+        return local
 
 
 def dense_blocks(K: sp.csr_array) -> list[Matrix]:

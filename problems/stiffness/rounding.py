@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 U = 2.0**-53
+SAFE = 1.01  # for the rounding of the bounds themselves
 
 
 def gamma(k: Any) -> Any:

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 from .banded import BandedBlock, half_bandwidth
 from .block import Matrix, SparseBlock
 from .general import GeneralBlock
-from .local_compliance import Rows
+from .selected_inverse import Rows
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 

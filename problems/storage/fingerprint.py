@@ -12,6 +12,7 @@ import hashlib
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 #: The folder that holds the project's packages.
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,27 +50,19 @@ def _read(path: Path, root: Path, changed: int) -> tuple[str, tuple[Path, ...]]:
 class _WithoutText(ast.NodeTransformer):
     """Removes from a tree, which has neither comments nor layout, what cannot change a number."""
 
-    def generic_visit(self, node: ast.AST) -> ast.AST:
+    def generic_visit(self, node: ast.AST) -> Any:
+        match node:
+            case ast.Import() | ast.ImportFrom():
+                return None
+            case ast.Raise():
+                return ast.Raise()
+            case ast.arg():
+                node.annotation = None
+            case ast.FunctionDef():
+                node.returns = None
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             node.body = node.body[ast.get_docstring(node, clean=False) is not None :]
         return super().generic_visit(node)
-
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        node.returns = None
-        return self.generic_visit(node)
-
-    def visit_arg(self, node: ast.arg) -> ast.AST:
-        node.annotation = None
-        return node
-
-    def visit_Raise(self, node: ast.Raise) -> ast.AST:
-        return ast.Raise()
-
-    def visit_Import(self, node: ast.Import) -> None:
-        return None
-
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
-        return None
 
 
 def _imported(path: Path, tree: ast.Module, root: Path) -> Iterator[Path]:

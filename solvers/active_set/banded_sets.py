@@ -10,6 +10,8 @@ In terms of the change z, rounding shrinks with what is left to correct.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from problems.forms.assembly import Vector
@@ -18,22 +20,23 @@ from problems.forms.banded_inverse import BandedInverse, BandFactor
 from .block_pivoting import SIGN_UNCERTAINTY, Set, TrialSolution
 
 
-class BandedSets:
-    """λ⁺ and y⁺ of the sets C. factor : of M on an open set, kept from set to set.
+@dataclass
+class OpenFactor:
+    """M, and its Cholesky factor on an open set, kept until another one is asked for."""
 
-    All vectors are in the order of M; `start.rounding` is |y_C| at the point.
-    """
+    M: BandedInverse
+    last: BandFactor | None = None
 
-    def __init__(self, M: BandedInverse, start: TrialSolution, factor: BandFactor | None) -> None:
-        self.M, self.start, self.factor = M, start, factor
-        self.uncertainty = SIGN_UNCERTAINTY * start.rounding
+    def __call__(self, N: Set) -> BandFactor:
+        if self.last is None or (self.last.S ^ N).any():
+            self.last = self.M.factor(N)
+        return self.last
 
-    def at(self, C: Set) -> TrialSolution:
-        N, lam, y = ~C, self.start.lam, self.start.y
-        if self.factor is None or (self.factor.S ^ N).any():
-            self.factor = self.M.factor(N)
-        y_C = np.where(C, y, 0.0)
-        z: Vector = self.factor.solve(self.M.product(y_C) - lam) - y_C
-        return TrialSolution(
-            np.where(C, lam + self.M.product(z), 0.0), np.where(C, 0.0, y + z), self.uncertainty
-        )
+
+def banded_set(factor: OpenFactor, start: TrialSolution, C: Set) -> TrialSolution:
+    """λ⁺ and y⁺ of the set C; all vectors are in the order of M, `start.rounding` is |y_C| at the point."""
+    M, lam, y = factor.M, start.lam, start.y
+    y_C = np.where(C, y, 0.0)
+    z: Vector = factor(~C).solve(M.product(y_C) - lam) - y_C
+    new = np.where(C, lam + M.product(z), 0.0)
+    return TrialSolution(new, np.where(C, 0.0, y + z), SIGN_UNCERTAINTY * start.rounding)

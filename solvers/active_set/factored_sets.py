@@ -19,12 +19,9 @@ Optim. 17:159–187, 2006). One step of Newton's method per ρ, from the stiffne
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.banded_inverse import BandFactor
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
 from solvers.base import LoadCase
@@ -36,26 +33,18 @@ PASSES = 2
 GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
 
 
-@dataclass(frozen=True)
-class FactoredSets:
-    """λ⁺ and y⁺ of the sets C, from a point (λ, y)."""
-
-    prepared: Prepared
-    start: TrialSolution
-    factor: BandFactor | None = None  # there is none to keep
-
-    def at(self, C: Set) -> TrialSolution:
-        A, lam, y = self.prepared.assembly.A, self.start.lam, self.start.y
-        rho = STIFFER * stiffest_contact(self.prepared)
-        K, change = with_springs(self.prepared, rho, C), np.zeros_like(lam)
-        for _ in range(PASSES):
-            closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))
-            change = np.where(C, change + rho * (closed - y), -lam)
-        uncertainty = SIGN_UNCERTAINTY * self.start.rounding
-        return TrialSolution(lam + change, np.where(C, 0.0, y - closed), uncertainty)
+def factored_set(prepared: Prepared, start: TrialSolution, C: Set) -> TrialSolution:
+    """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
+    A, lam, y = prepared.assembly.A, start.lam, start.y
+    rho = STIFFER * stiffest_contact(prepared)
+    K, change = with_springs(prepared, rho, C), np.zeros_like(lam)
+    for _ in range(PASSES):
+        closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))
+        change = np.where(C, change + rho * (closed - y), -lam)
+    return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
 
 
-def approached_set(prepared: Prepared, load: LoadCase) -> Set:
+def penalty_continuation(prepared: Prepared, load: LoadCase) -> Set:
     """(m,) the contacts that overlap with springs as stiff as K. load : with p."""
     A, overlap = prepared.assembly.A, np.maximum(load.p, 0.0)
     C = overlap > 0

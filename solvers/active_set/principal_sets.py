@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy.linalg as sla
@@ -11,7 +10,7 @@ import scipy.linalg as sla
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Answer
-from solvers.kkt import kkt_status, rounding_of
+from solvers.kkt import judged, kkt_status, rounding_of
 
 from .block_pivoting import Set, TrialSolution, block_pivoting
 
@@ -29,12 +28,8 @@ def solve_from(C: Set, Q: Matrix, p: Vector, tolerance: float) -> Answer:
     if (found.trial.lam < 0).any():
         y = product(Q, lam) - p
     status, residual = kkt_status(Q, p, lam, y, tolerance)
-    details: dict[str, Any] = {"closed": int(found.C.sum()), "kkt_residual_mm": residual}
-    if status == "inaccurate":
-        status = "inaccurate" if found.converged else "iteration_limit"
-        why = "rounding" if found.converged else f"{MAX_SETS} contact sets"
-        details["cause"] = f"{why}: optimal only to {residual:.1e} mm"
-    return Answer(status, lam, iterations=found.passes, details=details)
+    limit = "" if found.converged else f"{MAX_SETS} contact sets"
+    return judged(status, lam, residual, {"closed": int(found.C.sum())}, limit, iterations=found.passes)
 
 
 def forces_on(C: Set, Q: Matrix, p: Vector) -> TrialSolution:

@@ -19,21 +19,20 @@ corrects more than further sets; so the limit on the sets of a sweep grows with 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.forms.banded_inverse import BandFactor
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
-from solvers.kkt import EPS, kkt_residual, largest_rounding, rounding_of
+from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
 
-from .banded_sets import BandedSets
+from .banded_sets import OpenFactor, banded_set
 from .block_pivoting import ROUNDING_FACTOR, Set, TrialSolution, block_pivoting, wrong_signs
-from .factored_sets import FactoredSets, approached_set
+from .factored_sets import factored_set, penalty_continuation
 
 MAX_SWEEPS = 200
 FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
@@ -56,7 +55,7 @@ class Case:
     load: LoadCase
     C: Set
     trial: TrialSolution
-    factor: BandFactor | None = None
+    factor: OpenFactor | None = None
     before: tuple[Vector, Vector] | None = None
     residual: float = np.inf
     doubt: float = np.inf
@@ -83,13 +82,15 @@ class Sweeps:
         near = self.prepared.approximate_inverse
         self.M, self.diagonal, self.gaps = near.M, near.diagonal, self.prepared.gaps
         self.order = np.arange(len(near.diagonal)) if near.M is None else near.M.order
+        self.own = near.diagonal[self.order]
 
     def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """An answer to each load, all with p, solved together from the nearest of the cases before them."""
         before = self.last or [self.solved(loads[0], tolerance)]
         self.last = self._sweep([self._from(_nearest(before, each), each) for each in loads], tolerance)
         for case in self.last:
-            case.factor = None  # as large as M for each; the next cases have other sets
+            if case.factor is not None:
+                case.factor.last = None  # as large as M for each; the next cases have other sets
         return [self.answer(case, tolerance) for case in self.last]
 
     def solved(
@@ -99,18 +100,18 @@ class Sweeps:
         order = self.order
         if start is None:
             y = -load.p[order]
-            first = y < 0 if self.M is not None else approached_set(self.prepared, load)
+            first = y < 0 if self.M is not None else penalty_continuation(self.prepared, load)
             case = Case(load, first, TrialSolution(np.zeros(len(y)), y, float(abs(y).max(initial=0.0))))
         else:
             lam, y = start.lam[order], start.gap[order]
-            closed = self.diagonal[order] * lam > y
+            closed = self.own * lam > y
             case = self._from(Case(start.load, closed, TrialSolution(lam, y, 0.0)), load)
         if C is not None:
             case.C = C[order]
         return self._sweep([case], tolerance)[0]
 
     def answer(self, case: Case, tolerance: float) -> Answer:
-        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew where
+        """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew if
         the rounding that it brought along decides, or a force was below zero.
 
         "solved" if max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm.
@@ -123,26 +124,31 @@ class Sweeps:
             y = self.gaps(lam[:, None], [case.load])[:, 0]
             residual = kkt_residual(lam, y)
         enough = residual <= max(tolerance, largest_rounding(self.diagonal, case.load.p, lam))
-        details: dict[str, Any] = {"closed": int(case.C.sum()), "kkt_residual_mm": residual}
-        status: Status = "solved" if enough else "inaccurate" if case.settled else "iteration_limit"
-        if not enough:
-            why = "rounding" if case.settled else f"{MAX_SWEEPS} products"
-            details["cause"] = f"{why}: optimal only to {residual:.1e} mm"
-        return Answer(status, lam, iterations=case.sweeps, inner_iterations=case.sets, details=details)
+        limit = "" if case.settled else f"{MAX_SWEEPS} products"
+        status: Status = "solved" if enough else "inaccurate"
+        return judged(
+            status,
+            lam,
+            residual,
+            {"closed": int(case.C.sum())},
+            limit,
+            iterations=case.sweeps,
+            inner_iterations=case.sets,
+        )
 
     def _from(self, solved: Case, load: LoadCase) -> Case:
         """A load case that starts from the solution of another one."""
         y = solved.trial.y + (solved.load.p - load.p)[self.order]
         trial = TrialSolution(solved.trial.lam, y, float(abs(y).max(initial=0.0)))
-        return Case(load, solved.C, trial, solved.factor)
+        return Case(load, solved.C, trial, None if solved.factor is None else replace(solved.factor))
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
         order = self.order
-        compliance, left = self.diagonal[order], cases
+        left = cases
         for _ in range(MAX_SWEEPS):
-            found = [self._step(case, compliance) for case in left]
+            found = [self._step(case) for case in left]
             kept = [
-                same and case.doubt <= SMALL * largest_rounding(compliance, case.load.p[order], lam)
+                same and case.doubt <= SMALL * largest_rounding(self.own, case.load.p[order], lam)
                 for case, (lam, same) in zip(left, found, strict=True)
             ]
             moved = np.empty((len(order), len(left)), order="F")
@@ -157,34 +163,33 @@ class Sweeps:
             for case, (lam, same), gap, k in zip(left, found, y, kept, strict=True):
                 if not k:
                     case.doubt = rounding_of(case.load.p[order], gap)
-                self._take(case, lam, case.trial.y + gap if k else gap, same, compliance, tolerance)
+                self._take(case, lam, case.trial.y + gap if k else gap, same, tolerance)
             left = [case for case in left if not case.settled]
             if not left:
                 break
         return cases
 
-    def _step(self, case: Case, compliance: Vector) -> tuple[Vector, bool]:
+    def _step(self, case: Case) -> tuple[Vector, bool]:
         """λ (m,) of the case with Q replaced by M⁻¹, and whether its set is the one before; on such a set it
         is conjugate to the last step.
         """
-        sets: BandedSets | FactoredSets
+        at: Callable[[Set], TrialSolution]
         if self.M is None:
-            sets = FactoredSets(self.prepared, case.trial)
+            at = partial(factored_set, self.prepared, case.trial)
         else:
-            sets = BandedSets(self.M, case.trial, case.factor)
-        floor = largest_rounding(compliance, case.load.p[self.order], case.trial.lam)
-        found = block_pivoting(sets.at, case.C, compliance, floor, int(FIRST_SETS * GROWTH**case.sweeps))
+            case.factor = case.factor or OpenFactor(self.M)
+            at = partial(banded_set, case.factor, case.trial)
+        floor = largest_rounding(self.own, case.load.p[self.order], case.trial.lam)
+        found = block_pivoting(at, case.C, self.own, floor, int(FIRST_SETS * GROWTH**case.sweeps))
         unchanged = not (case.C ^ found.C).any()
-        case.C, case.factor, case.sets = found.C, sets.factor, case.sets + found.passes
+        case.C, case.sets = found.C, case.sets + found.passes
         lam = found.trial.lam
         if unchanged and case.before is not None:
             step, change = case.before
             lam = lam - ((lam - case.trial.lam) @ change / (step @ change)) * step
         return lam, unchanged
 
-    def _take(
-        self, case: Case, lam: Vector, y: Vector, unchanged: bool, compliance: Vector, tolerance: float
-    ) -> None:
+    def _take(self, case: Case, lam: Vector, y: Vector, unchanged: bool, tolerance: float) -> None:
         """Take λ and y, or a part of the step, and decide whether the case is settled."""
         order = self.order
         step, change = lam - case.trial.lam, y - case.trial.y
@@ -200,8 +205,8 @@ class Sweeps:
         case.stalled = case.stalled + 1 if residual > case.residual / 2 else 0
         case.trial, case.sweeps = TrialSolution(lam, y, missed), case.sweeps + 1
         case.residual = residual
-        floor = largest_rounding(compliance, case.load.p[order], lam)
-        right = not wrong_signs(case.C, case.trial, compliance, floor).any()
+        floor = largest_rounding(self.own, case.load.p[order], lam)
+        right = not wrong_signs(case.C, case.trial, self.own, floor).any()
         enough = TARGET * tolerance
         if case.stalled:
             enough = max(tolerance, ROUNDING_FACTOR * floor)

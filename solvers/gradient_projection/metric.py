@@ -15,13 +15,13 @@ two band products and a band solution.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.compliance import Compliance
-from solvers.active_set.banded_sets import BandedSets
+from solvers.active_set.banded_sets import OpenFactor, banded_set
 from solvers.active_set.block_pivoting import Set, TrialSolution, block_pivoting
 
 STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
@@ -51,19 +51,15 @@ class Diagonal:
 
 @dataclass
 class Face(Diagonal):
-    """The same, but with M⁻¹ in the preconditioner. factor : of M off the face, kept from one to the next."""
+    """The same, but with M⁻¹ in the preconditioner. factor : of M off the face."""
 
-    M: BandedInverse
-    factor: BandFactor | None = field(default=None, init=False)
+    factor: OpenFactor
 
     def precondition(self, F: Set, r: Vector) -> Vector:
-        order = self.M.order
-        N = ~F[order]
-        if self.factor is None or (self.factor.S ^ N).any():
-            self.factor = self.M.factor(N)
-        v = self.M.product(np.where(F, r, 0.0)[order])
+        M = self.factor.M
+        v = M.product(np.where(F, r, 0.0)[M.order])
         z = np.empty_like(r)
-        z[order] = v - self.M.product(self.factor.solve(v))
+        z[M.order] = v - M.product(self.factor(~F[M.order]).solve(v))
         z[~F] = 0.0
         return z
 
@@ -72,13 +68,12 @@ class Band(Face):
     """B = M⁻¹, ᾱ = 1."""
 
     def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
-        order = self.M.order
+        order = self.factor.M.order
         own, gap, compliance = lam[order], y[order], self.diagonal[order]
         C = np.where(own > 0, compliance * own > gap, gap < 0)
         start = TrialSolution(own, gap, float(abs(gap[own > 0]).max(initial=0.0)))
-        banded = BandedSets(self.M, start, self.factor)
-        found = block_pivoting(banded.at, C, compliance, 0.0, MAX_SETS)
-        self.factor, self.sets = banded.factor, self.sets + found.passes
+        found = block_pivoting(partial(banded_set, self.factor, start), C, compliance, 0.0, MAX_SETS)
+        self.sets += found.passes
         d = np.empty_like(lam)
         d[order] = np.maximum(found.trial.lam, 0.0) - own
         return d

@@ -14,8 +14,8 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.banded_inverse import BandedInverse
-from solvers.linear_algebra.conjugate_gradients import Solved, conjugate_gradients
 
+from .conjugate_gradients import Solved, conjugate_gradients
 from .newton_system import NewtonSystem
 
 

@@ -13,7 +13,8 @@ import scipy.linalg as sla
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
-from solvers.linear_algebra.conjugate_gradients import Solved
+
+from .conjugate_gradients import Solved
 
 
 class NewtonSystem(ABC):

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.linalg import blas
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.linear_algebra.conjugate_gradients import Solved, conjugate_gradients
 
+from .conjugate_gradients import Solved, conjugate_gradients
 from .newton_system import Direct, NewtonSystem
 
 #: CG iterations after which a factorisation in a new order pays off. A Cholesky factorisation takes m³/3
@@ -55,28 +55,7 @@ class Identity(Preconditioned):
 
 
 class CholeskyFactor(Preconditioned):
-    """V = U: the Cholesky factor of Q, which ignores D."""
-
-    def __init__(self, Q: Matrix) -> None:
-        super().__init__(Q)
-        self.U = np.asfortranarray(sla.cholesky(Q, check_finite=False))
-
-    def multiply(self, z: Vector) -> Vector:
-        return z + self.to_transformed(self.D * self.from_transformed(z))
-
-    def to_transformed(self, b: Vector) -> Vector:
-        return blas.dtrsv(self.U, b, trans=1)
-
-    def from_transformed(self, z: Vector) -> Vector:
-        return blas.dtrsv(self.U, z)
-
-
-class CholeskyPlusRoot(Preconditioned):
-    """V = U + S with S = √D: upper triangular, and exact if D is zero or dominates.
-
-    VᵀV = H + UᵀS + SU, so λmin(V⁻ᵀHV⁻¹) ≥ 1/2; the largest eigenvalue has no such bound. If D → ∞
-    on a set B and D → 0 on the rest I, the spectrum tends to 1 and 1 + eig(U_II⁻ᵀ U_BIᵀ U_BI U_II⁻¹),
-    with U_BI = 0 if B comes last in the order of the nodes.
+    """V = U: the Cholesky factor of Q, which ignores D.
 
     order : (m,) the order in which the nodes are eliminated; as they are numbered if None.
     """
@@ -87,6 +66,26 @@ class CholeskyPlusRoot(Preconditioned):
         permuted = Q if order is None else Q[np.ix_(order, order)]
         self.V = np.asfortranarray(sla.cholesky(permuted, check_finite=False))
         self.diagonal = np.diag(self.V).copy()
+
+    def multiply(self, z: Vector) -> Vector:
+        return z + self.to_transformed(self.D * self.from_transformed(z))
+
+    def to_transformed(self, b: Vector) -> Vector:
+        return blas.dtrsv(self.V, b[self.order], trans=1)
+
+    def from_transformed(self, z: Vector) -> Vector:
+        v = np.empty_like(z)
+        v[self.order] = blas.dtrsv(self.V, z)
+        return v
+
+
+class CholeskyPlusRoot(CholeskyFactor):
+    """V = U + S with S = √D: upper triangular, and exact if D is zero or dominates.
+
+    VᵀV = H + UᵀS + SU, so λmin(V⁻ᵀHV⁻¹) ≥ 1/2; the largest eigenvalue has no such bound. If D → ∞
+    on a set B and D → 0 on the rest I, the spectrum tends to 1 and 1 + eig(U_II⁻ᵀ U_BIᵀ U_BI U_II⁻¹),
+    with U_BI = 0 if B comes last in the order of the nodes.
+    """
 
     def update(self, D: Vector) -> int:
         self.S = np.sqrt(D[self.order])
@@ -101,14 +100,6 @@ class CholeskyPlusRoot(Preconditioned):
         """
         St = self.S * blas.dtrsv(self.V, z)
         return z - St - blas.dtrsv(self.V, self.S * (z - 2.0 * St), trans=1)
-
-    def to_transformed(self, b: Vector) -> Vector:
-        return blas.dtrsv(self.V, b[self.order], trans=1)
-
-    def from_transformed(self, z: Vector) -> Vector:
-        v = np.empty_like(z)
-        v[self.order] = blas.dtrsv(self.V, z)
-        return v
 
 
 class OpenLast(NewtonSystem):

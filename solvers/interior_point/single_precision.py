@@ -11,8 +11,8 @@ import numpy as np
 from scipy.linalg import blas, lapack
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.linear_algebra.conjugate_gradients import Solved
 
+from .conjugate_gradients import Solved
 from .newton_system import Direct
 
 MAX_DIAGONAL = 1e30  # on the diagonal

@@ -26,7 +26,7 @@ MULTIPLIER = 2.0  # the multiplier of λ, > 1
 MAX_STEPS = 200  # multiplications, and sweeps of corrections
 
 
-class NoStart(ValueError):
+class NoStart(np.linalg.LinAlgError):
     """No feasible starting point was found."""
 
 
@@ -46,24 +46,18 @@ def algorithm_5(Q: Matrix, p: Vector) -> Start:
     One more multiplication follows, because the interior needs y > 0: mult·Qλ − p > Qλ − p ≥ 0. Raises
     NoStart if no λ > 0 with Qλ > 0 is found.
     """
-    return _opened(lambda lam: Q @ lam, lambda i: Q[:, i], p)
+    return _opened(lambda lam: Q @ lam, p)
 
 
 def algorithm_4(prepared: Prepared, load: LoadCase) -> Start:
     """The same from displacements: Kx = f − Aλ (step 3), y = g − Aᵀx (step 4)."""
-    A = prepared.assembly.A
-
-    def response(lam: Vector) -> Vector:
-        return A.T @ prepared.assembly.K.solve(A @ lam)
-
-    def column(i: int) -> Vector:
-        return A.T @ prepared.assembly.K.solve(A[:, [i]].toarray()[:, 0])
-
-    return _opened(response, column, prepared.dual_load(load))
+    A, K = prepared.assembly.A, prepared.assembly.K
+    return _opened(lambda lam: A.T @ K.solve(A @ lam), prepared.dual_load(load))
 
 
-def _opened(response: Callable[[Vector], Vector], column: Callable[[int], Vector], p: Vector) -> Start:
-    lam, Qlam, corrections = _positive_response(response, column, np.ones(len(p)))  # step 1
+def _opened(response: Callable[[Vector], Vector], p: Vector) -> Start:
+    """response : Q times a vector."""
+    lam, Qlam, corrections = _positive_response(response, np.ones(len(p)))  # step 1
     for multiplications in range(1, MAX_STEPS + 1):  # step 2
         y = Qlam - p  # step 3
         opened = bool((y >= 0).all())  # step 4
@@ -75,9 +69,7 @@ def _opened(response: Callable[[Vector], Vector], column: Callable[[int], Vector
     )
 
 
-def _positive_response(
-    response: Callable[[Vector], Vector], column: Callable[[int], Vector], lam: Vector
-) -> tuple[Vector, Vector, int]:
+def _positive_response(response: Callable[[Vector], Vector], lam: Vector) -> tuple[Vector, Vector, int]:
     """λ > 0 with Qλ > 0: the correction λ_i ← −Σ_{j≠i} q_ij λ_j / q_ii + ε below (16), ε the first λ_i."""
     corrections, epsilon = 0, lam.copy()
     for _ in range(MAX_STEPS):
@@ -86,7 +78,7 @@ def _positive_response(
         if not negative.size:
             return lam, Qlam, corrections
         for i in negative:
-            q = column(int(i))
+            q = response((np.arange(len(lam)) == i).astype(float))
             others = q @ lam - q[i] * lam[i]
             lam[i] = max(lam[i], -others / q[i] + epsilon[i])
             corrections += 1

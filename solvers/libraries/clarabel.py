@@ -13,14 +13,14 @@ so does the sparse one but for the equilibration, which its units replace (probl
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import clarabel
 import numpy as np
 
-from solvers.adapter import Converted, choice, gap_tolerance, is_sparse, rows_for_bounds, upper_triangle
-from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
-from solvers.settings import apply, chosen
+from solvers.adapter import Converted, Library, gap_tolerance, is_sparse, rows_for_bounds, upper_triangle
+from solvers.base import Answer, LoadCase, Problem, Status, WarmStart
+from solvers.settings import apply
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",
@@ -29,17 +29,15 @@ STATUS: dict[str, Status] = {
 }
 
 
-class Clarabel(Solver):
+class Clarabel(Library):
     """direct_solve_method : "faer" factors the dense blocks by supernodes, "qdldl" entry by entry;
     "auto" would choose qdldl for them. settings : Clarabel's own, as equilibrate_enable = true.
     """
 
-    forms = FORMS
+    choices: ClassVar[dict[str, tuple[str, ...]]] = {"direct_solve_method": ("faer", "qdldl", "auto")}
 
-    def __init__(self, *, direct_solve_method: str = "faer", **settings: object) -> None:
-        choice("clarabel", "direct_solve_method", direct_solve_method, ("faer", "qdldl", "auto"))
-        self.direct_solve_method = direct_solve_method
-        self.settings = chosen("clarabel", settings, clarabel.DefaultSettings())
+    def defaults(self) -> Any:
+        return clarabel.DefaultSettings()
 
     def convert(self, problem: Problem) -> Converted:
         return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, -1.0))
@@ -52,17 +50,16 @@ class Clarabel(Solver):
         return state, clarabel.DefaultSolver(state.P, q, state.G, h, cones, settings)
 
     def _settings(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
-        settings = clarabel.DefaultSettings()
+        settings = self.defaults()
         settings.verbose = False
         settings.max_iter = 500
-        settings.direct_solve_method = self.direct_solve_method
         settings.tol_feas = tolerance
         settings.tol_gap_abs = gap_tolerance(tolerance, load)
         settings.tol_gap_rel = 0.0
         settings.equilibrate_enable = not (state.problem.bounded or is_sparse(state.problem.blocks))
         if state.problem.bounded:
             settings.static_regularization_constant = 1e-12
-        apply(settings, self.settings)
+        apply(settings, self.own | self.settings)
         return settings
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:

@@ -7,47 +7,38 @@ when the objective no longer changes in its last digit, which it also calls a su
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 from scipy.optimize import minimize
 
-from problems.errors import InputError
 from problems.forms.assembly import Vector
-from solvers.adapter import Converted, dense
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.adapter import answer
+from solvers.base import Answer, LoadCase, Status
+from solvers.method import Method, State, first_point
+from solvers.settings import require
 
 LIMIT = 1_000_000  # iterations, and products with Q
 
 
-class LBfgsB(Solver):
+@dataclass(kw_only=True, frozen=True, eq=False)
+class LBfgsB(Method):
     """It starts from λ = 0 or a warm start. maxcor : pairs of vectors in the approximate Hessian."""
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
-    distribution = "scipy"
+    distribution: ClassVar[str | None] = "scipy"
 
-    def __init__(self, *, maxcor: int = 10) -> None:
-        if type(maxcor) is not int or maxcor < 1:
-            raise InputError.one("solver l-bfgs-b", "options.maxcor", maxcor, "must be a whole number from 1")
-        self.maxcor = maxcor
+    maxcor: int = 10
 
-    def convert(self, problem: Problem) -> Converted:
-        return Converted(problem, dense(problem.blocks))
+    def __post_init__(self) -> None:
+        valid = type(self.maxcor) is int and self.maxcor >= 1
+        require("l-bfgs-b", vars(self), maxcor=(valid, "must be a whole number from 1"))
 
-    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> tuple[Converted, Vector]:
-        return state, np.zeros_like(load.p)
-
-    def update(
-        self, state: Converted, ready: object, load: LoadCase, tolerance: float, start: WarmStart
-    ) -> tuple[Converted, Vector]:
-        return state, np.maximum(start.lam, 0.0)
-
-    def solve(self, ready: tuple[Converted, Vector], load: LoadCase, tolerance: float) -> Answer:
-        state, start = ready
+    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
+        Q, (start, _) = ready.Q.T, first_point(ready.start, load)  # symmetric
 
         def objective(lam: Vector) -> tuple[float, Vector]:
             """½λᵀQλ − pᵀλ, N·mm, and its gradient y = Qλ − p, mm."""
-            y = state.P @ lam - load.p
+            y = Q @ lam - load.p
             return float(lam @ (y - load.p)) / 2, y
 
         found = minimize(
@@ -69,4 +60,4 @@ class LBfgsB(Solver):
         status: Status = "iteration_limit" if found.status == 1 else "inaccurate"
         if found.success and "PROJECTED GRADIENT" in message:
             status = "solved"
-        return state.answer(status, tolerance, found.x, None, iterations=found.nit, details=details)
+        return answer(status, tolerance, found.x, iterations=found.nit, details=details)

@@ -7,14 +7,13 @@ never by the clock, so the iteration count does not depend on the machine.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import osqp
 
-from solvers.adapter import Converted, choice, rows_for_bounds, upper_triangle
-from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
-from solvers.settings import chosen
+from solvers.adapter import Converted, Library, rows_for_bounds, upper_triangle
+from solvers.base import Answer, LoadCase, Problem, Status, WarmStart
 
 STATUS: dict[int, Status] = {
     int(osqp.SolverStatus.OSQP_SOLVED): "solved",
@@ -25,25 +24,19 @@ RHO_BY_ITERATIONS = 1  # OSQP_ADAPTIVE_RHO_UPDATE_ITERATIONS
 POLISH = {0: "not tried", 1: "accepted", 2: "nothing active", -1: "rejected", -2: "failed"}
 
 
-def _defaults() -> Any:
-    interface = osqp.OSQP().ext
-    settings = interface.OSQPSettings()
-    interface.osqp_set_default_settings(settings)
-    return settings
-
-
-class Osqp(Solver):
+class Osqp(Library):
     """polishing : solve again on the estimated active set. OSQP may accept a result outside the tolerance and
     still report solved (its issue 790); if its own residuals exceed the tolerance, the status is inaccurate.
     settings : OSQP's own, as scaling = 0.
     """
 
-    forms = FORMS
+    choices: ClassVar[dict[str, tuple[bool, ...]]] = {"polishing": (False, True)}
 
-    def __init__(self, *, polishing: bool = False, **settings: object) -> None:
-        choice("osqp", "polishing", polishing, (False, True))
-        self.settings = chosen("osqp", settings, _defaults())
-        self.polishing = polishing
+    def defaults(self) -> Any:
+        interface = osqp.OSQP().ext
+        settings = interface.OSQPSettings()
+        interface.osqp_set_default_settings(settings)
+        return settings
 
     def convert(self, problem: Problem) -> Converted:
         return Converted(problem, upper_triangle(problem.blocks), rows_for_bounds(problem, 1.0))
@@ -59,11 +52,10 @@ class Osqp(Solver):
             "max_iter": 1_000_000,
             "adaptive_rho": RHO_BY_ITERATIONS,
             "adaptive_rho_interval": 50,
-            "polishing": self.polishing,
             "verbose": False,
         }
         library = osqp.OSQP()
-        library.setup(state.P, q, state.G, *bounds, **settings | self.settings)
+        library.setup(state.P, q, state.G, *bounds, **settings | self.own | self.settings)
         return state, library
 
     def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:

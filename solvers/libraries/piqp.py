@@ -7,15 +7,15 @@ sparse form, the rows are eliminated from the KKT system, so what is factored ha
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import piqp
 import scipy.sparse as sp
 
-from solvers.adapter import Converted, choice, dense, gap_tolerance, is_sparse, upper_triangle
-from solvers.base import DENSE_FORMS, FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
-from solvers.settings import apply, chosen
+from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
+from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
+from solvers.settings import apply
 
 STATUS: dict[Any, Status] = {
     piqp.PIQP_SOLVED: "solved",
@@ -23,34 +23,30 @@ STATUS: dict[Any, Status] = {
 }
 
 
-class Piqp(Solver):
+class Piqp(Library):
     """backend : "dense" or "sparse" Cholesky; None: as the blocks of P are. Where they are dense, dense is
     several times faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal
     form. settings : PIQP's own, as rho_init = 1e-8.
     """
 
-    def __init__(self, *, backend: str | None = None, **settings: object) -> None:
-        choice("piqp", "backend", backend, ("dense", "sparse", None))
-        self.backend = backend
-        self.settings = chosen("piqp", settings, piqp.DenseSolver().settings)
-        self.forms = DENSE_FORMS if backend == "dense" else FORMS  # type: ignore[misc]  # of this solver alone
+    choices: ClassVar[dict[str, tuple[str | None, ...]]] = {"backend": (None, "dense", "sparse")}
+
+    def __init__(self, **options: object) -> None:
+        super().__init__(**options)
+        if self.own["backend"] == "dense":
+            self.forms = DENSE_FORMS  # type: ignore[misc]  # of this solver alone
+
+    def defaults(self) -> Any:
+        return piqp.DenseSolver().settings
 
     def convert(self, problem: Problem) -> Converted:
-        G = problem.G
-        if self.backend == "sparse" or is_sparse(problem.blocks):
-            rows = None if G is None else sp.csc_matrix(G)
-            return Converted(problem, upper_triangle(problem.blocks), rows)
-        return Converted(problem, dense(problem.blocks), None if G is None else G.toarray(order="F"))
+        return converted(problem, self.own["backend"] == "sparse" or is_sparse(problem.blocks))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         library = piqp.SparseSolver() if sp.issparse(state.P) else piqp.DenseSolver()
         settings = library.settings
-        settings.eps_abs = tolerance
-        settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
-        settings.eps_rel = settings.eps_duality_gap_rel = 0.0
-        settings.check_duality_gap = True
+        set_absolute(settings, tolerance, load)
         settings.max_iter = 500
-        settings.compute_timings = True
         if is_sparse(state.problem.blocks):
             settings.kkt_solver = piqp.sparse_ldlt_ineq_cond
         apply(settings, self.settings)

@@ -6,15 +6,15 @@ and the duality gap are below the tolerance. The dual form uses its box constrai
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
 from proxsuite import proxqp
 
-from solvers.adapter import Converted, choice, dense, gap_tolerance, is_sparse, upper_triangle
-from solvers.base import DENSE_FORMS, FORMS, Answer, LoadCase, Problem, Solver, Status, WarmStart
-from solvers.settings import apply, chosen
+from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
+from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
+from solvers.settings import apply
 
 BACKENDS = {
     "automatic": proxqp.dense.DenseBackend.Automatic,
@@ -29,24 +29,25 @@ STATUS: dict[Any, Status] = {
 INFINITY = 1e20  # ProxQP's value for no bound
 
 
-class ProxQp(Solver):
+class ProxQp(Library):
     """backend : which matrix the dense backend factors; "automatic" decides by the sizes. Only "automatic"
     takes the sparse form. settings : ProxQP's own, as default_rho = 1e-7.
     """
 
     distribution = "proxsuite"
 
-    def __init__(self, *, backend: str = "automatic", **settings: object) -> None:
-        choice("proxqp", "backend", backend, tuple(BACKENDS))
-        self.backend = backend
-        self.settings = chosen("proxqp", settings, proxqp.dense.QP(1, 0, 0).settings)
-        self.forms = FORMS if backend == "automatic" else DENSE_FORMS  # type: ignore[misc]  # of this solver alone
+    choices: ClassVar[dict[str, tuple[str, ...]]] = {"backend": tuple(BACKENDS)}
+
+    def __init__(self, **options: object) -> None:
+        super().__init__(**options)
+        if self.own["backend"] != "automatic":
+            self.forms = DENSE_FORMS  # type: ignore[misc]  # of this solver alone
+
+    def defaults(self) -> Any:
+        return proxqp.dense.QP(1, 0, 0).settings
 
     def convert(self, problem: Problem) -> Converted:
-        G = problem.G
-        if is_sparse(problem.blocks):
-            return Converted(problem, upper_triangle(problem.blocks), sp.csc_matrix(G))
-        return Converted(problem, dense(problem.blocks), None if G is None else G.toarray())
+        return converted(problem, is_sparse(problem.blocks))
 
     def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
         q, h = state.vectors(load)
@@ -54,16 +55,11 @@ class ProxQp(Solver):
         if sp.issparse(state.P):
             library = proxqp.sparse.QP(len(q), 0, rows)
         else:
-            backend = BACKENDS[self.backend]
+            backend = BACKENDS[self.own["backend"]]
             library = proxqp.dense.QP(len(q), 0, rows, state.problem.bounded, dense_backend=backend)
         settings = library.settings
-        settings.eps_abs = tolerance
-        settings.eps_duality_gap_abs = gap_tolerance(tolerance, load)
-        settings.eps_rel = settings.eps_duality_gap_rel = 0.0
-        settings.check_duality_gap = True
-        settings.max_iter = 100_000
-        settings.max_iter_in = 100_000
-        settings.compute_timings = True
+        set_absolute(settings, tolerance, load)
+        settings.max_iter = settings.max_iter_in = 100_000
         apply(settings, self.settings)
         if h is None:
             library.init(H=state.P, g=q, l_box=np.zeros_like(q), u_box=np.full_like(q, INFINITY))

@@ -17,9 +17,10 @@ import qpsolvers
 import scipy.sparse as sp
 from qpsolvers.exceptions import QPError
 
-from problems.errors import Fault, InputError
+from problems.errors import InputError
 from solvers.adapter import Converted, dense, gap_tolerance, is_sparse, sorted_csc
 from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
+from solvers.settings import require
 
 #: Options that set the absolute tolerance, and that of the duality gap. Relative tolerances are 0, iteration
 #: limits too large to matter. DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes none
@@ -64,11 +65,8 @@ class QpSolvers(Solver):
         if name not in qpsolvers.available_solvers:
             found = ", ".join(qpsolvers.available_solvers)
             raise InputError.one("qpsolvers", "solver", name, f"one of those it finds: {found}")
-        if name not in TOLERANCE and settings:
-            faults = [
-                Fault(f"solver {name}", f"options.{key}", settings[key], NO_OPTIONS) for key in settings
-            ]
-            raise InputError(faults)
+        if name not in TOLERANCE:
+            require(name, settings, **dict.fromkeys(settings, (False, NO_OPTIONS)))
         self.name, self.settings = name, settings
         if name in qpsolvers.sparse_solvers:
             self.forms = FORMS  # type: ignore[misc]  # of this solver alone

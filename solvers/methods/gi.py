@@ -17,26 +17,27 @@ from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import NDArray
+from scipy.linalg import lapack
 
-from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
-from solvers.active_set.growing_factor import GrowingFactor
 from solvers.active_set.principal_sets import solve_from
-from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, Solver, failed
-from solvers.kkt import kkt_status
-from solvers.linear_algebra.inverse import inverse_with_factor
+from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, failed
+from solvers.kkt import kkt_residual, kkt_status
+from solvers.method import Method, State
+from solvers.settings import require
 
 
-@dataclass(frozen=True)
-class _Prepared:
-    problem: Problem
+@dataclass(frozen=True, kw_only=True)
+class _Prepared(State):
+    """G : Q in the primal form, Q⁻¹ in the dual one; U : there, Q = UᵀU."""
+
     G: Matrix
-    factor: Matrix | None  # of Q, in the dual form
+    U: Matrix | None = None
 
 
-class GoldfarbIdnani(Solver):
+@dataclass(kw_only=True, frozen=True, eq=False)
+class GoldfarbIdnani(Method):
     """Goldfarb–Idnani with Powell's safeguards.
 
     Stops when no slack is below −tolerance (mm in the primal form, N in the dual form) beyond rounding. In
@@ -52,38 +53,31 @@ class GoldfarbIdnani(Solver):
 
     forms: ClassVar[tuple[Form, ...]] = DENSE_FORMS
 
-    def __init__(self, *, max_pivots: float = 10.0) -> None:
-        if not max_pivots > 0:
-            raise InputError.one("gi", "max_pivots", max_pivots, "must be positive")
-        self.max_pivots = max_pivots
+    max_pivots: float = 10.0
 
-    def prepare(self, data: Problem) -> _Prepared | Answer:
-        """G: Q itself, or Q⁻¹ from the Cholesky factor of Q; a failed answer if there is none."""
-        if not data.bounded:
-            return _Prepared(data, data.Q, None)
-        try:
-            inverse, U = inverse_with_factor(data.Q)
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
-        return _Prepared(data, inverse, U)
+    def __post_init__(self) -> None:
+        require("gi", vars(self), max_pivots=(self.max_pivots > 0, "must be positive"))
 
-    def solve(self, ready: _Prepared | Answer, load: LoadCase, tolerance: float) -> Answer:
-        if isinstance(ready, Answer):
-            return ready
-        try:
-            return self._solved(ready, load, tolerance)
-        except np.linalg.LinAlgError as error:
-            return failed(str(error))
+    def state(self, problem: Problem) -> _Prepared:
+        """G: Q itself, or Q⁻¹ from the Cholesky factor of Q."""
+        if not problem.bounded:
+            return _Prepared(problem=problem, G=problem.Q)
+        U = sla.cholesky(problem.Q, check_finite=False)
+        G, info = lapack.dpotri(U)  # its upper triangle
+        if info:
+            raise np.linalg.LinAlgError(f"the diagonal of U is zero at {info}")
+        G += np.triu(G, 1).T
+        return _Prepared(problem=problem, G=G, U=U)
 
-    def _solved(self, ready: _Prepared, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: _Prepared, load: LoadCase, tolerance: float) -> Answer:
         data = ready.problem
-        slacks = _primal_slacks(ready, load) if ready.factor is None else _dual_slacks(ready, load)
+        slacks = _primal_slacks(ready, load) if ready.U is None else _dual_slacks(ready, load)
         limit = int(self.max_pivots * len(ready.G)) + 10
         result = goldfarb_idnani(ready.G, slacks, tolerance, limit)
         if not np.isfinite(result.u).all():
             return failed("rounding: the multipliers are no longer finite", result.pivots)
         details: dict[str, Any] = {"drops": result.drops, "refinements": result.refinements} | result.cause
-        if ready.factor is None:
+        if ready.U is None:
             lam = _certain(ready, slacks, result, tolerance, details)
             if result.status != "solved":
                 details.setdefault("cause", "rounding: some slack is below zero by more than the tolerance")
@@ -131,15 +125,10 @@ def _certain(
     if result.status != "solved" or not (s[~closed] < 0).any():
         return result.u
     answer = solve_from(closed, ready.G, -slacks(np.zeros(len(s)))[0], tolerance)
-    if answer.lam is None or _violation(slacks(answer.lam)[0], answer.lam) > _violation(s, result.u):
+    if answer.lam is None or kkt_residual(answer.lam, slacks(answer.lam)[0]) > kkt_residual(result.u, s):
         return result.u
     details["finishing_sets"] = answer.iterations
     return answer.lam
-
-
-def _violation(s: Vector, lam: Vector) -> float:
-    """max(max(−s), max_{λ>0} |s|), mm."""
-    return max(float((-s).max(initial=0.0)), float(abs(s[lam > 0]).max(initial=0.0)))
 
 
 def _primal_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
@@ -160,7 +149,7 @@ def _primal_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
 
 
 def _dual_slacks(ready: _Prepared, load: LoadCase) -> Slacks:
-    Q, factor = ready.problem.Q, (ready.factor, False)
+    Q, factor = ready.Q, (ready.U, False)
 
     def slacks(u: Vector) -> tuple[Vector, Vector]:
         """s = λ with Qλ = p + u, refined once.
@@ -180,29 +169,22 @@ def _on_support(ready: _Prepared, load: LoadCase, lam: Vector, result: GiResult)
     With G = Q⁻¹, Q_SS⁻¹ r_S is v_S − G_SC G_CC⁻¹ v_C for v = G (r_S, 0). Entries that are then negative, at
     contacts closed without a force, move to C.
     """
-    C = result.active
+    C, factor, Q = result.active, result.factor, ready.Q
     while True:
-        lam = _refined(ready, load, lam, C, result.factor)
+        lam = lam.copy()
+        for _ in range(2):
+            lam[C] = 0.0
+            r = load.p - Q @ lam
+            r[C] = 0.0
+            v = sla.cho_solve((ready.U, False), r, check_finite=False)
+            u = np.zeros_like(v)
+            u[C] = factor.solve(factor.solve_transposed(v[C]))
+            lam += v - ready.G @ u
+        lam[C] = 0.0
         negative = np.flatnonzero(lam < 0)
         if not negative.size:
             return lam
         for k in negative:
-            d = result.factor.solve_transposed(ready.G[C, k])
-            result.factor.append(d, float(np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))))
+            d = factor.solve_transposed(ready.G[C, k])
+            factor.append(d, float(np.sqrt(max(ready.G[k, k] - d @ d, EPS * ready.G[k, k]))))
             C = np.append(C, k)
-
-
-def _refined(
-    ready: _Prepared, load: LoadCase, lam: Vector, C: NDArray[np.intp], factor: GrowingFactor
-) -> Vector:
-    lam = lam.copy()
-    for _ in range(2):
-        lam[C] = 0.0
-        r = load.p - ready.problem.Q @ lam
-        r[C] = 0.0
-        v = sla.cho_solve((ready.factor, False), r, check_finite=False)
-        u = np.zeros_like(v)
-        u[C] = factor.solve(factor.solve_transposed(v[C]))
-        lam += v - ready.G @ u
-    lam[C] = 0.0
-    return lam

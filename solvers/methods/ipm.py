@@ -8,19 +8,20 @@ V = U + √D (eq. 15), from the start of Algorithm 5. Each option changes one in
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from problems.forms.banded_inverse import banded_inverse
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, failed
+from solvers.base import Answer, LoadCase, Problem, Status
 from solvers.interior_point.banded import Banded
 from solvers.interior_point.newton_system import NewtonSystem
 from solvers.interior_point.preconditioner import SYSTEMS, OpenLast
 from solvers.interior_point.schemes import SCHEMES, CgExhausted, NewtonSteps, Point
 from solvers.interior_point.start import NoStart, Start, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
 from solvers.kkt import largest_rounding
-from solvers.settings import require
+from solvers.method import Method, State
+from solvers.settings import one_of, require
 
 STALLED = 10  # iterations without progress before a restart, or the end
 RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
@@ -33,14 +34,13 @@ STARTS = ("algorithm_5", "algorithm_4", "stp1", "stp2", "mehrotra")
 ORDERINGS = ("lexicographic", "open_last")
 
 
-@dataclass(frozen=True)
-class _Ready:
-    problem: Problem
+@dataclass(frozen=True, kw_only=True)
+class _State(State):
     system: NewtonSystem
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
-class Ipm(Solver):
+class Ipm(Method):
     """Primal–dual interior point.
 
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ 1e-3 √ε_μ mm with s1 = y − (Qλ − p).
@@ -68,8 +68,6 @@ class Ipm(Solver):
     max_cg : limit on the iterations of the conjugate gradients, in total.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
-
     start: str = "algorithm_5"
     scheme: str = "algorithm_3"
     preconditioner: str = "V"
@@ -84,9 +82,9 @@ class Ipm(Solver):
         require(
             "ipm",
             vars(self),
-            start=(self.start in STARTS, f"must be one of {STARTS}"),
-            scheme=(self.scheme in SCHEMES, f"must be one of {(*SCHEMES,)}"),
-            preconditioner=(self.preconditioner in systems, f"must be one of {systems}"),
+            start=one_of(self.start, STARTS),
+            scheme=one_of(self.scheme, SCHEMES),
+            preconditioner=one_of(self.preconditioner, systems),
             ordering=(self.ordering in orderings, f"must be one of {ORDERINGS}, open_last with V only"),
             theta=(0 < self.theta < 1, "must lie in (0, 1)"),
             sigma=(0 <= self.sigma <= 1, "must lie in [0, 1]"),
@@ -94,28 +92,20 @@ class Ipm(Solver):
             max_cg=(self.max_cg >= 1, "must be at least 1"),
         )
 
-    def prepare(self, data: Problem) -> _Ready | Answer:
-        """The factors of Q; a failed answer if Q is not positive definite."""
-        try:
-            if self.preconditioner == "band":
-                M = banded_inverse(data.Q, data.assembly.contact_nodes)
-                return _Ready(data, Banded(data.Q, M))
-            kind = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
-            return _Ready(data, kind(data.Q))
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
+    def state(self, problem: Problem) -> _State:
+        """The factors of Q."""
+        if self.preconditioner == "band":
+            M = banded_inverse(problem.Q, problem.assembly.contact_nodes)
+            return _State(problem=problem, system=Banded(problem.Q, M))
+        kind = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
+        return _State(problem=problem, system=kind(problem.Q))
 
-    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
-        if isinstance(ready, Answer):
-            return ready
-        Q, system = ready.problem.Q, ready.system
+    def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
+        Q, system = ready.Q, ready.system
         system.begin()
         newton = NewtonSteps(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
         details: dict[str, Any] = {"cg": newton.counts}
-        try:
-            start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
-        except (NoStart, np.linalg.LinAlgError) as error:
-            return failed(str(error), iterations=0)
+        start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
         first = newton.at(start.lam, start.y)  # step 3
         details["start"] = {
             "mu": first.mu,

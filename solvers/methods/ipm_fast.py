@@ -8,19 +8,19 @@ ones, an exact finish on the active set it identified. The paper's method is `ip
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, failed
+from solvers.active_set.sweeps import Sweeps
+from solvers.base import Answer, LoadCase, Problem, failed
 from solvers.interior_point.banded import Banded
 from solvers.interior_point.newton_system import Direct, NewtonSystem
 from solvers.interior_point.schemes import NewtonSteps, mehrotra
 from solvers.interior_point.single_precision import SinglePrecision
-from solvers.interior_point.start import NoStart, algorithm_5, stp2
-from solvers.settings import require
-
-from .newton import DualState
+from solvers.interior_point.start import algorithm_5, stp2
+from solvers.method import Method, State
+from solvers.settings import one_of, require
 
 THETA = 0.995
 LEAST_GAP = 0.01  # mm, at the start
@@ -32,14 +32,14 @@ IDENTIFICATION_RATIO = 1e-4  # of the initial μ: above, a contact may look clos
 UNDECIDED = 1 / 4  # of the contacts, with 0.1 < q_ii λ_i / y_i < 10
 
 
-@dataclass(frozen=True)
-class _Ready:
+@dataclass(frozen=True, kw_only=True)
+class _State(State):
     system: NewtonSystem
-    finish: DualState
+    finish: Sweeps
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
-class FastIpm(Solver):
+class FastIpm(Method):
     """Interior point with an exact finish on the active set it identified.
 
     The finish, `newton` from C = {q_ii λ_i > y_i}, begins when μ = λᵀy/m has fallen to 1e-4
@@ -55,36 +55,25 @@ class FastIpm(Solver):
         each then replaces; only this uses single precision.
     """
 
-    forms: ClassVar[tuple[Form, ...]] = ("dual",)
-
     finish: bool = True
     single: bool = True
     start_at_gaps: bool = True
     band: bool = True
 
     def __post_init__(self) -> None:
-        rules = {key: (isinstance(value, bool), "must be true or false") for key, value in vars(self).items()}
-        require("ipm-fast", vars(self), **rules)
+        options = vars(self)
+        require("ipm-fast", options, **{key: one_of(options[key], (False, True)) for key in options})
 
-    def prepare(self, data: Problem) -> _Ready | Answer:
-        """M, and what the systems need; a failed answer if Q is not positive definite."""
-        finish = DualState.of(data)
-        if isinstance(finish, Answer):
-            return finish
-        if self.band and (M := finish.sweeps.M):
-            return _Ready(Banded(data.Q, M), finish)
-        return _Ready((SinglePrecision if self.single else Direct)(data.Q), finish)
+    def state(self, problem: Problem) -> _State:
+        """M, and what the systems need."""
+        finish = Sweeps(problem.prepared)
+        if self.band and finish.M:
+            return _State(problem=problem, system=Banded(problem.Q, finish.M), finish=finish)
+        system = (SinglePrecision if self.single else Direct)(problem.Q)
+        return _State(problem=problem, system=system, finish=finish)
 
-    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
-        if isinstance(ready, Answer):
-            return ready
-        try:
-            return self._solved(ready, load, tolerance)
-        except (np.linalg.LinAlgError, NoStart) as error:
-            return failed(str(error))
-
-    def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
-        Q, p, system = ready.system.Q, load.p, ready.system
+    def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
+        Q, p, system = ready.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()
         newton = NewtonSteps(Q, p, system, THETA, 0.0, REFINEMENT, np.inf)
@@ -101,7 +90,8 @@ class FastIpm(Solver):
             details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
             done = residual <= tolerance or stalled == STALLED
             if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
-                answer = ready.finish.solve_from(ratio > 1, load, tolerance)
+                case = ready.finish.solved(load, tolerance, C=ratio > 1)
+                answer = ready.finish.answer(case, tolerance)
                 details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
             if residual <= tolerance:

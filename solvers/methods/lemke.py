@@ -9,21 +9,21 @@ d is the change of p from the load case whose answer is the start, and t goes fr
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from solvers.active_set.parametric_path import ParametricPath
 from solvers.active_set.principal_sets import solve_from
-from solvers.base import Answer, LoadCase, WarmStart, failed
-from solvers.dense_dual import DenseDual, DenseDualSolver
-from solvers.kkt import kkt_status
+from solvers.base import Answer, LoadCase, WarmStart
+from solvers.kkt import judged, kkt_status
+from solvers.method import Method, State
+from solvers.settings import require
 
 
-class Lemke(DenseDualSolver):
+@dataclass(kw_only=True, frozen=True, eq=False)
+class Lemke(Method):
     """Lemke's pivots, with a factor of Q_CC that grows and shrinks.
 
     Ends at t = 0 with λ_C refined: "solved" if max(max(−y), max_{λ>0} |y|) ≤ max(tolerance,
@@ -36,25 +36,18 @@ class Lemke(DenseDualSolver):
     max_pivots : limit on the pivots, in units of m.
     """
 
-    def __init__(self, *, max_pivots: float = 10.0) -> None:
-        if not max_pivots > 0:
-            raise InputError.one("lemke", "max_pivots", max_pivots, "must be positive")
-        self.max_pivots = max_pivots
+    max_pivots: float = 10.0
 
-    def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
-        try:
-            return self._solved(ready, load, tolerance)
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
+    def __post_init__(self) -> None:
+        require("lemke", vars(self), max_pivots=(self.max_pivots > 0, "must be positive"))
 
-    def _solved(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
-        path = _cold(Q, p) if ready.start is None else _warm(Q, p, ready.start)
+        path = _path(Q, p, ready.start)
         arrived = path.follow(int(self.max_pivots * len(p)) + 10)
         if not arrived:
             path.t = 0.0
             path.refresh()
-        details: dict[str, Any] = {"products": path.products}
         lam = np.maximum(path.lam, 0.0)
         y = path.y if (path.lam >= 0).all() else Q @ lam - p
         status, residual = kkt_status(Q, p, lam, y, tolerance)
@@ -64,17 +57,12 @@ class Lemke(DenseDualSolver):
             answer = solve_from(closed, Q, p, tolerance)
             details = {**answer.details, "finishing_sets": answer.iterations}
             return replace(answer, iterations=path.pivots, details=details)
-        details["kkt_residual_mm"] = residual
-        if status != "solved":
-            status = "iteration_limit"
-            details["cause"] = f"max_pivots = {self.max_pivots:g}: optimal only to {residual:.1e} mm"
-        return Answer(status, lam, iterations=path.pivots, details=details)
+        limit = f"max_pivots = {self.max_pivots:g}"
+        return judged(status, lam, residual, {"products": path.products}, limit, iterations=path.pivots)
 
 
-def _cold(Q: Matrix, p: Vector) -> ParametricPath:
+def _path(Q: Matrix, p: Vector, start: WarmStart | None) -> ParametricPath:
+    if start is not None:
+        return ParametricPath(Q, p, p - start.load.p, 1.0, np.flatnonzero(start.lam > 0))
     d = np.random.default_rng(0).uniform(1.0, 2.0, len(p))
     return ParametricPath(Q, p, d, max(float((p / d).max(initial=0.0)), 0.0), np.empty(0, dtype=np.intp))
-
-
-def _warm(Q: Matrix, p: Vector, start: WarmStart) -> ParametricPath:
-    return ParametricPath(Q, p, p - start.load.p, 1.0, np.flatnonzero(start.lam > 0))

@@ -11,40 +11,34 @@ smooth fields only, and the face changes contact by contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, ClassVar
-
-import numpy as np
+from typing import ClassVar
 
 from problems.forms.assembly import Vector
-from problems.forms.compliance import Compliance
-from problems.stiffness.block import NotPositiveDefinite
-from solvers.base import Answer, Form, LoadCase, Problem, Solver, Status, WarmStart, failed
-from solvers.dense_dual import first_point
+from problems.forms.banded_inverse import BandedInverse
+from solvers.active_set.banded_sets import OpenFactor
+from solvers.base import Answer, Form, LoadCase, Problem, failed
 from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
 from solvers.gradient_projection.proportioning import Proportioning
-from solvers.kkt import kkt_residual, largest_rounding
-from solvers.settings import require
+from solvers.kkt import judged, kkt_residual, largest_rounding
+from solvers.method import Method, State, first_point
+from solvers.settings import one_of, require
 from solvers.sparse_dual import with_p, with_x
 
 PRECONDITIONERS = ("band", "face", "none")
 
 
-@dataclass(frozen=True)
-class _Ready:
-    """diagonal : of Q, or about that. metric : makes a load case's own. start : a solved case, if any."""
+@dataclass(frozen=True, kw_only=True)
+class _State(State):
+    """diagonal : of Q, or about that. alpha : ᾱ of the metric."""
 
-    problem: Problem
-    Q: Compliance
     diagonal: Vector
-    metric: Callable[[], Diagonal]
-    start: WarmStart | None = None
+    alpha: float
+    M: BandedInverse
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
-class Mprgp(Solver):
+class Mprgp(Method):
     """MPRGP with Γ = 1, from λ = 0 or a warm start.
 
     Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance/10, 4ε max(|p| + |Qλ|)) mm with y = Qλ − p
@@ -69,48 +63,26 @@ class Mprgp(Solver):
         require(
             "mprgp",
             vars(self),
-            preconditioner=(self.preconditioner in PRECONDITIONERS, f"must be one of {PRECONDITIONERS}"),
+            preconditioner=one_of(self.preconditioner, PRECONDITIONERS),
             max_products=(self.max_products >= 1, "must be at least 1"),
         )
 
-    def prepare(self, data: Problem) -> _Ready | Answer:
-        """M and ᾱ, by 30 products, as the option needs them.
-
-        A failed answer if M finds Q indefinite, and in the sparse form if K is, or has no M.
-        """
-        try:
-            near = data.prepared.approximate_inverse
-        except NotPositiveDefinite as error:
-            return failed(f"K is not positive definite: {error}")
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
-        Q, diagonal, M = data.prepared.compliance, near.diagonal, near.M
+    def state(self, problem: Problem) -> _State | Answer:
+        """M and ᾱ, by 30 products, as the option needs them; a failed answer if there is no M."""
+        near = problem.prepared.approximate_inverse
+        Q, diagonal, M = problem.prepared.compliance, near.diagonal, near.M
         if M is None:
             return failed("no M ≈ Q⁻¹: K has no band, or its contacts lie all over an area")
-        metric: Callable[[], Diagonal]
+        alpha = 1.0 if self.preconditioner == "band" else step_length(Q, diagonal)
+        return _State(problem=problem, diagonal=diagonal, alpha=alpha, M=M)
+
+    def _metric(self, ready: _State) -> Diagonal:
         if self.preconditioner == "none":
-            metric = partial(Diagonal, diagonal, step_length(Q, diagonal))
-        elif self.preconditioner == "face":
-            metric = partial(Face, diagonal, step_length(Q, diagonal), M)
-        else:
-            metric = partial(Band, diagonal, 1.0, M)
-        return _Ready(data, Q, diagonal, metric)
+            return Diagonal(ready.diagonal, ready.alpha)
+        kind = Band if self.preconditioner == "band" else Face
+        return kind(ready.diagonal, ready.alpha, OpenFactor(ready.M))
 
-    def update(
-        self, state: _Ready | Answer, ready: object, load: LoadCase, tolerance: float, start: WarmStart
-    ) -> _Ready | Answer:
-        """From the forces of the warm start."""
-        return state if isinstance(state, Answer) else replace(state, start=start)
-
-    def solve(self, ready: _Ready | Answer, load: LoadCase, tolerance: float) -> Answer:
-        if isinstance(ready, Answer):
-            return ready
-        try:
-            return self._solved(ready, load, tolerance)
-        except np.linalg.LinAlgError as error:
-            return failed(str(error))
-
-    def _solved(self, ready: _Ready, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
         prepared, sparse, start = ready.problem.prepared, "x" in ready.problem.needs, ready.start
         given = with_p(prepared, [load])[0] if sparse else load
         if sparse and start is not None:
@@ -119,17 +91,20 @@ class Mprgp(Solver):
         def gaps(lam: Vector) -> Vector:
             return prepared.gaps(lam[:, None], [given])[:, 0]
 
-        metric = ready.metric()
-        case = Proportioning(ready.Q, given.p, ready.diagonal, metric, gaps, *first_point(start, given))
+        metric = self._metric(ready)
+        case = Proportioning(
+            prepared.compliance, given.p, ready.diagonal, metric, gaps, *first_point(start, given)
+        )
         enough = case.solve(tolerance, self.max_products)
         residual = kkt_residual(case.lam, case.y)
         solved = residual <= max(tolerance, largest_rounding(ready.diagonal, given.p, case.lam))
-        status: Status = "solved" if solved else "inaccurate" if enough else "iteration_limit"
-        details: dict[str, Any] = {"products": case.products, "kkt_residual_mm": residual}
-        details |= {"steps": case.steps}
-        if not solved:
-            tried = "rounding" if enough else f"max_products = {self.max_products}"
-            details["cause"] = f"{tried}: optimal only to {residual:.1e} mm"
-        steps = sum(case.steps.values())
-        answer = Answer(status, case.lam, iterations=steps, inner_iterations=metric.sets, details=details)
+        answer = judged(
+            "solved" if solved else "inaccurate",
+            case.lam,
+            residual,
+            {"products": case.products, "steps": case.steps},
+            "" if enough else f"max_products = {self.max_products}",
+            iterations=sum(case.steps.values()),
+            inner_iterations=metric.sets,
+        )
         return with_x(prepared, [answer], [load], tolerance)[0] if sparse else answer

@@ -16,32 +16,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-import numpy as np
-
-from problems.stiffness.block import NotPositiveDefinite
-from solvers.active_set.block_pivoting import Set
 from solvers.active_set.sweeps import Sweeps
-from solvers.base import Answer, Batch, Form, LoadCase, Problem, Solver, WarmStart, failed
+from solvers.base import Answer, Batch, Form, LoadCase, Problem
+from solvers.method import Method, State
 from solvers.sparse_dual import with_p, with_x
 
 
-@dataclass(frozen=True)
-class DualState:
-    """What load cases share. start : the solved case to start from."""
-
-    problem: Problem
+@dataclass(frozen=True, kw_only=True)
+class _State(State):
     sweeps: Sweeps
-    start: WarmStart | None = None
-
-    @classmethod
-    def of(cls, problem: Problem) -> DualState | Answer:
-        """M; a failed answer if Q, or K in the sparse form, is not positive definite, or there is no M."""
-        try:
-            return cls(problem, Sweeps(problem.prepared))
-        except NotPositiveDefinite as error:
-            return failed(f"K is not positive definite: {error}")
-        except np.linalg.LinAlgError as error:
-            return failed(f"Q is not positive definite: {error}")
 
     def solve(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """One load case, or several together."""
@@ -56,12 +39,8 @@ class DualState:
             found = sweeps(given, tolerance)
         return with_x(prepared, found, loads, tolerance) if sparse else found
 
-    def solve_from(self, C: Set, load: LoadCase, tolerance: float) -> Answer:
-        """A load case with p from a contact set."""
-        return self.sweeps.answer(self.sweeps.solved(load, tolerance, C=C), tolerance)
 
-
-class ActiveSetNewton(Solver):
+class ActiveSetNewton(Method):
     """Active-set Newton, from λ = 0 or a warm start; the stopping rule is that of `Sweeps`.
 
     Iterations are products with Q, inner iterations contact sets tried with M. "solved" as said in
@@ -70,26 +49,11 @@ class ActiveSetNewton(Solver):
 
     forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
 
-    def prepare(self, data: Problem) -> DualState | Answer:
-        return DualState.of(data)
+    def state(self, problem: Problem) -> _State:
+        return _State(problem=problem, sweeps=Sweeps(problem.prepared))
 
-    def update(
-        self,
-        state: DualState | Answer,
-        ready: object,
-        load: LoadCase,
-        tolerance: float,
-        start: WarmStart,
-    ) -> DualState | Answer:
-        return state if isinstance(state, Answer) else replace(state, start=start)
-
-    def batched(self, state: DualState | Answer) -> Batch | None:
+    def batched(self, state: _State | Answer) -> Batch | None:
         return None if isinstance(state, Answer) else state.solve
 
-    def solve(self, ready: DualState | Answer, load: LoadCase, tolerance: float) -> Answer:
-        if isinstance(ready, Answer):
-            return ready
-        try:
-            return ready.solve([load], tolerance)[0]
-        except np.linalg.LinAlgError as error:
-            return failed(str(error))
+    def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
+        return ready.solve([load], tolerance)[0]

@@ -11,7 +11,6 @@ which converges for 0 < ω < 2, by a factor of about 1 − 1/cond(Q) per sweep: 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.linalg import blas
@@ -19,8 +18,8 @@ from scipy.linalg import blas
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Answer, LoadCase
-from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
-from solvers.kkt import kkt_residual, kkt_status, rounding_of
+from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
+from solvers.method import Method, State, first_point
 from solvers.settings import require
 
 CHECKED = 10  # sweeps after which y is computed anew
@@ -28,7 +27,7 @@ SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slowe
 
 
 @dataclass(kw_only=True, frozen=True, eq=False)
-class ProjectedGaussSeidel(DenseDualSolver):
+class ProjectedGaussSeidel(Method):
     """Projected Gauss–Seidel, from λ = 0 or a warm start.
 
     Stops when max(max(−y), max_{λ>0} |y|) ≤ max(tolerance, 4ε max(|p| + |Qλ|)) mm, looked at after every
@@ -52,18 +51,18 @@ class ProjectedGaussSeidel(DenseDualSolver):
             max_sweeps=(self.max_sweeps >= 1, "must be at least 1"),
         )
 
-    def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
         lam, y = first_point(ready.start, load)
         products, sweeps = 0, 0
         reached: list[float] = []  # the residual at each check
-        cause = ""
+        limit = cause = ""
         while True:
             reached.append(kkt_residual(lam, y))
             if reached[-1] <= max(tolerance, rounding_of(p, y)):
                 break
             if sweeps >= self.max_sweeps:
-                cause = f"max_sweeps = {self.max_sweeps}"
+                limit = f"max_sweeps = {self.max_sweeps}"
                 break
             if len(reached) > PATIENCE and not reached[-1] <= SLOWEST * reached[-1 - PATIENCE]:
                 cause = f"{PATIENCE * CHECKED} sweeps did not halve the KKT residual"
@@ -73,11 +72,8 @@ class ProjectedGaussSeidel(DenseDualSolver):
                 sweeps += 1
             y, products = product(Q, lam) - p, products + 1
         status, residual = kkt_status(Q, p, lam, y, tolerance)
-        details: dict[str, Any] = {"products": products + sweeps, "kkt_residual_mm": residual}
-        if status == "inaccurate":
-            status = "iteration_limit" if cause.startswith("max_sweeps") else "inaccurate"
-            details["cause"] = f"{cause}: optimal only to {residual:.1e} mm"
-        return Answer(status, lam, iterations=sweeps, details=details)
+        details = {"products": products + sweeps}
+        return judged(status, lam, residual, details, limit, cause, iterations=sweeps)
 
 
 def _sweep(Q: Matrix, lam: Vector, y: Vector, relaxation: float) -> Vector:

@@ -19,17 +19,16 @@ length nor how it solves its equations: nothing here is taken from it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import scipy.linalg as sla
 
-from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.product import product
-from solvers.active_set.bordered_factor import Principal
-from solvers.base import Answer, LoadCase, failed
-from solvers.dense_dual import DenseDual, DenseDualSolver, first_point
-from solvers.kkt import kkt_residual, kkt_status, rounding_of
+from solvers.base import Answer, LoadCase
+from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
+from solvers.method import Method, State, first_point
+from solvers.settings import require
 
 LARGEST_EPSILON = 0.01  # mm
 DECREASE = 1e-4
@@ -48,58 +47,48 @@ class _Point:
         self.residual = kkt_residual(self.lam, self.y)
 
 
-class ProjectedNewton(DenseDualSolver):
+@dataclass(kw_only=True, frozen=True, eq=False)
+class ProjectedNewton(Method):
     """Projected Newton with a line search along the projection arc, from λ = 0 or a warm start.
 
     Stops when max(max(−y), max_{λ>0} |y|) is at most 4ε max(|p| + |Qλ|) mm, or at most tolerance/10 and not
     halved by another step, or when no step decreases the objective or halves it. "solved" if it then is at
-    most max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are Newton steps; details count
-    the products with Q, one per point of the arc, and the factorisations of Q_JJ, which a border replaces
-    while few contacts enter or leave J.
+    most max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are Newton steps, each with a
+    factorisation of Q_JJ; details count the products with Q, one per point of the arc.
 
     Options
     -------
     max_iterations : limit on the Newton steps.
     """
 
-    def __init__(self, *, max_iterations: int = 1000) -> None:
-        if max_iterations < 1:
-            raise InputError.one("projected-newton", "max_iterations", max_iterations, "must be at least 1")
-        self.max_iterations = max_iterations
+    max_iterations: int = 1000
 
-    def solve(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
-        try:
-            return self._solved(ready, load, tolerance)
-        except np.linalg.LinAlgError as error:
-            return failed(str(error))
+    def __post_init__(self) -> None:
+        valid = self.max_iterations >= 1, "must be at least 1"
+        require("projected-newton", vars(self), max_iterations=valid)
 
-    def _solved(self, ready: DenseDual, load: LoadCase, tolerance: float) -> Answer:
+    def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         point = _Point(*first_point(ready.start, load))
         newton = _Newton(ready.Q, load.p)
-        cause = f"max_iterations = {self.max_iterations}"
+        limit = f"max_iterations = {self.max_iterations}"
         for k in range(self.max_iterations + 1):
             if k == self.max_iterations or point.residual <= rounding_of(load.p, point.y):
                 break
             close = point.residual <= RESIDUAL_TARGET * tolerance
             following = newton.step(point)
             if following is None or (close and following.residual > point.residual / 2):
-                cause = "rounding"
+                limit = ""
                 break
             point = following
         status, residual = kkt_status(ready.Q, load.p, point.lam, point.y, tolerance)
-        details: dict[str, Any] = {"products": newton.products, "kkt_residual_mm": residual}
-        details["factorisations"] = newton.free.factorisations
-        if status == "inaccurate":
-            status = "inaccurate" if cause == "rounding" else "iteration_limit"
-            details["cause"] = f"{cause}: optimal only to {residual:.1e} mm"
-        return Answer(status, point.lam, iterations=k, details=details)
+        return judged(status, point.lam, residual, {"products": newton.products}, limit, iterations=k)
 
 
 class _Newton:
     """The steps of a load case. products : with Q."""
 
     def __init__(self, Q: Matrix, p: Vector) -> None:
-        self.Q, self.p, self.diagonal, self.free, self.products = Q, p, np.diag(Q), Principal(Q), 0
+        self.Q, self.p, self.diagonal, self.products = Q, p, np.diag(Q), 0
 
     def step(self, point: _Point) -> _Point | None:
         """The next point; None if there is none better."""
@@ -107,8 +96,11 @@ class _Newton:
         own = self.diagonal * lam
         w = float(abs(np.minimum(own, y)).max())
         bound = (own <= min(LARGEST_EPSILON, w)) & (y > 0)
-        self.free.move_to(~bound)
-        d = np.where(bound, -y / self.diagonal, self.free.factor.solve(np.where(bound, 0.0, -y)))
+        free, d = np.flatnonzero(~bound), -y / self.diagonal
+        if free.size:
+            block = self.Q.T[np.ix_(free, free)].T  # symmetric, and column-major as Q is
+            factor = sla.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
+            d[free] = sla.cho_solve(factor, -y[free], check_finite=False)
         slope, alpha = float(y[~bound] @ d[~bound]), 1.0
         while alpha >= SHORTEST:
             trial = np.maximum(lam + alpha * d, 0.0)

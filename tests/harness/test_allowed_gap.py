@@ -1,7 +1,5 @@
 """`--allow-gap` of `solve` and `series`: what it says against gaps found by another method."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections import Counter
@@ -13,12 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from commands import harness
 from long import draws
 from small import solve_by_nnls
 from strip import write_strip
-from typer.testing import CliRunner, Result
 
-from harness.cli.app import app
 from harness.results import series_file
 from harness.scene.allowed_gap import checked
 from harness.verification.gap_error import GapError
@@ -128,10 +125,6 @@ def test_a_gap_lost_in_rounding_cannot_be_told(
     np.savez(tmp_path / "own.npz", K=[[1.0]], A=[[0.7]], f=[f], g=[g])
     done = harness("solve", tmp_path / "own.npz", "--allow-gap", allowed, "--out", tmp_path / "out")
     assert done.exit_code == 3, done.output
-
-
-def harness(*words: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, words)])
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """The public interface: what it gives is what the commands give, and what it refuses it names."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -32,11 +30,10 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.prepared import Prepared
-from problems.forms.problem import in_form
 from problems.full_model.joint_model import JointModel
 from problems.model.joint import Joint
 from solvers.base import failed
-from solvers.registry import make_solver, modules
+from solvers.registry import modules
 
 
 def matrices(seed: int = 3) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
@@ -62,17 +59,12 @@ def test_the_names_are_offered_and_documented() -> None:
 def test_a_scene_from_a_dict_or_objects_is_that_of_the_file(tmp_path: Path) -> None:
     table = tomllib.loads(STRIP)
     scenes = [load_scene(write_strip(tmp_path)), load_scene(table)]
+    assert table == tomllib.loads(STRIP)  # left as it was
     gap, fasteners, *others = table["effect"]
     effects = (gap, Fasteners.model_validate(fasteners), *others)
     scenes.append(load_scene({"joint": Joint.model_validate(table["joint"]), "effect": effects}))
     assert len({scene.key for scene in scenes}) == 1
     assert load_scene(scenes[0]) is scenes[0]
-
-
-def test_a_dict_is_left_as_it_was() -> None:
-    table = tomllib.loads(STRIP)
-    load_scene(table)
-    assert table == tomllib.loads(STRIP)
 
 
 def test_all_faults_of_a_dict_are_named() -> None:
@@ -109,7 +101,6 @@ def test_an_x_from_elsewhere_is_judged() -> None:
     x, lam = solve_by_nnls(data, load)
     right, wrong = judge(scene, x, lam), judge(scene, x + 1e-6)
     assert right.verdict == "within"
-    assert right.backward_error is not None
     assert right.backward_error < 1e-14
     assert wrong.verdict == "outside"
     assert wrong.displacement_error_mm == pytest.approx(1e-6, rel=1e-5)
@@ -190,14 +181,6 @@ def test_without_contact_no_solver_is_called() -> None:
     assert not found.lam.any()
 
 
-@pytest.mark.parametrize(("change", "said"), [(0, r"max\|K − Kᵀ\|"), (2, "f.shape"), (3, "NaN")])
-def test_bad_matrices_are_refused(change: int, said: str) -> None:
-    own = [np.array(a.toarray() if sp.issparse(a) else a) for a in matrices()[2]]
-    own[change] = {0: own[0] + np.triu(own[0]), 2: own[2][:-1], 3: own[3] * np.nan}[change]
-    with pytest.raises(InputError, match=said):
-        own_matrices(*own)
-
-
 @pytest.mark.parametrize(("solver", "form"), [("newton", "dual"), ("gi", "dual"), ("gi", "primal")])
 def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
     data, _, own = matrices()
@@ -214,20 +197,6 @@ def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
         solve_series(own_matrices(*own), [loads[0], LoadCase(loads[1].f, loads[1].g[1:])])
 
 
-def test_a_series_of_random_gaps_by_an_object() -> None:
-    scene = load_scene(tomllib.loads(STRIP))
-    cases = random_gaps(scene, 3, seed=5)
-    named, own = (
-        list(solve_series(scene, cases, solver)) for solver in ("newton", make_solver("newton", {}))
-    )
-    for one, two in zip(named, own, strict=True):
-        np.testing.assert_array_equal(one.gap, two.gap)
-        assert one.row["gap_seed"] == two.row["gap_seed"]
-    first = cases.load(0)
-    assert prepared(scene).assembly.m == len(first.g)
-    np.testing.assert_array_equal(first.f, load_case(scene).f)
-
-
 def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load_scene(tomllib.loads(STRIP))
     gaps = [found.gap for found in solve_series(scene, random_gaps(scene, 2, seed=5))]
@@ -240,12 +209,3 @@ def test_series_and_judge_in_the_sparse_form_condense_nothing(monkeypatch: pytes
     np.testing.assert_allclose([result.gap for result in found], gaps, atol=1e-7)
     assert judge(scene, x, form="sparse").verdict == "within"
     assert judge(scene, x + 1e-6, form="sparse").verdict == "outside"
-
-
-def test_the_callers_loads_stay_writable() -> None:
-    problem = in_form(make_prepared(1, 6), "primal")
-    f, g = np.ones(problem.assembly.n), np.ones(problem.assembly.m)
-    (load,) = problem.loads([LoadCase(f, g)])
-    assert not load.f.flags.writeable
-    assert f.flags.writeable
-    assert g.flags.writeable

@@ -1,17 +1,14 @@
 """Each solver here has one fault; `check` must name it, and must find nothing in the one without."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from small import make_prepared
 
 from harness.conformance.check import run
-from harness.conformance.known_problems import known_case, known_problems
+from harness.conformance.known_problems import known_problems
 from problems.forms.assembly import LoadCase
 from solvers.base import Answer, Form, Problem, Solver, WarmStart
 from solvers.registry import make_solver
@@ -99,13 +96,6 @@ def test_a_primal_answer_needs_right_displacements() -> None:
 
     assert "x is 2e-07 mm off" in words_of(spoiling(moved), ("primal",))
     assert run(spoiling(moved), ("dual",)) == []
-
-
-def test_an_error_within_the_limit_is_not_a_finding() -> None:
-    def moved(answer: Answer) -> Answer:
-        return answer if answer.x is None else replace(answer, x=answer.x + 0.5e-7)
-
-    assert run(spoiling(moved), ("primal",)) == []
 
 
 def test_a_tolerance_that_is_ignored() -> None:
@@ -208,11 +198,6 @@ def test_wrong_forms_and_a_failing_constructor() -> None:
     assert "constructor: raised KeyError" in words_of(Fails)
 
 
-def test_one_fault_is_reported_once_a_form() -> None:
-    words = words_of(spoiling(lambda a: replace(a, lam=-lam_of(a))), ("dual",)).splitlines()
-    assert len(words) == 1
-
-
 def test_load_cases_at_once_in_another_order() -> None:
     class Turned(Sound):
         def batched(self, state: Any) -> Any:
@@ -247,9 +232,3 @@ def test_known_answers_fulfil_the_optimality_conditions() -> None:
             assert abs(case.lam @ gap) < 1e-9
             again = prepared.recover(case.lam, LoadCase(case.load.f, case.load.g))
             np.testing.assert_allclose(again, case.x, atol=1e-11)
-
-
-def test_trials_have_open_and_closed_contacts() -> None:
-    case = known_case(np.random.default_rng(2), make_prepared(2, 20), 0.5, "half")
-    assert 0 < np.count_nonzero(case.lam) < 20
-    assert {0, 40} <= {np.count_nonzero(case.lam) for case in known_problems()[2].cases}

@@ -1,23 +1,20 @@
 """`compare`: rows are changed one by one, and what is said of each is known."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from typing import Any
 
 import pytest
+from commands import harness
 from synthetic_results import no_answer, row, write_rows
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from harness.cli.app import app
-from harness.results.digits import digits_lost, floor_mm
 from harness.results.records import append
 from harness.results.sides import measurement, read_side
 
 
 def compare(*words: object) -> Result:
-    return CliRunner().invoke(app, ["compare", *map(str, words)])
+    return harness("compare", *words)
 
 
 def repeats(times: list[float], **figures: Any) -> list[dict[str, Any]]:
@@ -190,15 +187,6 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     page = (tmp_path / "out" / "comparison.md").read_text()
     assert "<b>" not in page
     assert "\x1b" not in page + done.stdout
-
-
-def test_digits_are_those_above_the_floor() -> None:
-    floor = floor_mm(1e-12, 1e-7)
-    assert floor == 1e-12
-    assert floor_mm(0.0, 1e-7) == pytest.approx(1e-13)
-    assert digits_lost(1e-11, 9e-8, floor) == pytest.approx(3.954, abs=1e-3)
-    assert digits_lost(9e-8, 1e-11, floor) == pytest.approx(-3.954, abs=1e-3)
-    assert digits_lost(0.0, 1e-13, floor) == 0
 
 
 def test_a_measurement_is_named_by_what_was_asked() -> None:

@@ -1,7 +1,5 @@
 """`export --form` and `judge`: problems to other programs, bit for bit, and their answers back."""
 
-from __future__ import annotations
-
 import runpy
 import shutil
 import subprocess
@@ -13,11 +11,10 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 import tiny
+from commands import harness
 from small import solve_by_nnls
 from strip import write_strip
-from typer.testing import CliRunner, Result
 
-from harness.cli.app import app
 from problems.build import load_case, prepared
 from problems.forms.names import Form
 from problems.forms.problem import in_form
@@ -25,10 +22,6 @@ from problems.scene import read_scene
 
 READERS = Path(__file__).parents[2] / "examples" / "readers"
 EIGEN = Path("/usr/include/eigen3")
-
-
-def harness(*words: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, words)])
 
 
 @pytest.fixture(scope="module")
@@ -70,12 +63,8 @@ def test_a_problem_is_written_bit_for_bit(form: Form, scenes: Path, tmp_path: Pa
 
 def test_the_reference_is_the_answer_of_another_method(scenes: Path, tmp_path: Path) -> None:
     """The files alone, solved by nnls."""
-    assert (
-        harness(
-            "export", scenes / "tiny.npz", "--form", "primal", "--with-reference", "--out", tmp_path / "p"
-        ).exit_code
-        == 0
-    )
+    asked = ("export", scenes / "tiny.npz", "--form", "primal", "--with-reference", "--out", tmp_path / "p")
+    assert harness(*asked).exit_code == 0
     scene = read_scene(str(scenes / "tiny.npz"))
     x, lam = solve_by_nnls(prepared(scene), load_case(scene))
     found = read_problem(tmp_path / "p")
@@ -134,16 +123,8 @@ def test_the_reader_in_cpp_agrees_with_the_one_in_python(scenes: Path, tmp_path:
     command = ["g++", "-I", str(EIGEN), str(READERS / "read_problem.cpp"), "-o", str(compiled)]
     subprocess.run(command, check=True)
     for form in ("dual", "sparse"):
-        asked = (
-            "export",
-            scenes / "strip.toml",
-            "--form",
-            form,
-            "--with-reference",
-            "--out",
-            tmp_path / form,
-        )
-        assert harness(*asked).exit_code == 0
+        asked = ("export", scenes / "strip.toml", "--form", form, "--with-reference", "--out")
+        assert harness(*asked, tmp_path / form).exit_code == 0
         said = subprocess.run([compiled, tmp_path / form], capture_output=True, text=True, check=True).stdout
         unknowns, residual = map(float, said.split())
         assert unknowns == len(read_problem(tmp_path / form)["q"])
@@ -177,8 +158,10 @@ def written(path: Path, x: np.ndarray) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["x.npy", "x.npz", "x.txt", "x.mtx", "x.csv"])
-@pytest.mark.parametrize(("shift", "code"), [(0.0, 0), (5e-8, 0), (2e-7, 1)])
+@pytest.mark.parametrize(
+    ("name", "shift", "code"),
+    [*((f"x.{kind}", 2e-7, 1) for kind in ("npy", "npz", "txt", "mtx", "csv")), ("x.npy", 5e-8, 0)],
+)
 def test_an_answer_is_judged_by_its_displacements(
     name: str, shift: float, code: int, scenes: Path, answer: Any, tmp_path: Path
 ) -> None:
@@ -187,8 +170,7 @@ def test_an_answer_is_judged_by_its_displacements(
     done = harness("judge", written(tmp_path / name, x), scenes / "tiny.npz")
     assert done.exit_code == code, done.output
     assert ("Outside" if code else "Within") in done.stdout
-    if shift:
-        assert f"{shift:.3e} at entry 7" in done.stdout
+    assert f"{shift:.3e} at entry 7" in done.stdout
 
 
 def test_forces_alone_are_judged_by_the_displacements_that_they_give(

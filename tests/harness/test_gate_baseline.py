@@ -1,7 +1,5 @@
 """The gate held to an earlier run, and its findings as JSON and JUnit XML."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -10,10 +8,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from finished import finished_run
-from typer.testing import CliRunner, Result
+from commands import harness
+from typer.testing import Result
 
-from harness.cli.app import app
 from harness.results import records
 from harness.results.sides import measurement
 from harness.verification.baseline import Baseline, read_baseline
@@ -21,18 +18,8 @@ from harness.verification.baseline import Baseline, read_baseline
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return finished_run(tmp_path_factory)
-
-
-@pytest.fixture
-def copy(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "copy"))
-
-
 def gate(directory: Path, *words: object) -> Result:
-    return CliRunner().invoke(app, ["gate", str(directory), *map(str, words)])
+    return harness("gate", directory, *words)
 
 
 def changed(directory: Path, **figures: Any) -> Path:

@@ -4,8 +4,6 @@ Two springs of 2 N/mm, pushed together by f = (3, −1) N with a gap of 0.5 mm b
 would move 1.5 and −0.5 mm and overlap by 1.5; λ = 1.5 N holds them at x = (0.75, 0.25).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -1,7 +1,5 @@
 """One measurement, whatever its solver does: a status, and no process left."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import time
@@ -95,7 +93,6 @@ def test_an_answer_with_its_times_and_threads(folder: Path) -> None:
     [
         ("newton", "sparse", "K"),
         ("piqp", "primal", "K"),
-        ("piqp", "dual", "K factors Q"),
         ("gi", "primal", "K factors Q"),
     ],
 )

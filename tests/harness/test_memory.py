@@ -1,20 +1,16 @@
 """A scene's size and memory, before anything is built."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
+from commands import harness
 
-from harness.cli.app import app
 from harness.planning import form_choice, memory
 from harness.planning.memory import refuse_what_cannot_fit, size_of
 from harness.scene import validate
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.names import Form
-from problems.model.scene import JointScene
 from problems.scene import read_scene
 from problems.stiffness.banded import half_bandwidth
 
@@ -24,7 +20,6 @@ GALLERY = ("three-part-stack", "installed-fasteners", "sheet-over-former", "plat
 @pytest.mark.parametrize("name", GALLERY)
 def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_made(name: str) -> None:
     scene = read_scene(f"gallery/{name}")
-    assert isinstance(scene, JointScene)
     estimate = size_of(scene)
     assert estimate is not None
     assert estimate.half_bandwidth is not None
@@ -47,7 +42,7 @@ def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_validate_says_what_both_forms_take(scene: str, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     machine_of(24_000, monkeypatch)
-    done = CliRunner().invoke(app, ["validate", scene])
+    done = harness("validate", scene)
     said = " ".join(done.output.split())
     assert done.exit_code == 0
     assert "Dense forms: K, its factors and Q take" in said
@@ -74,7 +69,6 @@ def test_each_form_is_refused_by_what_it_needs(form: Form, monkeypatch: pytest.M
 def test_a_wide_band_is_not_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a square grid a fill-reducing order needs far less than the band."""
     scene = read_scene("scaling/100352")
-    assert isinstance(scene, JointScene)
     joint = scene.joint.model_copy(
         update={"junction": scene.joint.junction.model_copy(update={"nodes": (1500, 1500)})}
     )

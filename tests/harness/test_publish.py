@@ -1,15 +1,12 @@
 """`publish`: what is measured, what counts as this code; nothing is lost before its time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from commands import harness
 
 from harness.cli import publish as command
-from harness.cli.app import app
 from harness.planning.suite import suite_names
 from harness.results import published
 from harness.results.records import MEASUREMENTS, append
@@ -54,7 +51,7 @@ def publish(monkeypatch: pytest.MonkeyPatch, run: Callable[[list[str]], int]) ->
         return run(words)
 
     monkeypatch.setattr(command, "_ended", ended)
-    done = CliRunner().invoke(app, ["publish", *SUITES])
+    done = harness("publish", *SUITES)
     return done.exit_code, done.output, asked
 
 

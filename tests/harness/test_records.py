@@ -1,7 +1,5 @@
 """Rows on disk: whole lines, torn lines, a full disk, two writers."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

@@ -1,16 +1,12 @@
 """`reproduce`: a row of a run measured again, with the same or another outcome."""
 
-from __future__ import annotations
-
-import shutil
 from pathlib import Path
 
 import pytest
 import tiny
-from finished import finished_run
-from typer.testing import CliRunner, Result
+from commands import harness
+from typer.testing import Result
 
-from harness.cli.app import app
 from harness.measurement.reproduce import find_row, of_one_process
 from harness.results import records
 
@@ -18,17 +14,7 @@ pytestmark = pytest.mark.slow
 
 
 def reproduce(directory: Path, *words: str) -> Result:
-    return CliRunner().invoke(app, ["reproduce", str(directory), *words])
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return finished_run(tmp_path_factory)
-
-
-@pytest.fixture
-def copy(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "copy"))
+    return harness("reproduce", directory, *words)
 
 
 def test_the_same_code_gives_the_same_answer(finished: Path) -> None:

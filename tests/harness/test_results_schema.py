@@ -1,7 +1,5 @@
 """The names of a row's fields, in one place for the harness and the report."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rungs of the ladders in a run: judged by what conditioning allows, and refused where the model refuses."""
 
-from __future__ import annotations
-
 from io import StringIO
 from pathlib import Path
 
@@ -51,13 +49,6 @@ def test_a_refused_rung_is_recorded_and_not_measured(directory: Path, suite: Sui
     problems = {problem["scene"]: problem for problem in records.read(directory / "problems.jsonl")}
     assert "must not depend on the columns before it" in problems[REFUSED]["refused"]
     assert "refused" not in problems[WIDE]
-
-
-def test_running_again_measures_nothing_twice(directory: Path, suite: Suite) -> None:
-    before = (directory / records.MEASUREMENTS).read_bytes()
-    console = Console(file=StringIO())
-    assert run(suite, directory, console) == 0
-    assert (directory / records.MEASUREMENTS).read_bytes() == before
 
 
 @pytest.mark.parametrize(("share", "code"), [(0.9, 0), (1.1, 1)])

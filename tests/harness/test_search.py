@@ -1,7 +1,5 @@
 """tolerances = "auto" and repeats = "auto": what is measured, and what the report makes of it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from io import StringIO
@@ -15,7 +13,7 @@ from rich.console import Console
 from harness.measurement.run import run
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import DECADES, Measurement, expand
-from harness.planning.search import found, superfluous
+from harness.planning.search import superfluous
 from harness.planning.suite import read_suite, suite_from
 from problems.errors import InputError
 from report.results.reader import read
@@ -96,14 +94,6 @@ def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float, repeats: int)
     others = [m for m in plan if m.tolerance == plan[0].tolerance and m.form == plan[0].form]
     assert [m.repeat for m in others if not superfluous(m, rows)] == [*range(repeats)]
     assert not superfluous(replace(plan[0], repeat=4), [])
-
-
-def test_the_loosest_that_suffices() -> None:
-    rows = [
-        {"tolerance": t, "verdict": v} for t, v in ((1e-3, "outside"), (1e-5, "within"), (1e-7, "within"))
-    ]
-    assert found(rows) == 1e-5
-    assert found(rows[:1]) is None
 
 
 @pytest.mark.parametrize(

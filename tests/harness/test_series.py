@@ -1,7 +1,5 @@
 """A suite of series: the cases of a scene in one process, a row each."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -18,9 +16,8 @@ from rich.console import Console
 from small import solve_by_nnls
 from strip import write_strip
 
-from harness.measurement.run import batches, run
-from harness.planning.plan import expand
-from harness.planning.suite import read_suite, to_toml, validated
+from harness.measurement.run import run
+from harness.planning.suite import read_suite
 from harness.results import records
 from harness.verification.gate import gate
 from problems.build import prepared
@@ -164,14 +161,6 @@ def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:
     assert rows[-1]["verdict"] == "within"
 
 
-def test_a_spoilt_answer_of_a_case_is_seen_by_the_gate(two: Path) -> None:
-    rows = read(shutil.copytree(two, Path("spoilt")))
-    for k in (0, 1):  # the answer of another case
-        with np.load(Path("spoilt") / rows[k]["answer"]) as saved:
-            np.savez(Path("spoilt") / rows[1 - k + 2]["answer"], **dict(saved))
-    assert gate(Path("spoilt"), Console(file=StringIO())) == 1
-
-
 @pytest.mark.parametrize(
     ("fault", "status", "why"),
     [
@@ -245,18 +234,6 @@ def test_what_is_for_a_series_is_refused_elsewhere_and_two_ways_need_two_names()
     assert "other `batched`" in faults["solver.1.variant"]
 
 
-def test_repeats_of_a_series_stay_together(tmp_path: Path) -> None:
-    (tmp_path / "many.toml").write_text("repeats = 3\n" + SUITE)
-    write_strip(tmp_path)
-    (tmp_path / "faulty.py").write_text(tiny.FAULTY)
-    suite = read_suite(str(tmp_path / "many.toml"))
-    found = batches(expand(suite))
-    assert len(found) == 6
-    assert all([m.case for m in batch] == [0, 1, 2, 3] for batch in found)
-    assert all(len({m.process for m in batch}) == 1 for batch in found)
-    assert validated(__import__("tomllib").loads(to_toml(suite)), tmp_path) == suite
-
-
 def test_the_table_of_the_report(two: Path) -> None:
     from report.writers.markdown import write as report
 
@@ -266,15 +243,6 @@ def test_the_table_of_the_report(two: Path) -> None:
     assert "PIQP `update`" in text
     assert "OSQP" not in text.partition("## Series")[2].partition("##")[0]
     assert "Repeatability" not in text  # cases are no repeats
-
-
-def test_a_report_without_a_library_and_with_cases_that_failed(together: Path) -> None:
-    from report.writers.markdown import write as report
-
-    text = report(together).read_text()
-    assert "*Batched*: given many load cases at once" in text
-    assert re.search(r"newton \(dual\) batched +\| +4 of 4 \| .* – \|", text)
-    assert re.search(r"faulty \(dual\) batched +\| +0 of 4 \| +– \|", text)
 
 
 def test_ratios_are_to_the_fastest_librarys_next_case_warm_or_cold() -> None:

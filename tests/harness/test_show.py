@@ -1,7 +1,5 @@
 """What the terminal shows: a line a row, and the time that is left."""
 
-from __future__ import annotations
-
 from io import StringIO
 from typing import Any
 
@@ -27,15 +25,6 @@ def row(**changes: Any) -> dict[str, Any]:
     }
     figures = {"tolerance": 1e-9, "threads_asked": 2, "iterations": 7, "displacement_error_mm": 2e-11}
     return {**times, **words, **figures, "verdict": "within", **changes}
-
-
-def test_the_time_left_grows_with_the_size_and_stops_at_the_limit() -> None:
-    plan = [measurement("small"), measurement("large"), measurement("large", time_limit_s=5.0)]
-    with Display(Console(file=StringIO()), plan, 0, {"small": 100, "large": 400}) as display:
-        display.ready("small", 0.0)
-        display.ready("large", 0.0)
-        display.finished(plan[0], row(), seconds=1.0)
-        assert display.progress.tasks[0].fields["left"] == "00:00:37 left"  # 4^2.5 + 5
 
 
 def test_a_line_says_the_outcome_and_why() -> None:

@@ -1,7 +1,5 @@
 """A measurement that cannot end in time is not run, and only such a one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

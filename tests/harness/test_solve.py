@@ -1,7 +1,5 @@
 """`solve` and `validate`: the answer, its files, the ledger, and what was not computed."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -13,19 +11,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from joints import forbid_building
+from commands import harness
+from joints import forbid_building, two_parts
 from matplotlib.image import imread
 from rich.console import Console
 from small import solve_by_nnls
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from harness.planning.memory import size_of
 from harness.scene.ledger import ledger
 from harness.scene.solve import solve
 from problems.build import load_case, model_of, prepared
 from problems.errors import InputError
-from problems.model.scene import JointScene
 from problems.scene import read_scene
 from report.writers.vtu import grid_with_fields, write_vtu
 
@@ -57,19 +53,7 @@ approach = 0.3
 [[effect]]
 kind = "self_weight"
 part = "b"
-[joint]
-junction = { length = 200.0, width = 80.0, nodes = [11, 5] }
-[[joint.part]]
-name = "a"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 3.0
-south = { length = 60.0, elements = 2 }
-clamped = ["south"]
-"""
+""" + two_parts(200.0, 80.0, (11, 5), "south")
 APART = """
 [[effect]]
 kind = "initial_gap"
@@ -199,12 +183,9 @@ def test_the_ledger_names_every_effect_and_what_it_added(tmp_path: Path) -> None
     assert added["fasteners", "load"]["amount"] == "a +160 N on 2 nodes"  # through to the tool
     assert "3e+04 N, b -3e+04 N" in added["installed_fasteners", "load"]["amount"]
     assert all(entry["seconds"] > 0 for entry in record["ledger"] if entry["adds"] != "constraints")
-    vectors = [entry for entry in record["ledger"] if entry["adds"] in ("gap", "load")]
-    assert all(entry["mib"] * 2**20 > 8 * 110 for entry in vectors)  # f and g have 110 entries
-    assert added["ribs a", "stiffness"]["mib"] > 0
     constraints = added["rigid_tool b", "constraints"]
     assert constraints["amount"] == "55 contacts of b and tool"
-    assert constraints["seconds"] is constraints["mib"] is None
+    assert constraints["seconds"] is None
     page = (tmp_path / "out" / "answer.md").read_text()
     for entry in record["ledger"]:
         assert f"| {entry['effect']} | {entry['adds']} | {entry['amount']} |" in page
@@ -214,22 +195,6 @@ def test_the_ledger_names_every_effect_and_what_it_added(tmp_path: Path) -> None
     assert "shims" in unnamed
     assert "ribs" not in unnamed
     assert any(name.startswith("matrices") for name in record["steps"])
-
-
-def test_effects_of_the_ledger_add_up_to_the_load_case(tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    path = tmp_path / "scene.toml"
-    path.write_text(SCENE.replace("PRELOAD", "80"))
-    scene = read_scene(str(path))
-    load = load_case(scene)
-    alone = [
-        load_case(replace(scene, effects=(*scene.stiffness_effects, effect)))
-        for effect in scene.effects
-        if effect not in scene.stiffness_effects
-    ]
-    np.testing.assert_allclose(sum(part.f for part in alone), load.f, rtol=1e-14)
-    np.testing.assert_array_equal(sum(part.g for part in alone), load.g)
 
 
 def test_a_change_of_loads_alone_reuses_the_assembly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -289,25 +254,6 @@ def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
     np.testing.assert_allclose(K @ x, [5.0 - force, 1.0, force], atol=1e-12)
 
 
-def test_a_grid_for_paraview_covers_the_junction_of_each_part(tmp_path: Path) -> None:
-    record, found = run(tmp_path), arrays(tmp_path)
-    points, blocks, data = grid_with_fields(record, found)
-    for kind, cells in blocks:
-        assert kind == "quad"
-        corners = points[cells][:, :, :2]
-        d1, d2 = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-        areas = (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]) / 2  # all turn the same way
-        np.testing.assert_allclose(areas, 20.0 * 20.0)
-        assert len(cells) == 40
-    between, on_tool = np.split(found["lam"], 2)
-    assert data["contact_force_N"][:55].sum() == pytest.approx(between.sum())
-    assert data["contact_force_N"][55:].sum() == pytest.approx((on_tool - between).sum())
-    np.testing.assert_array_equal(data["gap_after_mm"][:55], found["gap_after"][:55])
-    np.testing.assert_array_equal(
-        data["gap_after_mm"][55:], np.minimum(found["gap_after"][:55], found["gap_after"][55:])
-    )
-
-
 def test_a_vtu_file_reads_back(tmp_path: Path) -> None:
     """By meshio, which wrote it: the grid, and each field at its node."""
     import meshio
@@ -316,7 +262,11 @@ def test_a_vtu_file_reads_back(tmp_path: Path) -> None:
     assert write_vtu(tmp_path / "a.vtu", record, found) == "a.vtu"
     mesh = meshio.read(tmp_path / "a.vtu")
     np.testing.assert_array_equal(mesh.points, np.column_stack([found["nodes"], np.zeros(110)]))
-    assert [(block.type, len(block.data)) for block in mesh.cells] == [("quad", 80)]
+    ((quads,),) = ([block.data for block in mesh.cells if block.type == "quad"],)
+    corners = mesh.points[quads]
+    d1, d2 = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    areas = (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]) / 2  # all turn the same way
+    np.testing.assert_allclose(areas, [20.0 * 20.0] * 80)
     names = ["displacement_mm", "part", "contact_force_N", "gap_before_mm", "gap_after_mm"]
     assert list(mesh.point_data) == names
     moved, part, force, before, after = (mesh.point_data[name] for name in names)
@@ -349,7 +299,7 @@ def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text(SCENE.replace("PRELOAD", "-1").replace("I = 500.0", "I = 0"))
     for command in (["solve", str(bad), "--out", str(tmp_path / "out")], ["validate", str(bad)]):
-        done = CliRunner().invoke(app, command)
+        done = harness(*command)
         assert done.exit_code == 2
         lines = done.output.strip().splitlines()
         assert len(lines) == 2
@@ -370,7 +320,7 @@ def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
 def test_a_joint_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
     (tmp_path / "large.toml").write_text(APART.replace("nodes = [11, 5]", "nodes = [2001, 2001]"))
     for command in (["validate"], ["solve", "--out", str(tmp_path / "out")]):
-        done = CliRunner().invoke(app, [*command, str(tmp_path / "large.toml")])
+        done = harness(*command, tmp_path / "large.toml")
         assert done.exit_code == 2
         (line,) = done.output.strip().splitlines()
         assert "junction.nodes = [2001, 2001]: fewer nodes" in line
@@ -380,20 +330,19 @@ def test_a_joint_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
 def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SCENE.replace("PRELOAD", "80").replace("I = 500.0", "I = 777.0"))
-    first = CliRunner().invoke(app, ["validate", str(path)])
+    first = harness("validate", path)
     assert first.exit_code == 0
     for said in ("n = 110", "m = 110", "contact b – tool", "Dense forms", "self_weight"):
         assert said in first.output
     assert not model_of(read_scene(str(path))).built
     _ = prepared(read_scene(str(path))).Q
-    assert "is in the cache" in CliRunner().invoke(app, ["validate", str(path)]).output
+    assert "is in the cache" in harness("validate", path).output
 
 
 def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(APART)
     scene = read_scene(str(path))
-    assert isinstance(scene, JointScene)
     made = prepared(scene)
     stored = sum(a.nbytes for a in (*made.assembly.K.matrices, *made.assembly.K.factors, made.Q))
     size = size_of(scene)
@@ -404,11 +353,11 @@ def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> No
 
 def test_validate_looks_at_given_matrices(tmp_path: Path) -> None:
     """Of a rung, and of a user: one that is not positive definite is refused."""
-    done = CliRunner().invoke(app, ["validate", "hard/loads/zero-gap"])
+    done = harness("validate", "hard/loads/zero-gap")
     assert done.exit_code == 0
     assert "n = 128, m = 64" in done.output
     np.savez(tmp_path / "mine.npz", K=np.diag([1.0, -1.0]), A=np.eye(2), f=np.ones(2), g=np.ones(2))
-    done = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")])
+    done = harness("validate", tmp_path / "mine.npz")
     assert done.exit_code == 2
     assert "the pivot of unknown 1" in done.output
     assert "positive definite" in done.output
@@ -418,6 +367,40 @@ def test_a_scene_of_own_matrices_has_no_ledger(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", K=np.eye(2), A=np.eye(2)[:, :1], f=np.ones(2), g=np.ones(1))
     scene = read_scene(str(tmp_path / "mine.npz"))
     assert ledger(scene, built=True) == []
-    said = CliRunner().invoke(app, ["validate", str(tmp_path / "mine.npz")]).output
+    said = harness("validate", tmp_path / "mine.npz").output
     assert "n = 2, m = 1, blocks of 2" in said
     assert "seem to have 1 digits" in said
+
+
+def own_scene(path: Path, contacts: int) -> Path:
+    np.savez(path, K=np.eye(2), A=np.eye(2, contacts), f=np.full(2, 2.0), g=np.ones(contacts))
+    return path
+
+
+def test_nothing_of_an_older_answer_remains_and_what_is_not_ours_does(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert harness("solve", own_scene(tmp_path / "one.npz", 1), "--out", out).exit_code == 0
+    assert (out / "contacts.csv").exists()
+    (out / "mine.txt").write_text("kept")
+    assert harness("solve", own_scene(tmp_path / "none.npz", 0), "--out", out).exit_code == 0
+    assert not (out / "contacts.csv").exists()
+    assert (out / "mine.txt").read_text() == "kept"
+    files = json.loads((out / "solution.json").read_text())["files"]
+    assert sorted([*files, "mine.txt"]) == sorted(path.name for path in out.iterdir())
+
+
+def test_a_full_disk_leaves_the_older_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "out"
+    scene = own_scene(tmp_path / "one.npz", 1)
+    assert harness("solve", scene, "--out", out).exit_code == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def full(*_: object) -> None:
+        raise OSError(27, "File too large")
+
+    monkeypatch.setattr("report.writers.solution.write_page", full)
+    done = harness("solve", scene, "--out", out)
+    assert done.exit_code == 2
+    assert "File too large" in done.output
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.npz", "out"]

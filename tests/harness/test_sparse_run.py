@@ -1,8 +1,5 @@
 """A run of both roads on one scene: measured, judged, recorded beside each other, and gated."""
 
-from __future__ import annotations
-
-import json
 import shutil
 from io import StringIO
 from pathlib import Path
@@ -88,16 +85,7 @@ def test_a_scene_has_one_row_with_the_facts_of_both_roads(finished: Path) -> Non
         assert arrays["x"].shape == arrays["lam"].shape == (45,)
 
 
-@pytest.mark.parametrize(
-    "order",
-    [
-        ("dual", "sparse"),
-        ("sparse", "dual"),
-        ("sparse", "sparse"),
-        ("dual", "sparse", "sparse"),
-        ("dual", "sparse", "dual", "dual"),
-    ],
-)
+@pytest.mark.parametrize("order", [("dual", "sparse"), ("sparse", "dual", "dual"), ("sparse", "sparse")])
 def test_the_difference_of_the_roads_is_recorded_in_either_order(
     order: tuple[Form, ...], tmp_path: Path
 ) -> None:
@@ -112,16 +100,8 @@ def test_the_difference_of_the_roads_is_recorded_in_either_order(
     assert 0.0 < problem["sparse"].get("from_condensed_mm", 1e-12) <= 1e-9
 
 
-def test_the_gate_judges_both_again(finished: Path) -> None:
-    console = quiet()
-    assert gate(finished, console) == 0
-    said = console.file.getvalue()  # type: ignore[attr-defined]
-    assert "all 2 gated rows" in said
-    assert said.count("within") >= 2
-
-
 @pytest.mark.parametrize("form", ["dual", "sparse"])
-@pytest.mark.parametrize(("moved", "code"), [(0.0, 0), (5e-8, 0), (2e-7, 1), (np.nan, 1)])
+@pytest.mark.parametrize(("moved", "code"), [(5e-8, 0), (2e-7, 1), (np.nan, 1)])
 def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, moved: float, code: int) -> None:
     """Moved at the last displacement of the junction; an inner unknown is not judged."""
     path = copy / rows_of(copy)[form]["answer"]
@@ -141,12 +121,3 @@ def test_an_answer_of_the_other_form_is_none(copy: Path) -> None:
     rows = rows_of(copy)
     shutil.copy(copy / rows["dual"]["answer"], copy / rows["sparse"]["answer"])
     assert gate(copy, quiet()) == 1
-
-
-def test_a_row_without_its_answer_fails_the_gate(copy: Path) -> None:
-    lines = (copy / records.MEASUREMENTS).read_text().splitlines()
-    kept = [line for line in lines if json.loads(line)["form"] == "dual"]
-    (copy / records.MEASUREMENTS).write_text("\n".join(kept) + "\n")
-    console = quiet()
-    assert gate(copy, console) == 1
-    assert "never measured" in console.file.getvalue()  # type: ignore[attr-defined]

@@ -1,7 +1,5 @@
 """Suite files, the plan made of them, and what the command line changes."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 
@@ -209,25 +207,6 @@ def test_a_memory_limit_holds_for_the_form_that_is_run(tmp_path: Path) -> None:
     refuse_limits_too_low(plan("sparse"))
     with pytest.raises(InputError, match=r"take \d+ MiB in the dense forms, 16\d\d MiB in the sparse form"):
         refuse_limits_too_low(plan("dual"))
-
-
-def test_the_largest_joint_is_measured_in_the_sparse_form_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.planning.memory.physical_memory_mib", lambda: 24_000)
-    plan = expand(read_suite("scaling"))
-    largest = [m for m in plan if m.scene == "scaling/100352"]
-    assert [(m.solver, m.form) for m in largest] == [("newton", "sparse")]
-    assert {m.form for m in plan if m.scene == "scaling/24080"} >= {"sparse", "dual", "primal"}
-    refuse_limits_too_low(plan)
-
-
-def test_the_uncondensed_suite_has_both_roads_and_ends_within_half_an_hour() -> None:
-    """Beside newton's, the libraries' rows: those stopped on both small scenes are not run on larger ones."""
-    plan = expand(read_suite("uncondensed"))
-    assert {m.form for m in plan} == {"sparse", "dual"}
-    assert {m.scene.partition("/")[0] for m in plan} == {"4386", "6112", "11308"}
-    assert {m.repeat for m in plan if m.solver == "newton"} == set(range(5))
-    small = [m for m in plan if m.form == "sparse" and m.scene.startswith("4386/") and not m.gated]
-    assert sum(m.time_limit_s for m in small) <= 720
 
 
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:

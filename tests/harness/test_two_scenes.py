@@ -1,18 +1,15 @@
 """`solve A B`, the force in each fastener, and `init`."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import harness
+from joints import two_parts
 from matplotlib.image import imread
-from strip import write_strip
-from typer.testing import CliRunner, Result
 
-from harness.cli.app import app
 from harness.scene.fastener_forces import fastener_forces
 from harness.scene.starter import STARTER
 from problems.build import load_case, prepared
@@ -24,23 +21,7 @@ kind = "fasteners"
 preload = 80.0
 points = [[30.0, 70.0], [150.0, 70.0]]
 """
-JOINT = """
-[joint]
-junction = { length = 160.0, width = 80.0, nodes = [9, 5] }
-[[joint.part]]
-name = "a"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 3.0
-south = { length = 60.0, elements = 2 }
-clamped = ["south"]
-[[effect]]
-kind = "initial_gap"
-mean = 0.3
-"""
+JOINT = two_parts(160.0, 80.0, (9, 5), "south") + '[[effect]]\nkind = "initial_gap"\nmean = 0.3\n'
 SPRINGS = """
 [[effect]]
 kind = "installed_fasteners"
@@ -48,10 +29,6 @@ points = [[80.0, 40.0], [120.0, 20.0]]
 stiffness = 500.0
 approach = 0.2
 """
-
-
-def harness(*words: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, words)])
 
 
 def write(path: Path, text: str) -> Path:
@@ -124,14 +101,6 @@ def test_two_scenes_are_compared_contact_by_contact(tmp_path: Path) -> None:
             assert (border == 1.0).all()
 
 
-def test_the_same_scene_twice_has_no_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
-    monkeypatch.setattr("report.writers.two_answers.gap_maps", lambda *_: {})
-    scene = write_strip(tmp_path)
-    assert harness("solve", scene, scene, "--out", tmp_path / "both").exit_code == 0
-    assert {float(row["change_mm"]) for row in rows(tmp_path / "both" / "contacts.csv")} == {0.0}
-
-
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -180,3 +149,18 @@ def test_init_overwrites_nothing(tmp_path: Path) -> None:
     assert harness("init", path).exit_code == 2
     assert path.read_text() == "title = 'mine'"
     assert harness("init", tmp_path / "joint.txt").exit_code == 2
+
+
+@pytest.mark.parametrize("other", [{"n": 3}, {"A": -1.0}])
+def test_own_matrices_with_other_rows_are_refused(other: dict[str, float], tmp_path: Path) -> None:
+    """As many contacts, but of other unknowns or the other way round."""
+    paths = []
+    for k, asked in enumerate(({}, other)):
+        n = int(asked.get("n", 2))
+        paths.append(tmp_path / f"{k}.npz")
+        A = asked.get("A", 1.0) * np.eye(n, 1)
+        np.savez(paths[-1], K=np.eye(n), A=A, f=np.full(n, 2.0), g=np.ones(1))
+    done = harness("solve", *paths, "--out", tmp_path / "both")
+    assert done.exit_code == 5, done.output
+    assert "A with" in done.output
+    assert not (tmp_path / "both").exists()

@@ -1,7 +1,5 @@
 """A K that falls apart into thousands of bodies: few arrays, no loop over them, a form that suits it."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Condensation against a dense Schur complement and a full solve, and contact against beam theory."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -9,7 +7,6 @@ import pytest
 import scipy.sparse as sp
 from joints import dof, make_joint, make_scene
 from numpy.typing import NDArray
-from scipy.sparse.linalg import spsolve
 from small import solve_by_nnls
 
 from problems.build import load_case, prepared
@@ -77,18 +74,6 @@ def test_equals_the_dense_schur_complement(part: dict[str, Any]) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-10 * abs(expected).max())
 
 
-@pytest.mark.parametrize("part", PARTS, ids=str)
-def test_solution_equals_that_of_the_whole_plate(part: dict[str, Any]) -> None:
-    joint = make_joint(part, contacts=[["a", "tool"]])
-    made = prepared(make_scene(joint, *stiffeners(part)))
-    K, keep = full_stiffness(part)
-    load = np.random.default_rng(0).normal(0, 100, made.assembly.n)
-    f = np.zeros(K.shape[0])
-    f[keep] = load
-    whole = spsolve(K, f)[keep]
-    np.testing.assert_allclose(made.assembly.K.solve(load), whole, atol=1e-9 * abs(whole).max())
-
-
 def test_nodes_stand_in_the_order_of_the_unknowns() -> None:
     """By lines of ascending y, whichever the direction of elimination."""
     for part in PARTS[:3]:
@@ -102,12 +87,6 @@ def test_nodes_stand_in_the_order_of_the_unknowns() -> None:
         assert (by_line[0] > by_line[-1]) == ("north" in part["clamped"])
 
 
-def test_progress_ends_at_one() -> None:
-    seen: list[float] = []
-    condense(sp.csr_array(np.eye(6)), [np.arange(3), np.arange(3, 6)], np.arange(6) % 3 == 0, seen.append)
-    assert seen == [0.5, 1.0]
-
-
 def test_a_motion_without_energy_is_refused() -> None:
     spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
     K = sp.csr_array(sp.block_diag([spring, np.eye(2)]))
@@ -115,15 +94,7 @@ def test_a_motion_without_energy_is_refused() -> None:
         condense(K, [np.array([0, 1]), np.array([2, 3])], np.array([False, False, False, True]))
 
 
-FLOATING = [
-    (),
-    ((30.0, 20.0),),
-    ((30.0, 20.0), (350.0, 35.0)),
-    ((30.0, 20.0), (130.0, 40.0), (330.0, 80.0)),  # on one line
-]
-
-
-@pytest.mark.parametrize("points", FLOATING)
+@pytest.mark.parametrize("points", [(), ((30.0, 20.0), (130.0, 40.0), (330.0, 80.0))])  # on one line
 def test_a_part_that_floats_is_refused(points: tuple[tuple[float, float], ...]) -> None:
     joint = make_joint({"south": LONG}, contacts=[["a", "tool"]])
     effects = [Supports(kind="supports", part="a", points=points)] if points else []

@@ -1,17 +1,14 @@
 """Contacts that depend on one another are refused when they are read, in every form; all others are taken."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from typer.testing import CliRunner
+from commands import harness
 
 from harness import LoadCase, own_matrices, solve_series
-from harness.cli.app import app
 from problems.errors import InputError
 from problems.input.dependent_contacts import refuse_dependent
 
@@ -112,15 +109,10 @@ def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
     np.save(tmp_path / "gaps.npy", np.zeros((2, 3)))
     places = {"OWN": "own.npz", "X": "x.npy", "GAPS": "gaps.npy", "NEW": "new", "NEW.npz": "new.npz"}
     given = [str(tmp_path / places[word]) if word in places else word for word in words.split()]
-    done = CliRunner().invoke(app, given)
+    done = harness(*given)
     assert done.exit_code == 2, done.output
     said = " ".join(done.output.split())
     assert f"{own}: A[:, 2] = 'dependent': must not depend on the columns before it" in said
-
-
-def test_arrays_are_refused_at_once() -> None:
-    with pytest.raises(InputError, match=re.escape("A[:, 2]")):
-        own_matrices(np.eye(N), np.eye(N, 3)[:, [0, 1, 0]], np.ones(N), np.zeros(3))
 
 
 def test_contacts_that_the_rounding_of_Q_makes_dependent_are_said() -> None:

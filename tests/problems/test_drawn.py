@@ -1,7 +1,5 @@
 """Scenes drawn at random: the same wherever they are drawn, others for each version, within the ranges."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from pathlib import Path
@@ -16,8 +14,7 @@ from harness.planning.plan import expand
 from harness.planning.suite import read_suite, read_written, resolved_scenes, to_toml
 from harness.results.schema import DRAWN
 from problems.drawn import MEANS, ROWS, SIZES, drawn_names
-from problems.effects.fasteners import Fasteners
-from problems.effects.initial_gap import InitialGap, RandomField
+from problems.effects.initial_gap import RandomField
 from problems.effects.pressure import Pressure
 from problems.errors import Fault, InputError
 from problems.model.positions import Pattern
@@ -36,8 +33,6 @@ def drawn_scene(name: str) -> JointScene:
 def parts_of(scene: JointScene) -> tuple[float, RandomField, float, Pattern, tuple[float, float]]:
     """Mean gap and its field, preload and its pattern, the pressures on the two parts."""
     gap, fasteners, *pressures = scene.effects[-4:]  # after those of the assembly
-    assert isinstance(gap, InitialGap)
-    assert isinstance(fasteners, Fasteners)
     assert gap.random is not None
     assert fasteners.pattern is not None
     wing, fragment = (effect for effect in pressures if isinstance(effect, Pressure))
@@ -61,12 +56,6 @@ def test_a_name_gives_the_same_scene_everywhere(monkeypatch: pytest.MonkeyPatch)
     assert pressures == (5.176e-6, -5.176e-6)  # 10^(−5.286), as ⌊3801 · 0.18792…⌋ = 714
     assert scene.key == drawn_scene("drawn/4386/7").key
     assert scene.assembly_key == read_scene("4386/0107").assembly_key
-
-
-def test_another_version_draws_other_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = {drawn_scene(name).key for name in DRAWS[:30]}
-    monkeypatch.setattr(problems.drawn, "__version__", "99.0.0")
-    assert len(before | {drawn_scene(name).key for name in DRAWS[:30]}) == 60
 
 
 def test_every_parameter_is_within_its_range_and_fills_it() -> None:

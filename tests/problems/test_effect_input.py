@@ -1,28 +1,14 @@
 """What is said of bad effects: file, key, value, unit and what is allowed; contradictions by both names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
+from joints import two_parts
 
 from problems.errors import Fault, InputError
 from problems.scene import read_scene
 
-JOINT = """
-[joint]
-junction = { length = 100.0, width = 50.0, nodes = [5, 3] }
-[[joint.part]]
-name = "a"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 2.0
-north = { length = 40.0, elements = 2 }
-clamped = ["north"]
-"""
+JOINT = two_parts(nodes=(5, 3))
 
 
 def faults(folder: Path, *tables: str, joint: str = JOINT) -> list[Fault]:
@@ -93,11 +79,6 @@ def test_a_wrong_value_is_named_with_unit_and_range(
     assert len(found) == 1
     assert found[0].where == str(tmp_path / "scene.toml")
     assert allowed in found[0].allowed
-
-
-def test_units_of_a_joint(tmp_path: Path) -> None:
-    (fault,) = faults(tmp_path, joint=JOINT.replace("thickness = 2.0", "thickness = 0", 1))
-    assert fault.allowed.endswith("greater than 0; in mm")
 
 
 MEASURED = "points = [[0, 0, 1], [9, 0, 1], [9, 9, 2]]"
@@ -171,12 +152,6 @@ def test_a_preload_at_an_installed_fastener(tmp_path: Path) -> None:
         (fault,) = faults(tmp_path, *order)
         assert "installed_fasteners" in fault.key
         assert "fasteners acts at the same nodes" in fault.allowed
-
-
-def test_pads_side_by_side_are_no_contradiction(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text("".join(f"[[effect]]\n{PAD.format(3, *x)}\n" for x in ((0, 50), (50, 80))) + JOINT)
-    assert len(read_scene(str(path)).effects) == 2
 
 
 GAPS = 'kind = "measured_gap"\nfile = "gaps.csv"'

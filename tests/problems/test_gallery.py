@@ -1,7 +1,5 @@
 """The gallery: for each scene a number of independent origin: beam or plate theory, statics, symmetry."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Effects on gaps and forces at the junction: measured gap, shims, tool, clamps, files of positions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -38,14 +36,6 @@ def test_a_measured_plane_is_met_exactly(
     g = MeasuredGap(kind="measured_gap", points=points).gap(TWO)
     x, y = TWO.nodes.T
     np.testing.assert_allclose(g, a + b * x + c * y, atol=1e-10)
-
-
-def test_a_measured_point_on_a_node_is_met() -> None:
-    random = np.random.default_rng(4)
-    values = random.uniform(0.1, 0.9, 45)
-    points = tuple((x, y, v) for (x, y), v in zip(TWO.nodes.tolist(), values, strict=True))
-    g = MeasuredGap(kind="measured_gap", points=points).gap(TWO)
-    np.testing.assert_allclose(g, values, atol=1e-12)
 
 
 def test_interpolation_errs_with_the_square_of_the_distance() -> None:

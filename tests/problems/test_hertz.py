@@ -6,8 +6,6 @@ pressure, and p = p₀ √(1 − x²/a²) (K. L. Johnson, Contact Mechanics, 198
 how far the cylinder was moved does not matter, nor the solid's depth where that is large beside a.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -2,8 +2,6 @@
 that results is the one that is proven.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import product

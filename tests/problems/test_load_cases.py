@@ -1,7 +1,5 @@
 """Load cases of a series: random gaps, a table of measured ones, a sweep; and what is said of bad ones."""
 
-from __future__ import annotations
-
 import pickle
 from pathlib import Path
 
@@ -83,7 +81,6 @@ def test_the_statistics_of_the_random_gaps(scene: Scene, data: Prepared) -> None
     assert abs(gaps.mean(axis=0) - 0.5).max() < 4 * sd / np.sqrt(count)
     assert abs(gaps.std(axis=0) / sd - 1).max() < 4 / np.sqrt(2 * count)
     nodes = data.assembly.contact_nodes
-    assert nodes is not None
     found = np.corrcoef(gaps.T)[0]
     wanted = np.exp(-0.5 * (np.linalg.norm(nodes - nodes[0], axis=1) / length) ** 2)
     assert abs(found - wanted).max() < 4 / np.sqrt(count)

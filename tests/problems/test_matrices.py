@@ -1,7 +1,5 @@
 """A user's own K, A, f, g: both formats, the blocks found in K, and what is said of bad ones."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

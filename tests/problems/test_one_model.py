@@ -1,36 +1,21 @@
 """The model of a scene is made once, and its file read once, whatever is asked of it."""
 
-from __future__ import annotations
-
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
-from joints import make_joint, make_scene
-from typer.testing import CliRunner
+from commands import harness
+from joints import make_joint, make_scene, two_parts
 
-from harness.cli.app import app
 from problems import scene as reading
 from problems.build import load_case, model_of, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
 from problems.full_model.joint_model import JointModel
 
-TEXT = """
-[joint]
-junction = {length = 400.0, width = 120.0, nodes = [9, 4]}
-contacts = [["a", "b"]]
-[[joint.part]]
-name = "a"
-thickness = 6.0
-north = {length = 90.0, elements = 2}
-clamped = ["north"]
-[[joint.part]]
-name = "b"
-thickness = 6.0
-south = {length = 90.0, elements = 2}
-clamped = ["south"]
+TEXT = (
+    two_parts()
+    + """
 [[effect]]
 kind = "pressure"
 part = "a"
@@ -42,6 +27,7 @@ mean = 0.1
 kind = "self_weight"
 part = "b"
 """
+)
 
 
 @pytest.mark.parametrize("form", ["dual", "primal", "sparse"])
@@ -63,8 +49,7 @@ def test_one_solve_makes_one_model_and_reads_its_scene_once(
     monkeypatch.setattr(reading, "read_toml", counted_read)
     path = tmp_path / "scene.toml"
     path.write_text(TEXT)
-    assert tomllib.loads(TEXT)["joint"]
-    done = CliRunner().invoke(app, ["solve", str(path), "--form", form, "--out", str(tmp_path / "out")])
+    done = harness("solve", path, "--form", form, "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     assert (len(made), read) == (1, [path])
 

@@ -1,7 +1,5 @@
 """Problems from outside: printed optima, closed forms, convergence; and how they are found and solved."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -48,7 +46,6 @@ def solved(name: str) -> tuple[Reference, float]:
 def test_the_optimum_is_the_printed_one(name: str) -> None:
     """To the last printed digit, rounded or cut off: the sources stopped at tolerances of their own."""
     printed = read_scene(name).printed
-    assert printed is not None
     _, objective = solved(name)
     last_digit = 10.0 ** (np.floor(np.log10(abs(printed.value))) + 1 - printed.digits)
     assert abs(objective - printed.value) <= 1.5 * last_digit
@@ -59,7 +56,6 @@ def test_the_membrane_over_a_hemisphere_converges_to_its_closed_form() -> None:
     for cells in (8, 20, 40, 80):
         known, _ = solved(f"outside/hemisphere/{cells}")
         at = prepared(read_scene(f"outside/hemisphere/{cells}"), form="sparse").assembly.nodes
-        assert at is not None
         errors.append(float(abs(known.x + alone(cells) - exact(at)).max()))
         covered = at[prepared(read_scene(f"outside/hemisphere/{cells}"), form="sparse").assembly.A.indices]
         radii.append(float(np.hypot(*covered[known.active].T).max()) - FREE)
@@ -103,16 +99,6 @@ def test_a_large_one_is_solved_in_the_sparse_form_by_choice() -> None:
         chosen_form(read_scene("outside/torsion/320"), FORMS, "dual")
 
 
-def test_stiffer_and_stiffer_springs_leave_few_sets_to_pivot() -> None:
-    """Without them the edge of the contact region moves by a row per set, of 40 from edge to middle."""
-    scene = read_scene("outside/journal_bearing/80")
-    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
-    assert data.assembly.m > 3000
-    answer = answer_of("newton", make_solver("newton", {}), data, "sparse", load, 1e-11)
-    assert answer.status == "solved"
-    assert answer.inner_iterations <= 10  # contact sets, a factorisation of K each
-
-
 def test_the_matrices_are_those_of_linear_triangles() -> None:
     """∫ w ∇φ·∇φ summed over each triangle alone, for the journal bearing."""
     nx, ny, eccentricity = 3, 2, 0.1
@@ -145,7 +131,6 @@ def test_the_report_shows_printed_values_and_the_order(tmp_path: Path) -> None:
         json.dumps(problem | {"printed_source": "PETSc"}) + "\n", "utf-8"
     )
     section = outside.section(read(tmp_path))
-    assert section is not None
     sentence, printed, refined = section.blocks
     assert "Of 5 scenes" in sentence.markdown
     assert "4 have an answer" in sentence.markdown

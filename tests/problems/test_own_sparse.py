@@ -1,7 +1,5 @@
 """A user's own sparse K from its files to the answer: nothing dense, and one message for what is wrong."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -9,22 +7,19 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
-from lambda_min import proven
+from commands import harness
 from scipy.sparse.linalg import spsolve
-from sparse_matrices import band_matrix, graph_matrix, renumbered
-from typer.testing import CliRunner
+from sparse_matrices import band_matrix, renumbered
 
-from harness.cli.app import app
 from harness.planning import form_choice, memory
 from problems import formats
 from problems.build import load_case, prepared
-from problems.formats import pyyeti
+from problems.formats.nastran import pyyeti
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 from problems.input import user_matrices
 from problems.scene import read_scene
 from problems.stiffness.dense import DenseBlock
-from problems.stiffness.operator import Stiffness
 
 N, M = 3000, 40
 
@@ -64,7 +59,7 @@ def files(folder: Path, K: sp.csc_array | None = None, scipy_npz: bool = False) 
 
 
 def run(*words: str) -> tuple[int, str]:
-    done = CliRunner().invoke(app, list(words))
+    done = harness(*words)
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done.exit_code, " ".join(done.output.split())
 
@@ -120,24 +115,6 @@ def test_a_form_that_cannot_fit_is_refused_with_the_figures(tmp_path: Path) -> N
     assert code == 2
     assert f"{N} unknowns" in said
     assert "this machine has 200; the sparse form (--form sparse) needs 1" in said
-
-
-def test_a_mechanism_is_named(tmp_path: Path) -> None:
-    K = sp.csc_array(sp.block_diag([band_matrix(np.random.default_rng(1), N - 1, 4), [[0.0]]]))
-    code, said = run("import", *files(tmp_path, K), "--out", str(tmp_path / "mine.npz"))
-    order = np.random.default_rng(3).permutation(N)
-    assert code == 2
-    assert f"x[{np.flatnonzero(order == N - 1)[0]}]" in said
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_bound_without_a_band_is_below_the_smallest_eigenvalue_and_near_it(seed: int) -> None:
-    K = graph_matrix(np.random.default_rng(seed), 150)
-    least = float(np.linalg.eigvalsh(K.toarray())[0])
-    assert 0.89 * least < proven(K, 0.9 * least) <= 0.9 * least
-    assert Stiffness.of(K).blocks[0].shifted(np.ones(150), 1.001 * least) is None
-    tiny = sp.csc_array(K - (1 - 1e-15) * least * sp.eye_array(150))
-    assert proven(tiny, 1e-16 * least) == 0.0  # within rounding
 
 
 def test_a_sparse_matrix_of_an_op4_file_stays_sparse(tmp_path: Path) -> None:

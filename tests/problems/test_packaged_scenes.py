@@ -1,7 +1,5 @@
 """The packaged scenes that solvers are compared on: problems/scenes/<n>/<active>.toml, …/scaling/<n>.toml."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from typing import Any
@@ -18,7 +16,6 @@ LONGEST = "scaling/401408"
 
 
 def size(scene: Scene) -> int:
-    assert scene.expected_size is not None
     return scene.expected_size[0]
 
 
@@ -37,7 +34,6 @@ def test_the_title_gives_the_active_count_and_the_pressure(name: str) -> None:
     scene = read_scene(name)
     if name != LONGEST:  # whose count nothing has been run for
         count = re.search(r"about (\d+) active contacts", scene.title)
-        assert count is not None
         assert 0 < int(count[1]) < size(scene) // 2
     if name in SCALING:
         assert scene.title.startswith(f"Scaling, n = {size(scene)}: ")
@@ -108,7 +104,6 @@ def test_the_largest_is_four_times_as_long_on_the_same_grid() -> None:
 @pytest.mark.parametrize("name", SCALING)
 def test_no_two_fasteners_of_the_scaling_meet_on_a_node(name: str) -> None:
     scene = read_scene(name)
-    assert scene.joint is not None
     (fasteners,) = (effect for effect in scene.effects if isinstance(effect, Fasteners))
     force = fasteners.force(scene.joint)
     assert np.array_equal(np.unique(force), [-fasteners.preload, 0.0, fasteners.preload])

@@ -1,13 +1,10 @@
 """The paper's test problems: sizes and condition of Table 4, active constraints of Table 2."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from solving import solve
 
 from problems.build import load_case, prepared
-from problems.forms.prepared import Prepared
 from problems.scene import read_scene, scene_names
 
 TABLE_2 = (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592)
@@ -20,7 +17,6 @@ def test_sizes(n: int) -> None:
         if name.startswith(f"{n}/"):
             scene = read_scene(name)
             assert scene.expected_size == (n, TABLE_4[n][0])
-            assert scene.joint is not None
             assert scene.joint.contact_matrix().shape == (n, TABLE_4[n][0])
 
 
@@ -39,14 +35,10 @@ def test_every_size_has_from_few_to_many_active_constraints(n: int) -> None:
     assert np.diff(fractions).max() < 0.3
 
 
-@pytest.fixture(scope="module")
-def smallest() -> Prepared:
-    return prepared(read_scene("4386/0052"))
-
-
 @pytest.mark.slow
-def test_condition_of_the_smallest_problem(smallest: Prepared) -> None:
+def test_condition_of_the_smallest_problem() -> None:
     """By all eigenvalues of both blocks, where the build takes a few by Lanczos."""
+    smallest = prepared(read_scene("4386/0052"))
     assert (smallest.assembly.n, smallest.assembly.m) == (4386, 2193)
     values = np.concatenate([np.linalg.eigvalsh(K) for K in smallest.assembly.K.matrices])
     condition = values.max() / values.min()
@@ -56,11 +48,10 @@ def test_condition_of_the_smallest_problem(smallest: Prepared) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", TABLE_2)
-def test_active_constraints_of_the_paper(smallest: Prepared, count: int) -> None:
+def test_active_constraints_of_the_paper(count: int) -> None:
     scene = read_scene(f"4386/{count:04}")
-    case = load_case(scene)
-    lam = solve("newton", "dual", smallest, case)[0].lam
-    assert lam is not None
+    data, case = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    lam = solve("newton", "sparse", data, case)[0].lam
     assert abs(int((lam > 0).sum()) - count) <= 22  # 1 % of m
     assert lam.min() >= 0
-    assert (smallest.Q @ lam - smallest.dual_load(case)).min() > -1e-9
+    assert (data.compliance @ lam - data.dual_load(case)).min() > -1e-9

@@ -1,12 +1,10 @@
 """Weight, heat, shifted supports and pads against beam theory and statics."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import pytest
-from joints import degrees, dof, make_joint, make_scene
+from joints import dof, make_joint, make_scene
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
@@ -22,8 +20,7 @@ from problems.forms.prepared import Prepared
 from problems.full_model.joint_model import JointModel
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.joint import Joint
-from problems.model.part import PartModel
-from problems.model.part_load import PartLoadEffect
+from problems.model.part import PartLoadEffect, PartModel
 
 E, T = 70e3, 6.0
 #: A strip along y, clamped at y = −200, free at y = 150, bending like a beam since ν = 0.
@@ -73,21 +70,6 @@ def test_a_warm_face_bends_a_cantilever_away_from_it(pad: bool) -> None:
     np.testing.assert_allclose(x.reshape(6, 3)[:, 1], expected, rtol=1e-4)
 
 
-def test_work_of_heat_on_a_part_with_a_pad() -> None:
-    """On w = a x² + c y²: −(1 + ν) D κ (2a + 2c) times the area, with the pad's D and κ on the pad."""
-    plate = FREE_JOINT.plate(FREE_JOINT.part[0])
-    pad = LocalThickness(kind="local_thickness", part="a", thickness=9.0, x=(30, 333), y=(-111, 95))
-    f = ThermalBending(kind="thermal_bending", part="a", difference=30.0).load(
-        PartModel(plate, (pad,), range(0))
-    )
-    a, c = 1e-4, -3e-5
-    fields = degrees(plate.x, plate.y, lambda x, y: (a * x**2 + c * y**2, 2 * a * x, 2 * c * y, 0.0))
-    moment = [E * t**3 / 12 / (1 - 0.33**2) * 1.33 * 23e-6 * 30.0 / t for t in (6.0, 9.0)]
-    on_pad = 303.0 * 206.0
-    work = -(moment[0] * (400 * 460 - on_pad) + moment[1] * on_pad) * (2 * a + 2 * c)
-    assert f @ fields == pytest.approx(work, rel=1e-10)
-
-
 @pytest.mark.parametrize("thickness", [3.0, 9.0])
 def test_a_stepped_cantilever(thickness: float) -> None:
     """P at the end, EI changes at s = 100, a grid line: w(L) = P/3 [(L³−b³)/EI₁ + b³/EI₂], b = L−100."""
@@ -99,23 +81,6 @@ def test_a_stepped_cantilever(thickness: float) -> None:
     assert w[-1] == pytest.approx(20 / 3 * ((350.0**3 - 250.0**3) / root + 250.0**3 / tip), rel=1e-3)
 
 
-@pytest.mark.parametrize("area", [((0.0, 400.0), (-250.0, 210.0)), ((30.0, 333.0), (-111.0, 95.0))])
-def test_energy_of_a_pad_under_constant_curvature(area: tuple[Any, Any]) -> None:
-    """w = a x² + b xy + c y²: (D' − D) [(w_xx + w_yy)² − 2(1−ν)(w_xx w_yy − w_xy²)] times the area."""
-    plate = FREE_JOINT.plate(FREE_JOINT.part[0])
-    pad = LocalThickness(kind="local_thickness", part="a", thickness=9.0, x=area[0], y=area[1])
-    a, b, c = 1e-4, -3e-5, 2e-4
-    w = degrees(
-        plate.x,
-        plate.y,
-        lambda x, y: (a * x**2 + b * x * y + c * y**2, 2 * a * x + b * y, b * x + 2 * c * y, b),
-    )
-    D = [E * t**3 / 12 / (1 - 0.33**2) for t in (9.0, 6.0)]
-    density = (2 * a + 2 * c) ** 2 - 2 * (1 - 0.33) * (4 * a * c - b**2)
-    size = (area[0][1] - area[0][0]) * (area[1][1] - area[1][0])
-    assert w @ (pad.stiffness(plate) @ w) == pytest.approx((D[0] - D[1]) * density * size, rel=1e-9)
-
-
 @pytest.mark.parametrize("padded", [False, True])
 def test_weight_is_the_sum_of_the_reactions(padded: bool) -> None:
     pad = LocalThickness(kind="local_thickness", part="a", thickness=15.0, x=(33, 290), y=(-201, 45))
@@ -124,14 +89,6 @@ def test_weight_is_the_sum_of_the_reactions(padded: bool) -> None:
     at_supports = x[[0, 4, 17]]  # nodes of the 5 × 4 grid
     volume = 400 * (250 + 120 + 90) * T + padded * (290 - 33) * (45 + 201) * (15.0 - T)
     assert 1e6 * at_supports.sum() == pytest.approx(2700e-9 * 9.80665 * volume, rel=1e-9)
-
-
-def test_moments_of_the_weight_about_the_supports() -> None:
-    """The centre of gravity stands at y = −20 and x = 200: statics gives each of the three reactions."""
-    x, _ = solved(FREE_JOINT, HELD, SelfWeight(kind="self_weight", part="a"))
-    weight = 2700e-9 * 9.80665 * 400 * 460 * T
-    far = weight * -20.0 / 120.0
-    np.testing.assert_allclose(1e6 * x[[0, 4, 17]], [(weight - far) / 2, (weight - far) / 2, far], rtol=1e-8)
 
 
 def test_a_free_plate_bends_to_a_bowl_without_stress() -> None:

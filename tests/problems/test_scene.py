@@ -1,7 +1,5 @@
 """Scene files: what a key depends on, and what is said of bad input."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

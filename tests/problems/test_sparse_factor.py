@@ -1,13 +1,12 @@
 """Factors of a sparse K, each against the dense matrix, and what they say of a mechanism."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from long import seeds
 from sparse_matrices import band_matrix, chain, graph_matrix, renumbered
 
 from problems.build import load_case, prepared
@@ -32,7 +31,7 @@ def scattered(random: np.random.Generator, n: int, half: int) -> tuple[sp.csc_ar
     return renumbered(band_matrix(random, n, half), order), np.column_stack([order / 1.0, order % 2])
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(3, 12))
 def test_each_factor_solves_as_the_dense_matrix_does(seed: int) -> None:
     random = np.random.default_rng(seed)
     n = int(random.integers(300, 500))
@@ -54,7 +53,7 @@ def test_each_factor_solves_as_the_dense_matrix_does(seed: int) -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 5, 9])
 @pytest.mark.parametrize("half", [0, 1, 4, 8])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(1, 3))
 def test_small_matrices_of_any_band(n: int, half: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     K = band_matrix(random, n, half)
@@ -100,7 +99,7 @@ def grid(*shape: int) -> sp.csc_array:
     return sp.csc_array(K)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(3, 12))
 def test_a_mechanism_is_named_by_an_unknown_that_moves(seed: int) -> None:
     """A chain that nothing holds, among unknowns that are held, in each of the three kinds of factor."""
     random = np.random.default_rng(seed)

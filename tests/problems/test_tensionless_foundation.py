@@ -18,8 +18,6 @@ w = q/k + e^(−βs)(B sin βs − q/k cos βs), s = x − c. The conditions at 
 βc; c = 1/β belongs to w(0) = −8q/9k, P = 17q/6β and M(0) = −5q/6β².
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

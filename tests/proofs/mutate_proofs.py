@@ -8,8 +8,6 @@ killed. If it survives, a term of a bound is not tested. Exits with 1 if one sur
 found exactly once, which `test_mutants.py` checks too.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

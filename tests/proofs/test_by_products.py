@@ -1,7 +1,5 @@
 """The referee by products alone: K sparse, K⁻¹ by a sparse factor, no dense factor, inverse or Q."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

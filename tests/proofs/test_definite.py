@@ -3,8 +3,6 @@
 The errors are exact: in closed form, or in rational numbers. `mutate_proofs.py` takes the terms out in turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -18,6 +16,7 @@ from sparse_matrices import band_matrix, chain, graph_matrix
 from harness.verification import definite
 from harness.verification.definite import independence
 from problems.forms.assembly import Matrix, Vector
+from problems.stiffness.dense import DenseBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.rounding import U, gamma
 
@@ -183,3 +182,33 @@ def test_independence_counts_the_rounding_of_its_products() -> None:
     nearly = np.array([[1.0, 1.0], [0.0, 2.0**-20]])  # λmin(AᵀA) is 2⁻⁴¹, a product is rounded by 2⁻⁵³
     assert 0 < independence(sp.csc_array(nearly)) <= 2.0**-41
     assert independence(sp.csc_array(nearly * [[1.0], [2.0**-4]])) == 0.0  # 2⁻⁴⁹
+
+
+def test_compliance_the_backward_error_of_the_factor_counts() -> None:
+    """(K⁻¹)_ii ≤ (1 + e/κ) (UᵀU)⁻¹_ii, e/κ one hundredth here and then more."""
+    K = DenseBlock(np.diag([1.0, 2.0**40]).T)
+    each, ones = gamma(6), np.ones(2)
+    for share in (0.01, 1.0, 100.0):
+        kappa = each * (1 + 2.0**40) / share
+        assert 1 + share <= K.largest_compliance(ones, kappa) <= 1.02 * (1 + 1.02 * share)
+    D = np.array([1.0, 2.0**-20])  # DKD = I
+    assert 2.0 <= K.largest_compliance(D, 2 * each) <= 2.1
+    assert K.largest_compliance(ones, 0.0) == np.inf
+
+
+def test_compliance_the_error_of_the_inverse_counts() -> None:
+    """ε ‖X‖_F is what any row of X may be off by: 9 % of 1 here."""
+    epsilon, ones = gamma(6) * 2.0**47, np.ones(2)
+    found = DenseBlock(np.diag([1.0, 2.0**94]).T).largest_compliance(ones, 1e30)
+    assert 1.0099 * (1 + epsilon) ** 2 <= found <= 1.05 * (1 + epsilon) ** 2
+    assert DenseBlock(np.diag([1.0, 2.0**110]).T).largest_compliance(ones, 1e30) == np.inf
+
+
+def test_compliance_is_the_square_of_a_row() -> None:
+    assert 4.0 <= DenseBlock(np.full((1, 1), 0.25)).largest_compliance(np.ones(1), 0.25) <= 4.2
+    rng = np.random.default_rng(0)
+    B = rng.standard_normal((40, 40))
+    K = np.asfortranarray(B @ B.T + np.eye(40))
+    wanted = np.diag(np.linalg.inv(K)).max()
+    found = DenseBlock(K).largest_compliance(np.ones(40), float(np.linalg.eigvalsh(K)[0]))
+    assert wanted <= found <= 1.05 * wanted

@@ -3,8 +3,6 @@
 A few hundred problems; RIVETBENCH_LONG=1 takes 50 000 load cases, RIVETBENCH_LONG=N takes N.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -53,7 +51,7 @@ OTHERS: list[Variant] = [
 
 
 def test_nothing_wrong_is_called_solved_and_no_bound_is_too_small() -> None:
-    log, count, start = Log(), draws(300, 50_000), time.monotonic()
+    log, count, start = Log(), draws(150, 50_000), time.monotonic()
     for index in range(count // LOADS):
         made = exact_problem(SEED, index)
         log.where = f"exact_problem({SEED}, {index}), {made.kind}"
@@ -161,8 +159,6 @@ def _check_solver(
             continue
         log.seen[f"{name} {form} {options or ''}".strip()] += 1
         (x,) = session.problem.recover([answer.lam], [answer.x], [loads[k]])
-        assert x is not None
-        assert answer.lam is not None
         limit = min(allowed[k][name]) if variant in USUAL else allowed[k][name][0]
         error = max_error(x, given[k].x)
         if not error <= Fraction(limit):
@@ -219,7 +215,6 @@ def test_a_dual_program_alone_is_solved_to_its_promise() -> None:
                     continue
                 raise
             if answer.status == "solved":
-                assert answer.lam is not None
                 low, high = np.linalg.eigvalsh(Q)[[0, -1]]
                 error, rounding = answer.lam - lam, 1e-14 * high * max(1, lam.sum())
                 if not np.sqrt(error @ Q @ error) <= promised(name, 1.0, m, low, lam.sum(), rounding):

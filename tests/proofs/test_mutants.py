@@ -1,7 +1,5 @@
 """The list of mutants keeps up with the source: each text is there once, and what replaces it is Python."""
 
-from __future__ import annotations
-
 import pytest
 from mutants import MUTANTS, TESTS, Mutant
 from mutate_proofs import ROOT

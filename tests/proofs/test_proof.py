@@ -3,8 +3,6 @@
 The errors are known in closed form. `mutate_proofs.py` takes the terms out in turn.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 
@@ -20,6 +18,7 @@ from problems.forms.approximate_inverse import ApproximateInverse
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
+from problems.stiffness.rounding import gamma
 
 KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array], ids=["dense", "sparse"])
 
@@ -51,6 +50,7 @@ def bound(
     lo: float = 0.0,
     s: float = 0.0,
     r: float = 0.0,
+    translated: bool = False,
 ) -> float:
     """Of x and λ as they are. lo : the second half of x; s, r : uncertainties of gap and force, mm and N."""
     units, one = proof.balanced, proof.balanced.load([load])
@@ -58,7 +58,8 @@ def bound(
     forces = DoubleDouble(lam[:, None] / units.R, np.zeros((len(lam), 1)))
     force, gap = units.residuals(one, at, forces)
     force = Enclosure(force.value, force.error + r * units.D)
-    return float(proof.bounds(at, forces, force, Enclosure(gap.value, gap.error + s * units.R))[0][0])
+    gap = Enclosure(gap.value, gap.error + s * units.R)
+    return float(proof.bounds(at, forces, force, gap, translated)[0][0])
 
 
 #: Springs of 4 and 16 N/mm; x* = (1, 2), λ* = 6 N.
@@ -145,6 +146,43 @@ def test_what_is_not_known_of_the_residuals_counts(kind: Any) -> None:
     open_, touching = (LoadCase(array(4.0, 32.0), array(g)) for g in (2.0, 1.0))  # λ* = 0
     assert bound(proof, open_, array(1.0, 2.0), array(0.0), s=1e-3) < 1e-14
     assert 1e-3 <= bound(proof, touching, array(1.0, 2.0), array(0.0), s=1e-3) <= 1.03e-3
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.9, 1.0])
+def test_a_gap_is_closed_by_a_translation(share: float) -> None:
+    """By that share of it, the rest through ‖K‖/σ²; both count, and of a softer K neither does."""
+    proof, _ = springs(np.asfortranarray, 4.0, 16.0)
+    exact = proof.near.product
+    object.__setattr__(proof.near, "product", lambda v: share * exact(v))
+    proof.kappa = 1 / 16
+    at = array(1.001, 2.0), array(5.996)
+    assert 1e-3 * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 1.05e-3
+    assert 2e-3 * (1 - 1e-12) <= bound(proof, LOAD, *at, s=1e-3, translated=True) <= 2.1e-3
+    proof.balanced.__dict__["stiffest"] = 4.0
+    wider = 1e-3 * (share + 2 * (1 - share))
+    assert wider * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 1.05 * wider
+    proof.compliance = 1e9  # then it is D/√κ
+    assert 4 * wider * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 4.15 * wider
+
+
+def test_the_rounding_of_what_a_translation_leaves_counts() -> None:
+    proof, _ = springs(np.asfortranarray, 4.0, 16.0)
+    for size in (0.7, 1e-323):
+        delta = np.full((1, 1), size)
+        left, uncertain, _ = proof._translated(delta, np.full((1, 1), 1e-3) * size)
+        assert abs(left) <= uncertain
+        assert uncertain >= 1e-3 * size + 2 * gamma(2) * 0.99 * size
+        assert uncertain >= 2.0**-1074
+
+
+def test_many_answers_are_proven_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a correction, and to no more than some times their error."""
+    data, load, x, lam = beam(150, np.asfortranarray, 0)
+    proof = proof_of(data)
+    monkeypatch.setattr(proof, "_corrections", None)
+    noise = 1 + 1e-9 * np.random.default_rng(1).standard_normal((20, len(lam)))
+    for each in assess(proof, [load] * 20, list(lam * noise), [None] * 20, enough_mm=1.0):
+        assert abs(each.x - x).max() <= each.bound_mm <= 100 * abs(each.x - x).max()
 
 
 @KINDS
@@ -309,6 +347,6 @@ def test_the_rounding_of_what_was_moved_counts(kind: Any) -> None:
 @KINDS
 def test_the_bound_of_the_proven_answer_counts(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     proof, _ = springs(kind, 4.0, exact=False)
-    monkeypatch.setattr(proof, "bounds", lambda x, *_: (np.ones(x.hi.shape[1]), np.ones(x.hi.shape[1])))
+    monkeypatch.setattr(proof, "bounds", lambda x, *_, **__: (np.ones(x.hi.shape[1]), np.ones(x.hi.shape[1])))
     (found,) = assess(proof, [LoadCase(array(4.0), array(10.0))], [array(0.0)], [None])
     assert 1.0 <= found.bound_mm <= 1.02

@@ -1,7 +1,5 @@
 """The reference against exact arithmetic, chosen answers and non-negative least squares."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 
@@ -202,7 +200,7 @@ def test_reference_equals_non_negative_least_squares(seed: int) -> None:
 def test_reference_is_computed_once(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
     made = make_prepared(1, 12)
-    made.stages.key = "these matrices"
+    made.key = "these matrices"
     case, _ = make_load(2, made)
     first = reference(made, case)
     monkeypatch.setattr(module, "best_of_candidates", lambda *_: pytest.fail("computed a second time"))
@@ -217,7 +215,7 @@ def test_another_load_has_another_reference(tmp_path: object, monkeypatch: pytes
     """With the same matrices, as after a change in the code of an effect."""
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
     made = make_prepared(1, 12)
-    made.stages.key = "these matrices"
+    made.key = "these matrices"
     case, _ = make_load(2, made)
     first = reference(made, case)
     more = reference(made, replace(case, f=2 * case.f))

@@ -1,7 +1,5 @@
 """Where the reference ends: on families that take pivoting methods exponentially many steps, and in a row."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The bound on an answer's error: never below the error, and not far above it where the answer is good."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.linalg as sla

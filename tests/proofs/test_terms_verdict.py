@@ -3,8 +3,6 @@
 The errors are exact: in closed form, or in rational numbers. `mutate_proofs.py` takes the terms out in turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

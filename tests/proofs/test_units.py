@@ -1,7 +1,5 @@
 """The change of units: exact, undone on the answer, and the same answer in any units from every solver."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -96,7 +94,6 @@ def test_a_model_in_other_units_and_back_is_the_same_to_the_last_bit() -> None:
     lam, x = random.random(given.assembly.m), random.random(given.assembly.n)
     gap = load.g - given.assembly.A.T @ x
     scaled_lam, scaled_gap, scaled_x = units.start(lam, gap, x)
-    assert scaled_x is not None
     np.testing.assert_allclose(scaled_gap, own.g - problem.assembly.A.T @ scaled_x, rtol=0, atol=1e-12)
     for one, other in zip(units.answer(scaled_lam, scaled_x), (lam, x), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -198,8 +195,6 @@ def test_answers_do_not_depend_on_units(name: str, form: Form, bits: int) -> Non
     rounded = bits > 0 or name == "proxqp"  # whose rounding depends on where its arrays lie in memory
     for one, two in zip(*answers, strict=True):
         assert one.status == two.status
-        assert one.lam is not None
-        assert two.lam is not None
         np.testing.assert_allclose(two.lam * C, one.lam, rtol=0, atol=1e-5 if rounded else 0)
         if one.x is not None and two.x is not None:
             np.testing.assert_allclose(two.x * S, one.x, rtol=0, atol=1e-8 if rounded else 0)
@@ -215,7 +210,6 @@ def test_a_warm_start_is_scaled_with_the_problem() -> None:
     (load,) = problem.loads([case])
     session = opened_session("newton", problem, 1e-10)
     lam = session.cold(load).lam
-    assert lam is not None
     answer = session.warm(load, WarmStart(load, lam, problem.gap(load, lam, None)))
     assert answer.iterations == 1  # the set is the solution's
     np.testing.assert_allclose(answer.lam, lam, rtol=1e-6)
@@ -235,7 +229,5 @@ def test_a_library_solves_the_finite_element_model(name: str, scene: str, limit_
     assert 0 < np.count_nonzero(lam) < len(lam)
     answer = opened_session(name, problem, 1e-9).cold(load)
     assert answer.status == "solved"
-    assert answer.lam is not None
-    assert answer.x is not None
     np.testing.assert_allclose(problem.assembly.at_junction(answer.x), x, rtol=0, atol=limit_mm)
     assert answer.lam.sum() == pytest.approx(lam.sum(), rel=1e-6)

@@ -1,21 +1,19 @@
 """The page beside the report: all rows are in it, and no text of theirs is markup."""
 
-from __future__ import annotations
-
 import base64
 import json
-import os
-import re
-import subprocess
-import sys
+import shutil
 import zlib
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from browser import browser
+from conftest import pytest_terminal_summary
 from synthetic_results import everything, no_answer, row, write_rows
 from test_hostile_text import HOSTILE, MADE
 from test_series_report import made as made_series
@@ -222,11 +220,17 @@ def test_the_banner_of_an_answer_and_of_a_comparison_names_the_code() -> None:
     assert [warning.split()[-2] for warning in both["warnings"]] == ["uncommitted", "machine"], both
 
 
-@pytest.mark.slow
-def test_that_no_browser_tried_the_page_is_said_in_the_summary() -> None:
-    file = Path(__file__).parents[1] / "system/test_page_browser.py"
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file), "-k", "slider"]
-    environment = os.environ | {"PATH": "", "PYTEST_ADDOPTS": ""}
-    done = subprocess.run(command, env=environment, cwd=file.parents[2], capture_output=True, text=True)
-    (line,) = [line for line in done.stdout.splitlines() if "WARNING" in line]
-    assert re.search(r"\d+ browser tests skipped, no Chromium with its driver is installed", line)
+def test_that_no_browser_tried_the_page_is_said_in_the_summary(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    said: list[str] = []
+    with pytest.raises(pytest.skip.Exception) as skipped, browser(Path()):
+        pass
+    report = SimpleNamespace(longrepr=("file", 1, f"Skipped: {skipped.value}"))
+    summary = SimpleNamespace(
+        getreports=lambda kind: [report] * 31,
+        write_sep=lambda sep, text, **colours: said.append(text),
+        write_line=lambda text, **colours: said.append(text),
+    )
+    pytest_terminal_summary(summary)
+    assert said[0] == "31 browser tests SKIPPED"
+    assert said[1].startswith("The page was not tried: no Chromium")

@@ -1,7 +1,5 @@
 """The report, from made-up results whose figures can be worked out by hand."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -14,10 +12,10 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import everything, no_answer, row, write_rows
 
-from report.analysis.drawn import drawn_cells, middle_scenes, omission_note
+from report.analysis.drawn import drawn_cells, omission_note
 from report.analysis.precision import pareto
 from report.analysis.standings import compare, standings
-from report.document.numbers import power, significant
+from report.document.numbers import significant
 from report.figures import style
 from report.figures.scoreboard import scoreboard
 from report.results.reader import read
@@ -236,14 +234,6 @@ def test_of_many_variants_those_run_on_few_scenes_are_not_drawn(tmp_path: Path) 
     assert omission_note(few) == ""
 
 
-def test_a_size_of_one_scene_is_left_out_beside_sizes_of_several(tmp_path: Path) -> None:
-    of_size = {4386: [1, 2, 3], 6112: [1, 2], 11308: [7]}
-    rows = [row(f"{n}/{k:04d}", "a") for n, ks in of_size.items() for k in ks]
-    assert middle_scenes(read(write_rows(tmp_path / "many", rows))) == ["4386/0002", "6112/0002"]
-    two = [r for r in rows if r["scene"] != "4386/0003"]
-    assert middle_scenes(read(write_rows(tmp_path / "two", two))) == ["4386/0002", "6112/0002", "11308/0007"]
-
-
 def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> None:
     rows = [row(f"{n}/{k:04d}", "a") for n, most in ((4386, 12), (6112, 7), (11308, 7)) for k in range(most)]
     rows += [row("4386/0000", "b")]
@@ -262,7 +252,6 @@ def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
     rows = [row(f"4386/{k}", "a", **times(solve_s=1.0)) for k in (100, 200, 400)]
     rows += [row("4386/300", "a", **no_answer("time_limit")), row("4386/300", "b")]
     section = active.section(read(write_rows(tmp_path, rows)))
-    assert section is not None
     (axes,) = section.blocks[0].drawing.axes[:1]  # type: ignore[union-attr]
     seconds = axes.lines[0].get_ydata()
     assert [math.isnan(s) for s in seconds] == [False, False, True, False]
@@ -271,11 +260,6 @@ def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
 def test_pareto_front() -> None:
     points = pd.DataFrame({"error": [1e-9, 1e-8, 1e-7, 1e-8], "load_case_s": [5.0, 2.0, 3.0, 9.0]})
     assert pareto(points).index.tolist() == [0, 1]
-
-
-def test_no_two_solvers_look_alike() -> None:
-    looks = [*style.KNOWN.values(), *style.SPARE]
-    assert len(set(looks)) == len(looks)
 
 
 @pytest.mark.parametrize(
@@ -291,11 +275,6 @@ def test_no_two_solvers_look_alike() -> None:
 )
 def test_significant_figures(value: float | None, text: str) -> None:
     assert significant(value) == text
-
-
-def test_powers_of_ten() -> None:
-    assert power(1.7692e7) == "1.77e7"
-    assert power(0.05, 2) == "5.0e-2"
 
 
 def test_a_directory_without_measurements_is_named(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """The sections on what accuracy costs, from rows whose facts were planted."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -48,12 +46,10 @@ def changed(rows: list[dict[str, Any]], solver: str, **figures: Any) -> list[dic
 
 
 def table(section: Section | None, name: str) -> Table:
-    assert section is not None
     return next(block for block in section.blocks if isinstance(block, Table) and block.name == name)
 
 
 def text(section: Section | None) -> str:
-    assert section is not None
     return "\n".join(block.markdown for block in section.blocks if isinstance(block, Text))
 
 
@@ -90,7 +86,6 @@ def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> No
 
 def panels(found: Results) -> Any:
     section = accuracy.section(found)
-    assert section is not None
     (figure,) = (block for block in section.blocks if isinstance(block, Figure))
     return figure.drawing.axes
 

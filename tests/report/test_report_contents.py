@@ -1,7 +1,5 @@
 """Links within a report and from a report to the page, and how wide its tables are."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The section on scenes drawn at random: every time, the worst cases, the failures, the looser tolerances."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

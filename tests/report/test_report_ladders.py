@@ -1,7 +1,5 @@
 """The report on ladders, from made-up rows: right or wrong, and whether the solver knew."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The section on methods for contact problems: seconds and products with Q."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +30,6 @@ def test_seconds_and_products_stand_together(tmp_path: Path) -> None:
     rows += [measured(LOW, "piqp", 1.25, None), measured(HIGH, "piqp", 1.5, None)]
     rows += [measured(HIGH, "rough", 0.01, 9, verdict="outside", displacement_error_mm=3e-5)]
     section = told(tmp_path, rows)
-    assert section is not None
     advice, table = section.blocks
     assert "**newton (dual)** on 1 of 2 scenes and **mprgp (dual)** on 1 of 2 scenes" in advice.markdown or (
         "**mprgp (dual)** on 1 of 2 scenes and **newton (dual)** on 1 of 2 scenes" in advice.markdown
@@ -58,7 +55,6 @@ def test_a_method_counts_with_its_best_tolerance(tmp_path: Path) -> None:
     rows += [measured(LOW, "rough", 2.0, None, tolerance=1e-9, **missed | {"displacement_error_mm": 1e-5})]
     rows += [measured(LOW, "rough", 1.0, None, tolerance=1e-8, **missed | {"displacement_error_mm": 1e-4})]
     section = told(tmp_path, rows)
-    assert section is not None
     advice, table = (block.markdown for block in section.blocks)
     assert advice.endswith("were tried on: rough (dual) (off by up to 1.0e-5 mm).")
     assert " 1.50 |" in table

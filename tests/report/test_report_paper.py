@@ -1,7 +1,5 @@
 """The paper's tables and figures in the report, from made-up rows."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable
@@ -103,7 +101,6 @@ def test_a_stopped_solve_is_a_lower_bound(tmp_path: Path) -> None:
 
 def _shown(section: Any) -> list[str]:
     """All text of a section as it stands in the report."""
-    assert section is not None
     texts = []
     for block in section.blocks:
         texts.append(block.markdown if block.kind != "figure" else block.caption)
@@ -152,11 +149,9 @@ def test_table_2_counts_the_loads(tmp_path: Path) -> None:
 def test_exponents_of_known_powers() -> None:
     sizes = [1170.0, 2522.0, 4386.0, 6762.0, 11308.0]
     exact = exponent(sizes, [3e-7 * n**2.5 for n in sizes])
-    assert exact is not None
     assert (exact.slope, exact.error, exact.constant) == pytest.approx((2.5, 0.0, 3e-7), abs=1e-9)
     noisy = [n**2 * f for n, f in zip(sizes, (1.1, 0.8, 1.3, 0.9, 1.0), strict=True)]
     fit, other = exponent(sizes, noisy), linregress(np.log(sizes), np.log(noisy))
-    assert fit is not None
     assert (fit.slope, fit.error) == pytest.approx((other.slope, other.stderr))
     assert exponent(sizes, [1.0, 2.0, math.nan, 0.0, math.nan]) is None
 

@@ -1,7 +1,5 @@
 """The verdicts on the paper's claims: they hold for made-up rows that say so, and turn with the rows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
@@ -122,7 +120,6 @@ def test_rows_are_found_by_what_was_run_not_by_its_name(tmp_path: Path) -> None:
 
 def test_a_verdict_names_the_rows_it_stands_on(tmp_path: Path) -> None:
     made = claims.section(results(tmp_path, paper_rows()))
-    assert made is not None
     table = made.blocks[1].data.set_index("name")  # type: ignore[union-attr]
     keys = table.loc["Algorithms 4 and 5", "rows"].split("; ")
     assert "4386/0795 ipm dual" in keys

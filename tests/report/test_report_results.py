@@ -1,8 +1,5 @@
 """How the report reads rows: those of older versions, of several forms and of different code."""
 
-from __future__ import annotations
-
-import ast
 import re
 import sys
 from pathlib import Path
@@ -20,7 +17,8 @@ from report.writers.discovery import sections
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
-REPORT = Path(style.__file__).parents[1]
+
+
 HERE, OTHER = "0123456789" * 4, "abcdef0123" * 4
 
 
@@ -75,31 +73,6 @@ def test_a_section_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     text = write(write_rows(tmp_path / "out", [row(LOW, "a")])).read_text("utf-8")
     sys.modules.pop("report.sections.greeting")
     assert re.findall("^## (.*)", text, re.M)[:2] == ["Hello to 1 row", "Summary"]
-
-
-# Layers.
-
-LAYERS = ("document", "results", "analysis", "figures", "page", "sections", "writers")
-FROM_OUTSIDE = {
-    "harness.results.digits",
-    "harness.results.provenance",
-    "harness.results.published",
-    "harness.results.schema",
-}
-OWN = ("harness", "solvers", "problems", "report")
-
-
-@pytest.mark.parametrize("path", sorted(REPORT.rglob("*.py")), ids=lambda path: str(path.relative_to(REPORT)))
-def test_a_folder_imports_only_from_those_before_it(path: Path) -> None:
-    layer = LAYERS.index(path.relative_to(REPORT).parts[0]) if path.parent != REPORT else len(LAYERS)
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-        names = [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
-        names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-        for name in (name for name in names if name.split(".")[0] in OWN):
-            if name.startswith("report."):
-                assert LAYERS.index(name.split(".")[1]) <= layer, name
-            elif name != "report":
-                assert name in FROM_OUTSIDE
 
 
 # Rows of older versions.

@@ -1,7 +1,5 @@
 """The section "from scene to answer": stages, totals, and who is the fastest in any form."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -43,12 +41,12 @@ def results(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> Result
     return read(directory)
 
 
-def line_of(lines: pd.DataFrame, method: str) -> pd.Series[Any]:
+def line_of(lines: pd.DataFrame, method: str) -> pd.Series:
     (line,) = (line for _, line in lines.iterrows() if line["method"] == method)
     return line
 
 
-def totals(line: pd.Series[Any]) -> list[float]:
+def totals(line: pd.Series) -> list[float]:
     return [line[f"total_{k}_s"] for k in (1, 10, 1000)]
 
 
@@ -61,7 +59,6 @@ def test_speed_from_the_scene_on_is_relative_to_the_fastest_library_in_any_form(
     """newton 0.9 s on the sparse form and 11.9 s on the dual; Clarabel 1.8 s on the sparse form."""
     rows = [sparse(), dense(cholesky_s=0.5, product_s=0.01), sparse(solver="clarabel", solve_s=1.1)]
     section = speed.section(results(tmp_path, rows))
-    assert section is not None
     ratios = section.blocks[0].data.set_index("method")["scene_to_library"]
     expected = {"newton (sparse)": 0.5, "newton (dual)": 11.9 / 1.8, "clarabel (sparse)": 1.0}
     assert ratios.to_dict() == pytest.approx(expected)
@@ -134,7 +131,6 @@ def test_the_section_names_the_winner_and_its_factors(tmp_path: Path) -> None:
         r for scene in (LOW, HIGH) for r in (sparse(scene), dense(scene), dense(scene, "piqp", solve_s=6.1))
     ]
     section = section_of.section(results(tmp_path, rows))
-    assert section is not None
     text, figure, best, table = section.blocks
     won = "13 times as fast as the next and 20 times as fast as the fastest library"
     assert f"- 1 load case: **newton (sparse)** on 2 of 2 scenes, {won}." in text.markdown
@@ -152,13 +148,11 @@ def test_the_section_names_the_winner_and_its_factors(tmp_path: Path) -> None:
 
 def test_a_tie_is_said_to_be_one(tmp_path: Path) -> None:
     section = section_of.section(results(tmp_path, [sparse(), sparse(solver="other", solve_s=0.3), dense()]))
-    assert section is not None
     assert "on 1 of 1 scene, about as fast as the next" in section.blocks[0].markdown
 
 
 def test_a_library_that_wins_is_not_compared_with_itself(tmp_path: Path) -> None:
     section = section_of.section(results(tmp_path, [sparse(solver="clarabel"), dense()]))
-    assert section is not None
     assert (
         "**clarabel (sparse)** on 1 of 1 scene, 13 times as fast as the next." in section.blocks[0].markdown
     )
@@ -178,7 +172,6 @@ def test_series_and_forms_that_are_not_taken_do_not_count(tmp_path: Path) -> Non
 
 def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
     section = section_of.section(results(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
-    assert section is not None
     text, table = section.blocks
     assert text.markdown.startswith("No answer is within the limit.")
     assert "(outside)" in table.markdown
@@ -188,12 +181,10 @@ def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
     own = {"unknowns": 46956, "reference_bound_mm": 1.6e-11, "from_condensed_mm": 3e-12}
     facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
     section = problems.section(results(tmp_path, [sparse(), dense()], **facts, sparse=own))
-    assert section is not None
     scenes = section.blocks[1]
     assert scenes.data["sparse_unknowns"].tolist() == [46956]
     assert "difference of the two references, mm" in scenes.markdown
     assert all(text in scenes.markdown for text in ("46956", "1.60e-11", "3.00e-12", "2.00e-12"))
     assert "The sparse form" in scenes.caption
     without = problems.section(results(tmp_path / "dense", [dense()], **facts))
-    assert without is not None
     assert "sparse" not in without.blocks[1].markdown + without.blocks[1].caption

@@ -1,7 +1,5 @@
 """The section on speed: ratios of times within one run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +39,6 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
     seconds = {LOW: (1.0, 2.0, 3.0), HIGH: (4.0, 4.0, 4.0)}
     rows += [timed(scene, "newton", s, repeat=k) for scene in seconds for k, s in enumerate(seconds[scene])]
     section = speed.section(results(tmp_path, rows))
-    assert section is not None
     table, yardsticks, figure = section.blocks
     line = table.data[table.data["method"] == "newton (dual)"].iloc[0]
     found = [line[name] for name in ("to_library", "to_library_least", "to_library_most")]
@@ -57,7 +54,6 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
 def test_without_an_answering_library_there_is_no_ratio_to_it(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0), timed(LOW, "piqp", 8.0) | no_answer("time_limit")]
     section = speed.section(results(tmp_path, rows))
-    assert section is not None
     assert "–" in section.blocks[0].markdown
 
 
@@ -67,7 +63,6 @@ def test_without_a_yardstick_there_is_no_section(tmp_path: Path) -> None:
 
 def test_where_no_answer_is_within_the_limit_the_yardsticks_stand_alone(tmp_path: Path) -> None:
     section = speed.section(results(tmp_path, [timed(LOW, "newton", 1.0, verdict="cannot_be_judged")]))
-    assert section is not None
     assert [block.name for block in section.blocks] == ["speed-yardsticks"]
 
 
@@ -92,7 +87,6 @@ def test_a_code_of_the_same_method_that_ran_out_of_time_bounds_the_ratio(tmp_pat
     rows += [timed(LOW, "quadprog", 40.0, "primal")]
     rows += [timed(HIGH, "quadprog", 0.0, "primal") | no_answer("time_limit") | {"time_limit_s": 50.0}]
     section = same_method.section(results(tmp_path, rows))
-    assert section is not None
     (table,) = section.blocks
     assert table.data["ratio"].tolist() == pytest.approx([2 / 40, 2 / 50])
     assert table.data["method"].tolist() == ["gi (primal)"] * 2
@@ -106,7 +100,6 @@ def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path:
     rows += [timed(scene, "ipm-fast", s, variant="no finish") for scene, s in ((LOW, 3.0), (HIGH, 20.0))]
     rows += [timed(LOW, "ipm-fast", 9.0, variant="bad", verdict="outside")]
     section = ingredients.section(results(tmp_path, rows))
-    assert section is not None
     data = section.blocks[0].data.set_index("method")
     line = data.loc["ipm-fast (dual) no finish"]
     assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
@@ -119,7 +112,6 @@ def test_variants_that_are_not_drawn_stand_in_the_tables_alone(tmp_path: Path) -
     rows = [timed(scene, solver, 1.0) for scene in scenes for solver in ("ipm-fast", "piqp")]
     rows += [timed(scenes[0], "ipm-fast", 2.0, variant=f"without {k}") for k in "abc"]
     section = speed.section(results(tmp_path, rows))
-    assert section is not None
     table, _, figure = section.blocks
     assert table.data["method"].str.contains("without").sum() == 3
     legend = [text.get_text() for text in figure.drawing.legends[0].get_texts()]
@@ -135,7 +127,6 @@ def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: P
         grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
         rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
     section = scaling.section(results(tmp_path, rows))
-    assert section is not None
     data = section.blocks[0].data.set_index("method")
     assert data.loc["newton (dual)", "load_case_s"] == pytest.approx(1.5)
     assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
@@ -155,7 +146,6 @@ def test_a_size_of_the_sparse_form_alone_leaves_the_benchmarks_of_q_as_they_are(
             figures = {"cholesky_s": 1e-10 * n**3, "product_s": 1e-9 * n**2}
             rows.append(timed(LOW, "newton", 1e-6 * n**2, **figures, **known) | grid)
     section = scaling.section(results(tmp_path, rows))
-    assert section is not None
     data = section.blocks[0].data.set_index("method")
     assert data.loc["newton (sparse)", "load_case_s"] == pytest.approx(1.0)
     assert data.loc["newton (sparse)", "largest"] == 100_000

@@ -1,7 +1,5 @@
 """Statistics of a series against brute force, and the report's files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The maps of an answer: in true proportions, and nothing is cut off or lies over something else."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

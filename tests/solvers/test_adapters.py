@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import itertools
 from typing import Any
 
@@ -10,7 +8,6 @@ import piqp
 import pytest
 import qpsolvers
 import scipy.linalg as sla
-import scipy.sparse as sp
 from proxsuite import proxqp
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 from solving import TESTED
@@ -36,44 +33,11 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("proxqp", {"backend": "primal_dual_ldlt"}),
     ("piqp", {"backend": "sparse"}),
 ]
-#: The tolerance handed over; in the sparse form, in units of its own, forces are then allowed more.
-TOLERANCES: dict[Form, float] = {"primal": 1e-9, "dual": 1e-9, "sparse": 1e-10}
-CASES = [(name, options, form) for name, options in VARIANTS for form in FORMS if name != "l-bfgs-b"]
-
-
-def skip_unless_taken(name: str, options: dict[str, Any], form: Form) -> None:
-    if form not in make_solver(name, options).forms:
-        pytest.skip(f"{name} does not take the {form} form")
 
 
 @pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
 def test_conformance(name: str, options: dict[str, Any]) -> None:
     assert [str(finding) for finding in run(lambda: make_solver(name, options))] == []
-
-
-@pytest.mark.parametrize(("name", "options", "form"), CASES, ids=str)
-@pytest.mark.parametrize("kind", ["parts", "parts and tool", "strips"])
-def test_agrees_with_nnls(name: str, options: dict[str, Any], form: Form, kind: str) -> None:
-    skip_unless_taken(name, options, form)
-    prepared = {
-        "parts": lambda: make_prepared(1, 6),
-        "parts and tool": lambda: make_prepared(2, 20, 5),
-        "strips": lambda: make_strips(40),
-    }[kind]()
-    solver, tolerance = make_solver(name, options), TOLERANCES[form]
-    session = SolverSession(solver, in_form(prepared, form), tolerance)
-    session.open()
-    for seed in (3, 4):
-        case, load = make_load(seed, prepared)
-        expected_x, expected_lam = solve_by_nnls(prepared, case)
-        assert 0 < np.count_nonzero(expected_lam) < prepared.assembly.m  # a case with a real choice
-        got = session.cold(load)
-        assert got.lam is not None
-        x = got.x if form != "dual" else prepared.recover(got.lam, case)
-        assert x is not None
-        np.testing.assert_allclose(x, expected_x, rtol=0, atol=1e-8)
-        np.testing.assert_allclose(got.lam, expected_lam, rtol=0, atol=1e-3)
-        assert got.status == "solved"
 
 
 def test_both_forms_are_stated_rightly() -> None:
@@ -186,7 +150,6 @@ def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy(name: str, form:
         session = SolverSession(solver, in_form(prepared, form), tolerance)
         session.open()
         got = session.cold(load)
-        assert got.lam is not None
         x = got.x if form != "dual" else prepared.recover(got.lam, case)
         errors.append(np.abs(x - expected_x).max())
         iterations.append(got.iterations)
@@ -248,7 +211,6 @@ def test_matrices_in_the_libraries_formats() -> None:
 def test_small_negative_multipliers_become_zero_and_large_ones_stay() -> None:
     lam = np.array([1.0, -1e-10, -1e-3])
     got = answer("solved", 1e-9, lam)
-    assert got.lam is not None
     assert got.lam.tolist() == [1.0, 0.0, -1e-3]
     assert lam[1] == -1e-10  # the library's own array is left alone
 
@@ -275,13 +237,6 @@ def test_a_stopped_solver_does_not_say_solved(
     assert got.status != "solved"
 
 
-def test_linear_term_has_the_sign_of_the_libraries() -> None:
-    prepared = make_prepared(16, 3)
-    _, load = make_load(16, prepared)
-    np.testing.assert_array_equal(in_form(prepared, "primal").q(load), -load.f)
-    np.testing.assert_array_equal(in_form(prepared, "dual").q(load), -load.p)
-
-
 def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
     """OSQP says solved here with a dual residual of 4e-7 at a tolerance of 1e-9."""
     prepared = make_strips(40)
@@ -294,17 +249,9 @@ def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
         answers[polishing] = solver.solve(ready, load, 1e-9)
     polished = answers[True]
     assert polished.details == {"status": "solved", "polish": "accepted"}
-    assert polished.lam is not None
     assert np.abs(prepared.recover(polished.lam, case) - expected_x).max() > 1e-7
     assert polished.status == "inaccurate"
     assert answers[False].status == "solved"
-
-
-def test_sparse_rows_have_the_orientation_of_the_libraries() -> None:
-    prepared = make_prepared(17, 3, 2)
-    rows = Clarabel().convert(in_form(prepared, "primal")).G
-    assert sp.issparse(rows)
-    assert rows.shape == (prepared.assembly.m, prepared.assembly.n)
 
 
 @pytest.mark.parametrize(
@@ -327,7 +274,5 @@ def test_a_librarys_own_settings_are_handed_on(name: str, options: dict[str, Any
         solver = make_solver(name, given)
         ready = solver.setup(solver.convert(in_form(prepared, "dual")), load, 1e-9)
         answers.append(solver.solve(ready, load, 1e-9))
-    assert answers[0].lam is not None
-    assert answers[1].lam is not None
     assert (answers[0].lam != answers[1].lam).any()
     np.testing.assert_allclose(answers[1].lam, answers[0].lam, rtol=1e-5, atol=1e-5)

@@ -1,7 +1,5 @@
 """The fast interior-point method: its systems in single precision, and its answers with each ingredient."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small import make_load, make_prepared, solve_by_nnls
@@ -49,7 +47,7 @@ def test_what_single_precision_cannot_factor_is_factored_in_double() -> None:
 
 
 @pytest.mark.parametrize("options", [{}, {"finish": False}, {"single": False}, {"start_at_gaps": False}])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_answers_against_nnls(seed: int, options: dict[str, bool]) -> None:
     prepared = make_prepared(seed, 5 + 6 * seed, tools=seed % 3)
     case, load = make_load(seed, prepared)

@@ -1,6 +1,4 @@
-"""Block principal pivoting, its factors, and the forces and gaps of a set."""
-
-from __future__ import annotations
+"""Block principal pivoting, and the forces and gaps of a set."""
 
 import numpy as np
 import pytest
@@ -8,10 +6,8 @@ import scipy.linalg as sla
 from scipy.optimize import nnls
 
 from problems.forms.product import product
-from solvers.active_set.block_pivoting import MAX_STALE_PASSES, block_pivoting
-from solvers.active_set.bordered_factor import BorderedFactor
+from solvers.active_set.block_pivoting import MAX_STALE_PASSES, _towards, block_pivoting
 from solvers.active_set.principal_sets import forces_on
-from solvers.linear_algebra.inverse import BLOCK, inverse_with_factor
 
 
 def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:
@@ -23,34 +19,6 @@ def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:
 
 def subset(rng: np.random.Generator, size: int, share: float) -> np.ndarray:
     return rng.random(size) < share
-
-
-@pytest.mark.parametrize("size", [1, BLOCK, BLOCK + 1, 2 * BLOCK + 3])
-def test_the_inverse_is_full_and_symmetric(size: int) -> None:
-    Q = definite(size, seed=size)
-    inverse, U = inverse_with_factor(Q)
-    np.testing.assert_allclose(inverse @ Q, np.eye(size), atol=1e-9)
-    np.testing.assert_array_equal(inverse, inverse.T)
-    np.testing.assert_allclose(U.T @ U, Q, atol=1e-9 * abs(Q).max())
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_a_border_gives_what_a_factor_of_its_own_would(share: float) -> None:
-    size, rng = 60, np.random.default_rng(1)
-    G = definite(size, seed=2)
-    base = subset(rng, size, share)
-    factor = BorderedFactor(G, base)
-    for _ in range(12):
-        S = base ^ subset(rng, size, 0.2)
-        b = rng.standard_normal(size)
-        factor.move_to(S)
-        u = factor.solve(b)
-        rows = np.flatnonzero(S)
-        wanted = np.zeros(size)
-        wanted[rows] = np.linalg.solve(G[np.ix_(rows, rows)], b[rows])
-        np.testing.assert_allclose(u, wanted, atol=1e-9)
-        assert factor.changes(S) == (S ^ base).sum()
-    assert factor.Z.shape[1] <= size  # a column is made once
 
 
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.5, 0.8, 1.0])
@@ -101,6 +69,16 @@ def test_no_set_comes_back(stale: int, seed: int, monkeypatch: pytest.MonkeyPatc
     found = block_pivoting(lambda C: forces_on(C, Q, p), p > 0, np.diag(Q), 0.0, 400)
     assert found.converged
     assert found.descents > 10
+
+
+def test_every_step_of_descent_opens_a_contact() -> None:
+    """The first force to reach zero is exactly zero, however the step there rounds."""
+    rng = np.random.default_rng(9)
+    for _ in range(200):
+        lam, aim = 10 ** rng.uniform(-8, 4, 30), rng.standard_normal(30)
+        found = _towards(aim, lam, aim < 0)
+        assert found.min() == 0.0
+        assert found[aim >= 0].min() != 0.0
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])

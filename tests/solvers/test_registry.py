@@ -1,7 +1,5 @@
 """Solvers by name, their options, and a user's own solver from a file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

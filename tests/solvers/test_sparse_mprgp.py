@@ -1,7 +1,5 @@
 """`mprgp` on the sparse form, where a product with Q is a solution with K's factors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -44,8 +42,6 @@ def test_cold_and_warm_are_the_answer_of_nnls(kind: str) -> None:
     session = session_of(data, preconditioner=kind)
     cold = session.next(first, None)
     check(cold, dense, first)
-    assert cold.x is not None
-    assert cold.lam is not None
     start = WarmStart(first, cold.lam, first.g - data.assembly.A.T @ cold.x, cold.x)
     warm = session.next(second, start)
     check(warm, dense, second)

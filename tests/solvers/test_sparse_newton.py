@@ -1,7 +1,5 @@
 """`newton` on the sparse form: cold, warm, batched, by sets alone, with a band and without."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,8 +40,6 @@ def session_of(data: Prepared, tolerance: float = 1e-10) -> SolverSession:
 
 def check(answer: Answer, x: Vector, lam: Vector, limit: float = LIMIT_MM) -> None:
     assert answer.status == "solved"
-    assert answer.x is not None
-    assert answer.lam is not None
     np.testing.assert_allclose(answer.x, x, rtol=0, atol=limit)
     np.testing.assert_allclose(answer.lam, lam, rtol=0, atol=1e-5 * max(1.0, abs(lam).max(initial=0.0)))
 
@@ -56,8 +52,6 @@ def test_a_scene_of_the_gallery(name: str) -> None:
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     answer = session_of(data).next(load, None)
     assert answer.status == "solved"
-    assert answer.x is not None
-    assert answer.lam is not None
     assert answer.x.shape == (data.assembly.n,)
     assert abs(data.assembly.at_junction(answer.x) - known.x).max() <= LIMIT_MM
     assert (answer.lam >= 0).all()
@@ -108,11 +102,8 @@ def test_a_warm_start_saves_contact_sets() -> None:
     session.next(first, None)
     warm = session.next(second, session.nearest(second))
     check(warm, *solve_by_nnls(dense, second))
-    assert warm.iterations is not None
     assert cold.iterations is not None
     assert 1 <= warm.iterations <= cold.iterations
-    assert warm.inner_iterations is not None
-    assert cold.inner_iterations is not None
     assert warm.inner_iterations < cold.inner_iterations
 
 

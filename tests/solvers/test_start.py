@@ -1,7 +1,5 @@
 """Starting points: Algorithms 4 and 5, STP1, STP2, Mehrotra's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small import make_load, make_prepared
@@ -47,7 +45,7 @@ def test_a_missing_starting_point_is_reported() -> None:
         algorithm_5(-np.eye(3), np.ones(3))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_algorithms_4_and_5_give_the_same_point(seed: int) -> None:
     prepared = make_prepared(seed, pairs=14, tools=3)
     load, _ = make_load(seed, prepared)
@@ -62,7 +60,7 @@ def test_algorithms_4_and_5_give_the_same_point(seed: int) -> None:
     np.testing.assert_allclose(load.g - prepared.assembly.A.T @ x, by_x.y, atol=1e-9 * abs(by_x.y).max())
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_stp1_and_stp2_are_central_and_their_residual_is_small_beside_the_gap(seed: int) -> None:
     Q = definite(30, seed)
     p = np.random.default_rng(seed).standard_normal(30) * 10
@@ -87,7 +85,7 @@ def test_stp2_takes_the_open_gaps_as_they_are() -> None:
     np.testing.assert_allclose(start.lam, [0.25, 2.0])
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_mehrotras_start_is_an_affine_step_kept_inside(seed: int) -> None:
     Q = definite(20, seed)
     p = np.random.default_rng(seed).standard_normal(20)

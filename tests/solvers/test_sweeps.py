@@ -1,7 +1,5 @@
 """A banded M ≈ Q⁻¹, and contact sets with it, corrected by products with Q: cold, warm and batched."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.approximate_inverse import of_dense
 from problems.forms.assembly import Assembly, LoadCase
-from problems.forms.banded_inverse import BandedInverse, banded_inverse, order_along_joint
+from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
 from problems.forms.compliance import DenseCompliance
 from problems.forms.prepared import Prepared, dual_alone
 from problems.forms.problem import in_form
@@ -69,7 +67,6 @@ def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = TOLERANCE) -> Answer
 
 
 def residual(Q: np.ndarray, p: np.ndarray, lam: np.ndarray | None) -> float:
-    assert lam is not None
     assert lam.min() >= 0
     y = Q @ lam - p
     return max(float(-y.min()), float(abs(y[lam > 0]).max(initial=0.0)))
@@ -88,19 +85,19 @@ def test_where_forces_act_on_neighbours_alone_m_is_the_inverse() -> None:
 def test_contacts_stand_in_lines_across_the_joint(nx: int, ny: int) -> None:
     x, y = np.meshgrid(10.0 * np.arange(nx), 10.0 * np.arange(ny))
     nodes = np.column_stack([x.ravel(), y.ravel()])[np.random.default_rng(0).permutation(nx * ny)]
-    order, across = order_along_joint(nodes, len(nodes))
-    assert across == min(nx, ny)
-    assert (np.diff(nodes[order, 0 if nx >= ny else 1]) >= 0).all()
-    both, twice = order_along_joint(np.vstack([nodes, nodes]), 2 * len(nodes))  # two contacts at each place
-    assert twice == 2 * across
-    assert sorted(both) == list(range(2 * len(nodes)))
+    lines = Windows.of(nodes, len(nodes))
+    assert lines.across == min(nx, ny)
+    assert (np.diff(nodes[lines.order, 0 if nx >= ny else 1]) >= 0).all()
+    both = Windows.of(np.vstack([nodes, nodes]), 2 * len(nodes))  # two contacts at each place
+    assert both.across == 2 * lines.across
+    assert sorted(both.order) == list(range(2 * len(nodes)))
 
 
 @pytest.mark.parametrize(("dx", "across"), [(0.6, 5), (1.0, 5), (0.15, 15)])
 def test_lines_a_little_closer_than_wide_are_lines_still(dx: float, across: int) -> None:
     x, y = np.meshgrid(dx * np.arange(40), np.arange(5.0))
-    assert order_along_joint(np.column_stack([x.ravel(), y.ravel()]), 200)[1] == across
-    assert order_along_joint(np.zeros((7, 2)), 7)[1] == 7  # all in one place
+    assert Windows.of(np.column_stack([x.ravel(), y.ravel()]), 200).across == across
+    assert Windows.of(np.zeros((7, 2)), 7).across == 7  # all in one place
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
@@ -120,7 +117,6 @@ def test_m_has_a_narrow_band_where_q_decays_alone() -> None:
     v = np.random.default_rng(2).standard_normal(len(Q))
     for given, narrow in ((Q, True), (rotated(len(Q), 1e4, 1), False), (Q + 100 * np.outer(v, v), False)):
         M = of_dense(DenseCompliance(np.asfortranarray(given)), None).M
-        assert M is not None
         assert (len(M.band) < len(Q) / 4) == narrow
         if not narrow:
             np.testing.assert_allclose(full(M) @ given, np.eye(len(Q)), atol=1e-8)
@@ -193,7 +189,6 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     second = replace(first, p=first.p + data.Q @ np.where(closed, 1.0, 0.0))  # N more on each closed contact
     own = Sweeps(data)
     one, two = (own([load], TOLERANCE)[0] for load in (first, second))
-    assert one.lam is not None
     assert two.iterations <= 2
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
@@ -212,7 +207,6 @@ def test_no_contact_closed_few_and_all(kept: float) -> None:
 @pytest.mark.parametrize(("rung", "sweeps_needed"), [("conditioning/9e+13", 6), ("duplicates/2e-05", 6)])
 def test_an_ill_conditioned_q_is_solved_near_rounding_in_few_sweeps(rung: str, sweeps_needed: int) -> None:
     made = make_rung(f"hard/{rung}").made
-    assert made is not None
     data = Prepared(made.assembly)
     session = session_of(data, "dual")
     (load,) = session.problem.loads([made.load])
@@ -220,6 +214,15 @@ def test_an_ill_conditioned_q_is_solved_near_rounding_in_few_sweeps(rung: str, s
     assert answer.status == "solved"
     assert answer.iterations <= sweeps_needed
     assert residual(data.Q, load.p, answer.lam) <= TOLERANCE
+
+
+@pytest.mark.parametrize("scale", [1e5, 1e6, 1e7])
+def test_rounding_above_the_target_ends_the_sweeps(scale: float) -> None:
+    """Loads so large that |y_C| stays above a fiftieth of the tolerance: what no longer halves is enough."""
+    Q, p = decaying(), scale * np.random.default_rng(3).standard_normal(LINES * ACROSS)
+    answer = solved(Q, p)
+    assert answer.status == "solved"
+    assert answer.iterations <= 13
 
 
 @pytest.mark.parametrize("size", [1e-13, 1e-9, 1e-5])

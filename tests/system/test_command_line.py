@@ -1,7 +1,5 @@
 """The command line starts fast: help needs none of the libraries that compute or draw."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -54,29 +52,3 @@ def test_a_closed_terminal_ends_no_command(tmp_path: Path) -> None:
     root = Path(__file__).parents[2]
     done = subprocess.run(["sh", "-c", f"{' '.join(words)} >&-"], cwd=root, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("validate", "loop.toml"),
-        ("validate", "loop.npz"),
-        ("solve", "loop.toml", "--out", "out"),
-        ("run", "loop.toml"),
-        ("run", "--scene", "loop.toml"),
-        ("run", "--plugin", "loop.py"),
-        ("series", "loop.toml", "--out", "out"),
-        (
-            *["series", "gallery/three-part-stack", "--sd", "0.1", "--correlation-length", "9", "--out"],
-            "loop",
-        ),
-        ("report", "loop"),
-        ("gate", "loop"),
-    ],
-)
-def test_links_that_lead_to_themselves_are_bad_input(words: tuple[str, ...], tmp_path: Path) -> None:
-    for name in ("loop", "loop.toml", "loop.npz", "loop.py"):
-        (tmp_path / name).symlink_to(name)
-    done = harness(tmp_path, *words)
-    assert done.returncode == 2, done.stdout + done.stderr
-    assert "loop" in done.stderr

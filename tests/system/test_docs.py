@@ -1,7 +1,5 @@
 """The documents: what they show works as written, their tables are those of the code, their paths exist."""
 
-from __future__ import annotations
-
 import re
 import sys
 from io import StringIO
@@ -20,7 +18,7 @@ from harness.terminal import exit_codes
 from problems import effects
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.formats import names
+from problems.formats import FORMATS
 from problems.model.effect import Effect, effect_class, effect_kinds
 from problems.scene import SCENES, read_scene
 
@@ -33,7 +31,6 @@ JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 def test_the_scene_of_the_page_is_solved_and_drawn_whole(tmp_path: Path) -> None:
     """Its parts meet; the borders of the pictures are white, so that no title is cut."""
-    assert JOINT is not None
     (tmp_path / "scene.toml").write_text(JOINT[1])
     assert solve(str(tmp_path / "scene.toml"), None, 1e-9, tmp_path, Console(file=StringIO())) == 0
     for name in ("gap", "forces", "displacement"):
@@ -47,8 +44,6 @@ def test_the_new_effect_of_the_page_is_one_short_file(
 ) -> None:
     """Put into a folder of effects, it is known to scenes, messages and loads by its name alone."""
     code = re.search(r"```python\n# problems/effects/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL)
-    assert JOINT is not None
-    assert code is not None
     assert len(code[2].splitlines()) < 40
     (tmp_path / f"{code[1]}.py").write_text(code[2])
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
@@ -88,9 +83,10 @@ def test_the_table_names_every_parameter_with_its_default_and_unit(kind: str) ->
         default = field.default
         if name != "kind" and default is not PydanticUndefined and isinstance(default, float) and default:
             stated = re.search(rf"`{name}` = (\S+)", row)
-            assert stated is not None
             assert float(stated[1].rstrip(";,")) == default
-    for unit in effect.units.values():
+    for unit in (
+        each for field in effect.model_fields.values() for each in field.metadata if str is type(each)
+    ):
         assert unit.replace("1/mm", "mm") in row or kind in ("clamps", "fasteners", "installed_fasteners")
 
 
@@ -108,7 +104,7 @@ def test_every_scene_of_the_gallery_is_shown_with_its_command_and_pictures() -> 
 
 def test_the_formats_of_the_page_are_those_of_the_code() -> None:
     stated = re.findall(r"^\| `(\w+)` \|", PAGE[PAGE.index("## Matrices") :], re.MULTILINE)
-    assert stated == names()
+    assert stated == list(FORMATS)
 
 
 def anchors(page: Path) -> set[str]:
@@ -165,7 +161,6 @@ def test_every_command_is_in_the_readme() -> None:
 def test_the_main_suite_takes_as_long_on_every_page() -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     table = re.search(r"^\| `default` \|.*\| (\d+) min \|$", text, re.MULTILINE)
-    assert table is not None
     assert f"run the main suite ({table[1]} minutes on two cores)" in text
     assert f"the suite `default` ({table[1]} minutes)" in str(get_command(app).help)
 
@@ -173,7 +168,6 @@ def test_the_main_suite_takes_as_long_on_every_page() -> None:
 def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     code = re.search(r"```python\n(.*?)```", text[text.index("## From Python") :], re.DOTALL)
-    assert code is not None
     exec(code[1], {})
     first, second = capsys.readouterr().out.splitlines()
     assert float(first.split()[1]) < 1e-10

@@ -1,7 +1,5 @@
 """Each example prints the number that it is expected to; the solver template is a solver."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 A few hundred inputs; RIVETBENCH_LONG=1 takes 20 000, RIVETBENCH_LONG=N takes N.
 """
 
-from __future__ import annotations
-
 import hashlib
 import resource
 import shutil

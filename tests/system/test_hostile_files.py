@@ -1,7 +1,5 @@
 """Files that are damaged, foreign, missing or in the way: refused by name or mended, and nothing is lost."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from io import StringIO
@@ -13,14 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import tiny
+from commands import harness
 from rich.console import Console
 from small import make_load, make_prepared
 from strip import write_strip
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
-from harness.cli.app import app
-from harness.measurement.run import run
-from harness.planning.suite import read_suite, read_written
+from harness.planning.suite import read_written
 from harness.results import records, series_file
 from harness.results.kinds import refuse_unreadable
 from harness.results.schema import SERIES
@@ -29,7 +26,7 @@ from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.formats import pyyeti
+from problems.formats.nastran import pyyeti
 from problems.scene import read_scene
 from problems.storage import cache
 
@@ -37,7 +34,7 @@ PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 QUIET = Console(file=StringIO())
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("RIVETBENCH_CACHE", str(root))
@@ -52,7 +49,7 @@ def own_matrices(**changes: Any) -> formats.Data:
 
 
 def invoke(*words: object) -> Result:
-    done = CliRunner().invoke(app, [str(word) for word in words])
+    done = harness(*words)
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done
 
@@ -69,17 +66,11 @@ def test_a_refused_import_leaves_what_is_there(own: bool, tmp_path: Path) -> Non
     if not own:
         out.write_bytes(b"precious")
     before = out.read_bytes()
-    assert invoke("import", bad, "--out", out).exit_code == 2
+    refused = invoke("import", bad, "--out", out)
+    assert refused.exit_code == 2
+    assert str(bad) in refused.output
     assert out.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
-
-
-def test_a_refusal_names_the_matrixs_own_file(tmp_path: Path) -> None:
-    np.savez(tmp_path / "bad.npz", **own_matrices(K=-np.eye(12)))
-    assert (
-        str(tmp_path / "bad.npz")
-        in invoke("import", tmp_path / "bad.npz", "--out", tmp_path / "o.npz").output
-    )
 
 
 def test_an_import_never_replaces_an_input(tmp_path: Path) -> None:
@@ -99,14 +90,14 @@ def test_an_import_without_suffix_is_refused_before_it_writes(tmp_path: Path) ->
     assert [path.name for path in tmp_path.iterdir()] == ["mine.npz"]
 
 
-@pytest.mark.parametrize("form", formats.names())
+@pytest.mark.parametrize("form", formats.FORMATS)
 def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path: Path) -> None:
     own = tmp_path / "mine.npz"
     np.savez(own, **own_matrices())
     before = own.read_bytes()
     folder = tmp_path / "folder"
     folder.mkdir()
-    formats.write("mtx", folder, own_matrices())
+    formats.FORMATS["mtx"].write(folder, own_matrices())
     assert Path("/dev/null").is_char_device()
     for out in ("/dev/null", own):
         done = invoke("export", own, "--format", form, "--out", out)
@@ -119,7 +110,7 @@ def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path
 
 
 def test_an_export_into_the_folder_of_its_own_matrices_is_refused(tmp_path: Path) -> None:
-    formats.write("mtx", tmp_path, own_matrices())
+    formats.FORMATS["mtx"].write(tmp_path, own_matrices())
     scene = tmp_path / "scene.toml"
     scene.write_text("[matrices]\n" + "".join(f'{name} = "{name}.mtx"\n' for name in "KAfg"))
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -150,7 +141,7 @@ def stiffness(K: Any) -> pd.DataFrame:
 
 def test_an_absent_matrix_replaces_no_given_one_in_any_order(tmp_path: Path) -> None:
     data = own_matrices()
-    formats.write("mtx", tmp_path, data)
+    formats.FORMATS["mtx"].write(tmp_path, data)
     files = [cards(tmp_path / "konly.pch", K=stiffness(data["K"])), *(tmp_path / f"{x}.mtx" for x in "Afg")]
     for order in list(permutations(map(str, files)))[::5]:
         import_(list(order), tmp_path / "out.npz", QUIET)
@@ -161,7 +152,7 @@ def test_an_absent_matrix_replaces_no_given_one_in_any_order(tmp_path: Path) -> 
 
 def test_a_matrix_in_two_files_is_refused(tmp_path: Path) -> None:
     data = own_matrices()
-    formats.write("mtx", tmp_path / "m", data)
+    formats.FORMATS["mtx"].write(tmp_path / "m", data)
     np.savez(tmp_path / "all.npz", **data)
     for files in permutations([str(tmp_path / "all.npz"), str(tmp_path / "m" / "f.mtx")]):
         with pytest.raises(InputError, match="too; say f=FILE"):
@@ -183,14 +174,6 @@ def test_a_row_at_a_point_that_is_not_there_is_named(changed: Any, said: str, tm
     with pytest.raises(InputError) as error:
         import_([str(path)], tmp_path / "out.npz", QUIET)
     assert said in str(error.value)
-
-
-def test_loads_without_their_points_are_not_guessed(tmp_path: Path) -> None:
-    data = own_matrices()
-    formats.write("mtx", tmp_path, data)
-    loads = cards(tmp_path / "loads.pch", F=frame(np.ones((12, 1)), [*range(1, 12), 20]))
-    with pytest.raises(InputError, match="F, point 20"):
-        import_([str(loads), *(str(tmp_path / f"{x}.mtx") for x in "KAg")], tmp_path / "out.npz", QUIET)
 
 
 # --- the cache ----------------------------------------------------------------------------------------
@@ -267,25 +250,26 @@ def test_matrices_beyond_double_precision_are_refused(changes: Any, said: str, t
         assert str(path) in done.output
 
 
-@pytest.mark.parametrize(("K", "A"), [(1e45, 1e-45), (1e-45, 1e45), (1e-45, 1e-45)])
-def test_matrices_at_the_ends_of_the_range_raise_nothing(K: float, A: float, tmp_path: Path) -> None:
-    data = own_matrices()
-    np.savez(tmp_path / "own.npz", **(data | {"K": data["K"] * K, "A": data["A"] * A}))
-    assert invoke("solve", tmp_path / "own.npz", "--out", tmp_path / "x").exit_code in (0, 1)
-
-
 # --- a series -----------------------------------------------------------------------------------------
 
 COUNT = 12
 
 
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("series")
+    write_strip(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("report.writers.series.write", lambda directory: directory)
+        assert solve_series(folder / "out").exit_code == 0
+    return folder
+
+
 @pytest.fixture
-def series(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def series(solved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The directory of a finished series of COUNT cases; its report is not drawn."""
     monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
-    write_strip(tmp_path)
-    assert solve_series(tmp_path / "out").exit_code == 0
-    return tmp_path / "out"
+    return Path(shutil.copytree(solved, tmp_path / "copy")) / "out"
 
 
 def solve_series(out: Path, *more: object) -> Result:
@@ -334,81 +318,60 @@ def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series
 # --- a directory of results ---------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("run")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
-        text = '[[solver]]\nname = "exact"\nforms = ["dual"]\n'
-        suite = read_suite(str(tiny.write_suite(folder, text, tolerances=[1e-6, 1e-8])))
-        assert run(suite, folder / "finished", QUIET) == 0
-    return folder / "finished"
-
-
-@pytest.fixture
-def results(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "copy"))
-
-
 def measured(directory: Path) -> list[dict[str, Any]]:
     return records.read(directory / records.MEASUREMENTS)
 
 
 @pytest.mark.slow
-def test_the_gate_does_not_pass_what_nobody_planned(results: Path) -> None:
+def test_the_gate_does_not_pass_what_nobody_planned(copy: Path) -> None:
     """Without suite.toml, and with the first row alone."""
-    assert invoke("gate", results).exit_code == 0
-    (results / "suite.toml").unlink()
-    records.rewrite(results / records.MEASUREMENTS, measured(results)[:1])
-    done = invoke("gate", results)
+    assert invoke("gate", copy).exit_code == 0
+    (copy / "suite.toml").unlink()
+    records.rewrite(copy / records.MEASUREMENTS, measured(copy)[:1])
+    done = invoke("gate", copy)
     assert done.exit_code == 1
     assert "suite.toml" in done.output
 
 
 WRONG: list[tuple[str, Any]] = [
-    *(("limit_mm", value) for value in ("a", -1.0, [1], True)),
-    *((name, 3) for name in ("key", "source", "status", "message", "answer", "scene_key", "scene", "solver")),
-    *(("gated", value) for value in ("yes", 1, None)),
-    *(("series", value) for value in ([], {"cases": "a"}, {"cases": 2, "other": 1})),
-    *(("case", value) for value in ("a", {}, [])),
-    *(("solve_s", value) for value in ("fast", {}, [1, 2])),
+    *(("limit_mm", value) for value in ("a", -1.0, True)),
+    *((name, 3) for name in ("key", "status", "answer", "scene")),
+    *(("gated", 1), ("series", {"cases": "a"}), ("case", "a"), ("solve_s", [1, 2])),
 ]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), WRONG)
-def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, results: Path) -> None:
-    rows = measured(results)
+def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, copy: Path) -> None:
+    rows = measured(copy)
     rows[1][name] = value
-    records.rewrite(results / records.MEASUREMENTS, rows)
+    records.rewrite(copy / records.MEASUREMENTS, rows)
     for command in ("gate", "report"):
-        done = invoke(command, results)
+        done = invoke(command, copy)
         if done.exit_code != 0 or command == "gate":
             assert done.exit_code == 2, done.output
             assert f"measurements.jsonl: line 2: {name}" in done.output
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "value"), [("key", None), ("key", []), ("status", 3), ("time_limit_s", "a")]
-)
-def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, results: Path) -> None:
-    rows = measured(results)
+@pytest.mark.parametrize(("name", "value"), [("key", None), ("time_limit_s", "a")])
+def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, copy: Path) -> None:
+    rows = measured(copy)
     rows[1][name] = value
-    records.rewrite(results / records.MEASUREMENTS, rows)
-    words = ["--scene", results.parent / "tiny.npz", "--solver", "gi", "--out", results]
-    tiny.write_problem(results.parent / "tiny.npz")
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    words = ["--scene", copy.parent / "tiny.npz", "--solver", "gi", "--out", copy]
+    tiny.write_problem(copy.parent / "tiny.npz")
     done = invoke("run", "gate", *words)
     assert done.exit_code == 2
     assert f"measurements.jsonl: line 2: {name}" in done.output
 
 
 @pytest.mark.slow
-def test_a_nested_line_is_named(results: Path) -> None:
-    path = results / records.MEASUREMENTS
+def test_a_nested_line_is_named(copy: Path) -> None:
+    path = copy / records.MEASUREMENTS
     path.write_bytes(b"[" * 100_000 + b"\n" + path.read_bytes())
     for command in ("gate", "report"):
-        done = invoke(command, results)
+        done = invoke(command, copy)
         assert done.exit_code == 2
         assert "line 1" in done.output
 
@@ -419,45 +382,45 @@ def test_a_nested_line_is_named(results: Path) -> None:
     [
         *(
             ("suite.toml", text)
-            for text in (b"solver = 3", b"solver = [3]", b"[[solver]]\nname = 1", b"\xff", b"scenes = 3")
+            for text in (b"solver = [3]", b"[[solver]]\nname = 1", b"\xff", b"scenes = 3")
         ),
         *(("problems.jsonl", text) for text in (b"[" * 100_000 + b"\n{}\n", b"{}\n", b'{"scene": 3}\n')),
         ("problems.jsonl", b'{"scene": "tiny", "n": "many"}\n'),
-        *(("machine.json", text) for text in (b"[" * 100_000, b"[]", b"1", b"\xff")),
+        *(("machine.json", text) for text in (b"[" * 100_000, b"1", b"\xff")),
     ],
 )
-def test_a_damaged_file_beside_the_rows_is_named(name: str, content: bytes, results: Path) -> None:
-    (results / name).write_bytes(content)
-    done = invoke("report", results)
+def test_a_damaged_file_beside_the_rows_is_named(name: str, content: bytes, copy: Path) -> None:
+    (copy / name).write_bytes(content)
+    done = invoke("report", copy)
     assert done.exit_code in (0, 2), done.output
-    said = done.output if done.exit_code else (results / "report" / "report.md").read_text()
+    said = done.output if done.exit_code else (copy / "report" / "report.md").read_text()
     assert name in said
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("values", [np.full(20, "1.0"), np.full(20, 1.0 + 2j), np.full((20, 2), 1.0)])
-def test_an_answer_of_another_kind_is_none(values: Any, results: Path) -> None:
-    np.savez(results / measured(results)[0]["answer"], x=values, lam=np.zeros(10))
-    done = invoke("gate", results)
+def test_an_answer_of_another_kind_is_none(values: Any, copy: Path) -> None:
+    np.savez(copy / measured(copy)[0]["answer"], x=values, lam=np.zeros(10))
+    done = invoke("gate", copy)
     assert done.exit_code == 1
     assert "missing, damaged or not finite" in done.output
 
 
 @pytest.mark.slow
-def test_an_answer_that_is_a_pipe_is_none(results: Path) -> None:
-    answer = results / measured(results)[0]["answer"]
+def test_an_answer_that_is_a_pipe_is_none(copy: Path) -> None:
+    answer = copy / measured(copy)[0]["answer"]
     answer.unlink()
     os.mkfifo(answer)
-    assert invoke("gate", results).exit_code == 1
+    assert invoke("gate", copy).exit_code == 1
 
 
 @pytest.mark.slow
-def test_text_among_the_arrays_of_a_scene_is_left_out(results: Path) -> None:
-    (path,) = (results / "scenes").iterdir()
+def test_text_among_the_arrays_of_a_scene_is_left_out(copy: Path) -> None:
+    (path,) = (copy / "scenes").iterdir()
     with np.load(path) as file:
         arrays = dict(file)
     np.savez(path, **{name: values.astype(str) for name, values in arrays.items()})
-    assert invoke("report", results).exit_code == 0
+    assert invoke("report", copy).exit_code == 0
 
 
 @pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*/suite.toml")), ids=lambda path: path.parent.name)

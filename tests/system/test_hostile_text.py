@@ -1,7 +1,5 @@
 """Titles, names and messages that a hostile user wrote: text in every file and picture, and nothing else."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -23,7 +21,6 @@ from harness.results import series_file
 from harness.results.records import to_line
 from harness.terminal.console import error_reporting
 from harness.terminal.plain_console import PlainConsole
-from harness.terminal.progress import Display
 from report.document import escape
 from report.figures import style
 from report.figures.answer import answer_figures
@@ -33,7 +30,7 @@ from report.writers.solution import write as write_solution
 
 HOSTILE = "<b>x</b>|![i](http://e)`c`$a_b$ *e*\n# h\x1b[31m\u202e\ud800"
 LITERAL = r"&lt;b&gt;x&lt;/b&gt;\|\!\[i\](http://e)&#96;c&#96;\$a_b\$ \*e\* \# h�\[31m��"
-FORMULAS = ['=cmd|"/c calc"!A1', "+1+1", "-2+3", "@SUM(A1)", " =1"]
+FORMULAS = ["+1+1", "-2+3", "@SUM(A1)", " =1"]
 
 
 @pytest.fixture(autouse=True)
@@ -114,9 +111,7 @@ def test_a_page_shows_hostile_text_as_it_is(made: Any, written: Any, tmp_path: P
 
 
 @pytest.mark.parametrize(("made", "written"), MADE)
-@pytest.mark.parametrize(
-    "name", ["a" * 20_000, "$x_{$ \\frac{1}{0} $" * 9, "a\nb|c", "=1", "|", "_", "\ud800"]
-)
+@pytest.mark.parametrize("name", ["a" * 20_000, "$x_{$ \\frac{1}{0} $" * 9, "_|\ud800"])
 def test_any_text_is_drawn_in_seconds(made: Any, written: Any, name: str, tmp_path: Path) -> None:
     begun = time.perf_counter()
     page = written(made(tmp_path, name))
@@ -153,8 +148,8 @@ def test_labels_of_ticks_and_of_legends_are_spelled_out() -> None:
     assert axes.get_yticklabels()[0].get_fontsize() == 5
 
 
-@pytest.mark.parametrize("formula", FORMULAS)
-def test_a_spreadsheet_runs_no_formula(formula: str, tmp_path: Path) -> None:
+def test_a_spreadsheet_runs_no_formula(tmp_path: Path) -> None:
+    formula = '=cmd|"/c calc"!A1'
     target = write(results(tmp_path, formula)).parent
     cells = [cell for path in target.glob("*.csv") for line in csv.reader(path.open()) for cell in line]
     assert f"'{formula}" in cells
@@ -168,6 +163,8 @@ def test_numbers_in_a_csv_file_are_untouched() -> None:
     found = escape.csv_frame(frame)
     assert found["text"].tolist() == ["-1.5", "+2", "'-", "–"]
     pd.testing.assert_series_equal(found["number"], frame["number"])
+    formulas = escape.csv_frame(pd.DataFrame({"text": FORMULAS}))["text"].tolist()
+    assert formulas == [f"'{formula}" for formula in FORMULAS]
 
 
 def test_a_text_comes_back_whole_from_its_quotation() -> None:
@@ -221,14 +218,6 @@ def test_no_text_passes_for_a_line_of_its_own() -> None:
     assert "\nof ours" in screen.getvalue()
 
 
-def test_a_cell_with_control_characters_is_as_wide_as_it_is_shown() -> None:
-    screen = io.StringIO()
-    table = Table("name")
-    table.add_row("\x1b[31m:smile: end")
-    PlainConsole(file=screen, width=80).print(table)
-    assert "│ �[31m:smile: end │" in screen.getvalue()
-
-
 def test_a_name_that_no_file_can_hold_is_named() -> None:
     app = Typer()
 
@@ -240,13 +229,6 @@ def test_a_name_that_no_file_can_hold_is_named() -> None:
     outcome = CliRunner().invoke(app)
     assert outcome.exit_code == 2
     assert "scene a�: a name that is not UTF-8" in outcome.output
-
-
-def test_markup_in_the_name_of_a_scene_is_text_beside_the_bar() -> None:
-    screen = io.StringIO()
-    with Display(PlainConsole(file=screen, force_terminal=True, width=120), [], 0, {}) as display:
-        display.doing("[/b][red]")
-    assert "[/b][red]" in screen.getvalue()
 
 
 def test_a_file_name_that_is_not_utf8_is_kept_in_a_row() -> None:

@@ -1,7 +1,5 @@
 """The folders import each other in one direction only: the contracts of pyproject.toml."""
 
-from __future__ import annotations
-
 import pytest
 from importlinter.cli import lint_imports
 

@@ -1,7 +1,5 @@
 """What is installed: every file of the packages that is not code, and versions within the bounds."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import tomllib

@@ -1,7 +1,5 @@
 """The page in a browser: its verdicts against the judge's, sorting, filters, the address, the keyboard."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,13 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import browser
+from commands import harness
 from synthetic_results import everything, row, write_rows
 from test_hostile_text import HOSTILE, results, solution
 from test_page import DIRECTORIES, SCENES
 from test_series_report import made as made_series
-from typer.testing import CliRunner
 
-from harness.cli.app import app
 from report.figures import style
 from report.page.run import run_data
 from report.page.write import write
@@ -89,7 +86,7 @@ def test_no_view_of_any_page_has_an_error(
     write_series(series)
     for side, seconds in ((old, 1.0), (new, 9.0)):
         write_rows(side, [row(solve_s=seconds), row(solver="gi")])
-    CliRunner().invoke(app, ["compare", str(old), str(new), "--out", str(tmp_path / "compared")])
+    harness("compare", old, new, "--out", tmp_path / "compared")
     pages += [answer / "index.html", series / "report" / "index.html", tmp_path / "compared" / "index.html"]
     for page in pages:
         opened(chromium, page)

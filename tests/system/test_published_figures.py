@@ -1,7 +1,5 @@
 """Every figure of a document that comes from the published rows, computed from them again."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import cache
@@ -70,7 +68,6 @@ def stated_minutes(suite: str) -> float | None:
     if "| time on two cores, estimated |" in page:
         return None
     line = re.search(rf"^\| `{suite}` \|.*\| (?:(\d+) h ?)?(?:(\d+) min)? \|$", page, re.MULTILINE)
-    assert line is not None
     return 60 * int(line[1] or 0) + int(line[2] or 0)
 
 
@@ -79,7 +76,6 @@ def test_the_time_of_a_suite_is_that_of_its_rows(suite: str) -> None:
     """An estimate until all that is published names its commit."""
     rows = rows_of(PUBLISHED / suite)
     stated, taken = stated_minutes(suite), seconds(rows)
-    assert taken is not None
     if stated is None:
         assert any(row.get("commit") is None for name in SUITES for row in rows_of(PUBLISHED / name))
         return

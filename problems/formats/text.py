@@ -1,34 +1,53 @@
-"""Abaqus matrix text, as *MATRIX OUTPUT writes it: the stiffness as lines of numbers.
+"""Matrices as text: Matrix Market, and Abaqus' as *MATRIX OUTPUT writes it.
+
+Matrix Market is a folder with K.mtx, A.mtx, f.mtx, g.mtx; 17 digits keep every bit. Abaqus has no text format
+for A, f, g, which stay Matrix Market files; its stiffness are lines of numbers, one triangle of K or both:
 
     row node, row dof, column node, column dof, value      FORMAT=MATRIX INPUT
     row, column, value                                     FORMAT=COORDINATE
-
-One triangle of K or both. Abaqus has no text format for A, f, g: they become Matrix Market files beside it.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import scipy.io
 import scipy.sparse as sp
 
 from problems.errors import Fault, InputError
-from problems.formats import Data
+from problems.input.user_matrices import read_mtx
 
-from . import mtx_format
-
-DESCRIPTION = "a folder: K as Abaqus matrix text, the others as Matrix Market, bit for bit"
-SUFFIXES = (".mtx",)
-NORMAL = 3  # the degree of freedom under which displacements are written
+HEADER = b"%%MatrixMarket"
+NORMAL = 3  # the degree of freedom under which displacements are written to Abaqus
 
 
-def accepts(path: Path) -> bool:
-    return not mtx_format.accepts(path)
+def is_matrix_market(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(HEADER)) == HEADER
 
 
-def write(path: Path, data: Data) -> None:
+def write_matrix_market(path: Path, data: dict[str, Any]) -> None:
     path.mkdir(parents=True, exist_ok=True)
+    for name in "KAfg":
+        if name in data:
+            matrix = data[name] if name in "KA" else data[name][:, None]
+            write_one(path / f"{name}.mtx", matrix, "symmetric" if name == "K" else "general")
+
+
+def write_one(path: Path, matrix: object, symmetry: str) -> None:
+    if isinstance(matrix, np.ndarray) and not matrix.size:
+        matrix = sp.coo_array(matrix)  # of an empty array, SciPy before 1.17 writes without end
+    scipy.io.mmwrite(path, matrix, precision=17, symmetry=symmetry)
+
+
+def read_matrix_market(path: Path) -> dict[str, Any]:
+    return {path.stem: read_mtx(path)}
+
+
+def write_abaqus(path: Path, data: dict[str, Any]) -> None:
+    write_matrix_market(path, {name: data[name] for name in "Afg"})
     lower = sp.coo_array(sp.tril(data["K"]))
     lines = (
         f"{i + 1},{NORMAL},{j + 1},{NORMAL},{value!r}\n"
@@ -36,10 +55,9 @@ def write(path: Path, data: Data) -> None:
     )
     with (path / "K.mtx").open("w", encoding="ascii") as file:
         file.writelines(lines)
-    mtx_format.write_others(path, data)
 
 
-def read(path: Path) -> Data:
+def read_abaqus(path: Path) -> dict[str, Any]:
     rows = _rows(path)
     unknowns, place = np.unique(np.vstack(np.hsplit(rows[:, :-1], 2)), axis=0, return_inverse=True)
     i, j = place.reshape(2, -1)

@@ -1,1 +1,0 @@
-"""Products, factors and inverses shared by several methods."""

@@ -1,0 +1,68 @@
+"""What the methods of this project share: a start, and a failed answer where a matrix is indefinite."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from problems.forms.assembly import Matrix, Vector
+from problems.stiffness.block import NotPositiveDefinite
+
+from .base import Answer, Form, LoadCase, Problem, Solver, WarmStart, failed
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """What load cases share. start : the solved case to start from, if there is one."""
+
+    problem: Problem
+    start: WarmStart | None = None
+
+    @property
+    def Q(self) -> Matrix:
+        """(m, m) mm/N."""
+        return self.problem.Q
+
+
+class Method(Solver):
+    """Base of the methods: `state` and `solved` may raise LinAlgError, which makes a failed answer."""
+
+    forms: ClassVar[tuple[Form, ...]] = ("dual",)
+
+    def prepare(self, data: Problem) -> Any:
+        """The state; a failed answer if Q or K is not positive definite."""
+        try:
+            return self.state(data)
+        except NotPositiveDefinite as error:
+            return failed(f"K is not positive definite: {error}")
+        except np.linalg.LinAlgError as error:
+            return failed(f"Q is not positive definite: {error}")
+
+    def update(self, state: Any, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
+        return state if isinstance(state, Answer) else replace(state, start=start)
+
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        if isinstance(ready, Answer):
+            return ready
+        try:
+            return self.solved(ready, load, tolerance)
+        except np.linalg.LinAlgError as error:
+            return failed(str(error))
+
+    def state(self, problem: Problem) -> Any:
+        """What load cases share: a `State`, or an answer if there can be no other."""
+        return State(problem=problem)
+
+    @abstractmethod
+    def solved(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        """The answer to a load case."""
+
+
+def first_point(start: WarmStart | None, load: LoadCase) -> tuple[Vector, Vector]:
+    """λ (m,) N and y = Qλ − p (m,) mm from which a load case starts, without a product with Q."""
+    if start is None:
+        return np.zeros_like(load.p), -load.p
+    return np.maximum(start.lam, 0.0), start.gap + start.load.p - load.p
