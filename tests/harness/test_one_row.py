@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
 import tiny
-from finished import finished_run
 from typer.testing import CliRunner, Result
 
 from harness.cli.app import app
@@ -23,11 +21,6 @@ KEY = "tiny exact dual tol=1e-06 threads=1 repeat=0"
 
 def invoke(*words: object) -> Result:
     return CliRunner().invoke(app, [str(word) for word in words])
-
-
-@pytest.fixture
-def copy(tmp_path_factory: pytest.TempPathFactory, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished_run(tmp_path_factory), tmp_path / "copy"))
 
 
 def test_the_row_is_measured_again_and_compared(copy: Path, tmp_path: Path) -> None:
