@@ -31,7 +31,7 @@ def compared(root: Path) -> Target:
         ("compare", "@old", "@new"),
         ("compare", "@new", "@old", "--out", "@out"),
         ("compare", "@new@1234", "@old"),
-        ("reproduce", "@new", "no", "such", "row"),
+        ("compare", "@old", "@new", "--key", "20/0 exact 0"),
     )
     return Target("compared", 0.05, folder, ("new/measurements.jsonl",), commands, checked=counted)
 

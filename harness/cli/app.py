@@ -19,8 +19,6 @@ from harness.terminal.console import FormName, Plugin, ReferenceLimit, Scheduler
 from . import check as check_command
 from . import compare as compare_command
 from . import exchange as exchange_commands
-from . import publish as publish_command
-from . import reproduce as reproduce_command
 from . import scene as scene_commands
 from . import series as series_command
 
@@ -30,8 +28,6 @@ app = typer.Typer(
 app.add_typer(check_command.app)
 app.add_typer(compare_command.app)
 app.add_typer(exchange_commands.app)
-app.add_typer(publish_command.app)
-app.add_typer(reproduce_command.app)
 app.add_typer(scene_commands.app)
 app.add_typer(series_command.app)
 
@@ -68,7 +64,10 @@ def harness() -> None:
 @app.command()
 def run(
     suite: Annotated[
-        str, typer.Argument(metavar="SUITE", help="Name of a suite, or path of its TOML file.")
+        str,
+        typer.Argument(
+            metavar="SUITE", help="Name of a suite, path of its TOML file, or directory that `run` wrote."
+        ),
     ] = "default",
     size: Annotated[list[int] | None, option("N", "Only scenes with N unknowns. Repeatable.")] = None,
     scene: Annotated[
@@ -104,6 +103,7 @@ def run(
     out: Annotated[Path | None, option("DIR", "Output directory.  [default: results/SUITE]")] = None,
     plugin: Plugin = None,
     scheduler: Scheduler = None,
+    key: Annotated[str | None, option("KEY", "Only the row with this key, measured again.")] = None,
 ) -> None:
     """Measure a suite and write rows, answers and report.
 
@@ -119,6 +119,7 @@ def run(
       python -m harness run gate --out results/gate
       python -m harness run my-suite.toml --repeat 5 --threads 1 --threads 2
       python -m harness run --scheduler tcp://10.0.0.5:8786
+      python -m harness run results/default --key "4386/0107 gi dual tol=1e-10 threads=2 repeat=0" --out again
 
     \b
     Exit codes: 0 measured, 1 incomplete: workers were lost, 2 wrong usage or bad input,
@@ -127,7 +128,7 @@ def run(
     with error_reporting() as console:
         from harness.measurement.run import run as run_suite
         from harness.planning.overrides import Overrides, overridden, tolerances_of
-        from harness.planning.suite import read_suite
+        from harness.planning.suite import read_suite, read_written
         from harness.results.records import MEASUREMENTS
 
         change = Overrides(
@@ -144,10 +145,11 @@ def run(
             reference_limit_s=reference_limit,
             plugin=plugin,
         )
-        chosen = overridden(read_suite(suite), change)
+        written = Path(suite) / "suite.toml"
+        chosen = overridden(read_written(written) if written.is_file() else read_suite(suite), change)
         directory = out or Path("results") / chosen.name
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        code = run_suite(chosen, directory, console, scheduler)
+        code = run_suite(chosen, directory, console, scheduler, key)
         if (directory / MEASUREMENTS).is_file():
             from report.writers.markdown import write  # slow to import: not before the first row
 
@@ -157,16 +159,13 @@ def run(
 
 @app.command()
 def report(
-    directory: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Directory that `run`, `series` or `publish` wrote.")
-    ],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")],
 ) -> None:
-    """Rewrite DIR/report/report.md from the rows, or DIR/index.md of published results.
+    """Rewrite DIR/report/report.md from the rows.
 
     \b
     Example:
       python -m harness report results/default
-      python -m harness report results/published
     """
     with error_reporting() as console:
         from harness.planning.suite import read_written
@@ -182,11 +181,6 @@ def report(
             console.print(f"Report: {write_series(directory)}")
             return
         path = directory / records.MEASUREMENTS
-        if not path.is_file() and any(directory.glob(f"*/{path.name}")):
-            from report.writers.published import write_index
-
-            console.print(f"Index: {write_index(directory)}")
-            return
         if not path.is_file():
             raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
         refuse_unreadable(directory)

@@ -26,6 +26,7 @@ def compare(
     max_slowdown: Annotated[
         float | None, option("FACTOR", f"Ratio of times that is allowed.  [default: {MAX_SLOWDOWN}]", min=1.0)
     ] = None,
+    key: Annotated[str | None, option("KEY", "Only the row with this key.")] = None,
     out: Annotated[Path | None, option("DIR", "Write comparison.md and comparison.csv there.")] = None,
 ) -> None:
     """Compare runs, measurement by measurement; what became worse comes first.
@@ -52,8 +53,8 @@ def compare(
         from report.analysis.comparison import WORSE
         from report.writers.comparison import write
 
-        before = read_side(old)
-        compared = [_compared(before, read_side(name), max_digits_lost, max_slowdown) for name in new]
+        before = read_side(old, key)
+        compared = [_compared(before, read_side(name, key), max_digits_lost, max_slowdown) for name in new]
         for comparison in compared:
             show(comparison, console)
         if out:

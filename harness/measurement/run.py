@@ -14,6 +14,7 @@ from typing import Any
 from rich.console import Console
 
 from harness.planning.estimate import refuse_limits_too_low
+from harness.planning.one_row import of_key, with_key
 from harness.planning.plan import Measurement, expand
 from harness.planning.search import superfluous
 from harness.planning.suite import Suite, to_toml
@@ -41,18 +42,23 @@ from .row import Task, TaskResult, rows_of, run_task, run_task_on_worker
 from .scheduler import done_as_completed, workers
 
 
-def run(suite: Suite, directory: Path, console: Console, scheduler: str | None = None) -> int:
-    """Make the suite's measurements that DIRECTORY does not hold yet, here or on a scheduler's workers.
+def run(
+    suite: Suite, directory: Path, console: Console, scheduler: str | None = None, key: str | None = None
+) -> int:
+    """Make the suite's measurements that DIRECTORY does not hold yet, here or on a scheduler's workers; with
+    a key, only what the row of that key needs.
 
     Returns 0, 1 when a worker was lost too often, or 3 when no row of the suite could be judged. Raises
     InputError before the first measurement if the suite cannot be run; after KeyboardInterrupt the same
     command resumes.
     """
+    if key is not None:
+        suite = with_key(suite, key)
     with waiting(console) as show:
         descriptions = describe(suite, show)
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.variant): d for e, d in zip(suite.solver, descriptions, strict=True)}
-    plan = expand(suite)
+    plan = expand(suite) if key is None else of_key(expand(suite), key)
     refuse_limits_too_low(plan)
     with records.locked(directory):
         rows = resumed(directory, plan, solvers, console)

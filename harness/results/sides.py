@@ -31,9 +31,9 @@ class Side:
         return {str(row.get("machine")) for row in self.rows}
 
 
-def read_side(name: str) -> Side:
+def read_side(name: str, key: str | None = None) -> Side:
     """The rows of DIR, or of DIR@COMMIT: those that this commit measured, also where `run` has set them aside
-    since. Raises InputError.
+    since; with a key, only the row of that key. Raises InputError.
     """
     directory, at, commit = name.rpartition("@")
     if Path(name).is_dir() or not at:
@@ -55,6 +55,8 @@ def read_side(name: str) -> Side:
         if len(commit) < FEWEST_DIGITS or len({row["commit"] for row in rows}) != 1:
             allowed = f"a commit of these rows, at least {FEWEST_DIGITS} digits: {', '.join(known) or 'none'}"
             raise InputError.one(directory, "commit", commit, allowed)
+    if key is not None and not (rows := [row for row in rows if row.get("key") == key]):
+        raise InputError.one("--key", "key", key, f"the key of a row in {name}")
     return Side(name, rows)
 
 

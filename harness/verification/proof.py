@@ -27,7 +27,7 @@ cases are columns, left out when done.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -68,10 +68,18 @@ class Proven:
 
 
 class Proof:
-    """What the load cases of an assembly share. kappa : κ ≤ λmin(DKD), in balanced units."""
+    """What the load cases of an assembly share.
 
-    def __init__(self, prepared: Prepared, kappa: float) -> None:
-        self.balanced, self.kappa = Balanced.of(prepared), kappa
+    kappa : κ ≤ λmin(DKD), in balanced units. remembered : the figure of that name, or what makes it.
+    """
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        kappa: float,
+        remembered: Callable[[str, Callable[[], float]], float] = lambda name, make: make(),
+    ) -> None:
+        self.balanced, self.kappa, self.remembered = Balanced.of(prepared), kappa, remembered
 
     @cached_property
     def near(self) -> Near:
@@ -81,11 +89,11 @@ class Proof:
     @cached_property
     def compliance(self) -> float:
         """max (K⁻¹)_ii or more, mm/N; infinite without M or where no bound is cheap."""
-        K = self.balanced.assembly.K
-        if self.near.M is None:
-            return np.inf
+        return np.inf if self.near.M is None else self.remembered("compliance", self._largest_compliance)
+
+    def _largest_compliance(self) -> float:
+        K, D = self.balanced.assembly.K, self.balanced.D[:, 0]
         pairs = zip(K.blocks, K.slices, strict=True)
-        D = self.balanced.D[:, 0]
         return max(block.largest_compliance(D[rows], self.kappa) for block, rows in pairs)
 
     @cached_property

@@ -9,7 +9,8 @@ where the forces came from; the best one is kept.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -98,16 +99,22 @@ def best_of_candidates(
 
 def proof_of(prepared: Prepared) -> Proof:
     """What the load cases of an assembly share."""
-    return Proof(prepared, proven_lambda_min(prepared))
+    return Proof(prepared, proven_lambda_min(prepared), partial(_remembered, prepared))
 
 
 def proven_lambda_min(prepared: Prepared) -> float:
     """κ ≤ λmin(DKD) in balanced units, from the cache if it was proven before for this assembly."""
+    return _remembered(prepared, "lambda_min", lambda: _proven_lambda_min(prepared.assembly.K))
+
+
+def _remembered(prepared: Prepared, name: str, make: Callable[[], float]) -> float:
+    """A figure of an assembly that takes a while, from the cache."""
     if prepared.key is None:
-        return _proven_lambda_min(prepared.assembly.K)
-    key = cache.digest("lambda_min", prepared.key, _code())
-    _, facts = cache.load_or_make(key, lambda: ({}, {"kappa": _proven_lambda_min(prepared.assembly.K)}))
-    return float(facts["kappa"])
+        return make()
+    _, facts = cache.load_or_make(
+        cache.digest(name, prepared.key, _code()), lambda: ({}, {"value": repr(make())})
+    )
+    return float(facts["value"])
 
 
 def _proven_lambda_min(K: Stiffness) -> float:

@@ -12,22 +12,19 @@ from typing import Any
 import numpy as np
 
 from harness.results import records
-from harness.results.checksums import arrays_in
+from harness.results.answer_files import read_answer
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
-from problems.input.bounded import regular_file
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 
 from .judge import Judgement, Reference, conditioned_limit, judge
 from .reference import default_limit_s, reference, reference_of
-
-ANSWER_MIB = 1024  # the largest file of an answer that is read
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,7 @@ class ReferenceProblem:
     def judge_file(self, path: Path, limit_mm: float) -> Judgement:
         """Judge a saved answer; one that cannot be read is none."""
         try:
-            saved = arrays_in(regular_file(path, "answer", ANSWER_MIB).read_bytes())
+            saved = read_answer(path)
             x, lam = saved["x"], saved["lam"]
         except (OSError, ValueError, KeyError):
             return Judgement("no_answer", self.reference.bound_mm)

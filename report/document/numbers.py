@@ -45,12 +45,6 @@ def whole(value: object) -> str:
     return MISSING if number is None else f"{number:.0f}"
 
 
-def signed(value: object) -> str:
-    """+0.18, -0.04: two decimals and always a sign."""
-    number = as_number(value)
-    return MISSING if number is None else f"{number:+.2f}"
-
-
 def as_number(value: object) -> float | None:
     """The value as a float; None if it is missing, not finite or not a number."""
     if isinstance(value, bool) or value is None:

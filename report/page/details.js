@@ -18,8 +18,7 @@ function described(cell) {
 const quoted = text => /^[\w./=+:-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 
 function command(cell) {
-  const key = cell.key.split(" ").every(word => quoted(word) === word) ? cell.key : quoted(cell.key);
-  return `python -m harness reproduce ${quoted(DATA.directory)} ${key}`;
+  return `python -m harness run ${quoted(DATA.directory)} --key ${quoted(cell.key)} --out results/again`;
 }
 
 function openRow(cell) {

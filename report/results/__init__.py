@@ -1,1 +1,1 @@
-"""What a results directory holds, as data frames, and what the paper prints."""
+"""What a results directory holds, as data frames."""

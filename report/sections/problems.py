@@ -1,4 +1,4 @@
-"""The problems: their size, their conditioning beside the paper's, and the reference error bound."""
+"""The problems: their size, their conditioning, and the reference error bound."""
 
 from __future__ import annotations
 
@@ -9,15 +9,13 @@ import pandas as pd
 
 from report.document.blocks import Block, Column, Place, Section, Table, number, word
 from report.document.contents import scene_anchor
-from report.document.numbers import as_number, power, signed, whole
-from report.results.printed import TABLE_4
+from report.document.numbers import as_number, power, whole
 from report.results.reader import Results
 
 PLACE = Place(310)
 
 #: Of the scene's row under `sparse`: the facts of the sparse form.
 SPARSE = ("unknowns", "reference_bound_mm", "from_condensed_mm")
-PRINTED = {n: cond for _, n, _, cond in TABLE_4}
 
 
 def section(results: Results) -> Section | None:
@@ -44,19 +42,14 @@ def section(results: Results) -> Section | None:
 def _assemblies(table: pd.DataFrame) -> Table:
     by_assembly = table.groupby(["n", "m", "cond_K"], as_index=False, dropna=False)
     sizes = by_assembly.agg(scenes=("scene", "count"), build_s=("build_s", "max"))
-    sizes["cond_K_paper"] = sizes["n"].map(lambda n: PRINTED.get(int(n)))
-    sizes["cond_K_difference_percent"] = 100 * (sizes["cond_K"] / sizes["cond_K_paper"] - 1)
     columns = [
         number("unknowns n", "n", whole),
         number("contacts m", "m", whole),
         number("scenes", "scenes", whole),
-        number("cond(K) measured", "cond_K"),
-        number("cond(K), paper", "cond_K_paper"),
-        number("difference, %", "cond_K_difference_percent", signed),
+        number("cond(K)", "cond_K"),
         number("build, s", "build_s"),
     ]
-    caption = "*The assemblies.* cond(K) as computed here, beside Table 4 of the paper."
-    return Table("assemblies", caption, sizes, columns)
+    return Table("assemblies", "*The assemblies.*", sizes, columns)
 
 
 def _scenes(table: pd.DataFrame) -> Table:

@@ -21,6 +21,7 @@ from rich.console import Console
 from harness.measurement.run import run
 from harness.planning.suite import read_suite
 from harness.results import records
+from harness.results.answer_files import pack
 from harness.verification.gate import gate
 
 pytestmark = pytest.mark.slow
@@ -159,6 +160,23 @@ def test_gate_believes_the_answers_and_not_the_rows(copy: Path) -> None:
     code, text = said_by(gate, copy)
     assert code == 1
     assert "2.000e-07 mm from the reference" in text
+
+
+def test_gate_reads_the_answers_of_an_archive(copy: Path) -> None:
+    judged = said_by(gate, copy)
+    moved(copy / rows_of(copy)[2]["answer"], 2e-7)
+    spoilt = said_by(gate, copy)
+    pack(copy)
+    assert not (copy / "answers").exists()
+    assert judged[0] == 0
+    assert said_by(gate, copy) == spoilt
+    assert spoilt[0] == 1
+    archive = copy / "answers.zip"
+    whole = archive.read_bytes()
+    archive.write_bytes(whole[:60] + bytes(40) + whole[100:])  # in the first member
+    assert "damaged" in said_by(gate, copy)[1]
+    archive.write_bytes(whole[:-30])
+    assert said_by(gate, copy)[0] == 3
 
 
 def test_gate_lets_a_shift_within_the_limit_pass_and_ignores_what_is_not_gated(copy: Path) -> None:

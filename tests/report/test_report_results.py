@@ -50,8 +50,6 @@ def test_the_sections_stand_in_their_order() -> None:
             "scaling",
             "series",
         ),
-        *("paper.claims", "paper.table1", "paper.table2", "paper.table3", "paper.table4"),
-        *("paper.figures3_4", "paper.figures5_7"),
         *("problems", "times", "accuracy", "price_list", "asked_achieved", "residual_error", "profiles"),
         *("amortised", "stability", "breakdown", "gap_map", "details"),
         "machine",

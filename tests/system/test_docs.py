@@ -1,6 +1,7 @@
 """The documents: what they show works as written, their tables are those of the code, their paths exist."""
 
 import re
+import subprocess
 import sys
 from io import StringIO
 from pathlib import Path
@@ -12,6 +13,7 @@ from pydantic_core import PydanticUndefined
 from rich.console import Console
 from typer.main import get_command
 
+from harness import api, check_solver
 from harness.cli.app import app
 from harness.scene.solve import solve
 from harness.terminal import exit_codes
@@ -21,11 +23,14 @@ from problems.errors import InputError
 from problems.formats import FORMATS
 from problems.model.effect import Effect, effect_class, effect_kinds
 from problems.scene import SCENES, read_scene
+from solvers.plugin import load_plugin
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
 PAGE = (DOCS / "effects.md").read_text("utf-8")
+PUBLISHED = "results/published"
+COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
 JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
@@ -145,30 +150,84 @@ def test_the_folders_and_files_of_the_architecture_are_those_of_the_code() -> No
                 assert f"{folder.name}/" in part, f"{package}/{folder.name}"
 
 
-def test_the_exit_codes_of_the_readme_are_those_of_the_commands() -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
+def test_the_exit_codes_of_the_page_are_those_of_the_commands() -> None:
+    text = (DOCS / "commands.md").read_text("utf-8")
     table = text[text.index("| exit code |") :].split("\n\n")[0]
     codes = {value for name, value in vars(exit_codes).items() if name.isupper()}
     assert {int(code) for code in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)} == codes
 
 
-def test_every_command_is_in_the_readme() -> None:
+def test_every_command_is_in_its_table() -> None:
+    text = (DOCS / "commands.md").read_text("utf-8")
+    for name in COMMANDS:
+        assert f"| `python -m harness {name} " in text, name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_of_a_page_exist_with_their_options(page: Path) -> None:
+    """Up to the end of the line, or of the code in a sentence. CHANGELOG tells of what is gone, too."""
+    if page.name == "CHANGELOG.md":
+        return
+    for call in re.findall(r"python -m harness ([a-z]+[^`\n&|#]*)", page.read_text("utf-8")):
+        name, *words = call.split()
+        assert name in COMMANDS, call
+        known = {option for param in COMMANDS[name].params for option in param.opts}
+        assert {word for word in words if word.startswith("--")} <= known, call
+
+
+def test_the_readme_is_read_in_a_minute() -> None:
+    """Outside code and tables no sentence has more than 30 words."""
     text = (ROOT / "README.md").read_text("utf-8")
-    for name in get_command(app).commands:  # type: ignore[attr-defined]
-        assert re.search(rf"`(?:python -m harness )?{name}\b", text), name
+    assert text.count("\n") <= 130
+    prose = re.sub(r"```.*?```|^(?:\||    ).*?$", "", text, flags=re.DOTALL | re.MULTILINE)
+    for paragraph in prose.split("\n\n"):
+        for sentence in re.split(r"(?<=[.?!:])[*\s]", " ".join(paragraph.split())):
+            assert len(sentence.split()) <= 30, sentence
 
 
 def test_the_main_suite_takes_as_long_on_every_page() -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
+    text = (DOCS / "suites.md").read_text("utf-8")
     table = re.search(r"^\| `default` \|.*\| (\d+) min \|$", text, re.MULTILINE)
-    assert f"run the main suite ({table[1]} minutes on two cores)" in text
+    assert table is not None
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert f"run the main suite ({table[1]} minutes on two cores)" in readme
     assert f"the suite `default` ({table[1]} minutes)" in str(get_command(app).help)
 
 
-def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
-    code = re.search(r"```python\n(.*?)```", text[text.index("## From Python") :], re.DOTALL)
+def test_the_python_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    code = re.search(r"```python\n(.*?)```", (DOCS / "python.md").read_text("utf-8"), re.DOTALL)
+    assert code is not None
     exec(code[1], {})
     first, second = capsys.readouterr().out.splitlines()
     assert float(first.split()[1]) < 1e-10
     assert second == "outside"
+
+
+def test_the_solver_of_the_readme_works(tmp_path: Path) -> None:
+    """Within 1e-7 mm, as is said of it, and as the template is."""
+    code = re.search(r"```python\n(# mine\.py\n.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    assert code is not None
+    (tmp_path / "mine.py").write_text(code[1])
+    for path in (tmp_path / "mine.py", ROOT / "examples" / "my_solver.py"):
+        solver = load_plugin(path)
+        assert check_solver(solver) == []
+        answer = api.solve("scaling/1170", solver())
+        assert (answer.status, answer.judgement.verdict) == ("solved", "within")
+
+
+def test_what_is_published_in_git_is_small() -> None:
+    """Rows, the index, the answers and the pictures that documents show: the rest is drawn by `report`."""
+    listed = subprocess.run(["git", "ls-files", "-z", PUBLISHED], cwd=ROOT, capture_output=True, text=True)
+    files = [ROOT / name for name in listed.stdout.split("\0") if name]
+    if not files:
+        pytest.skip("no clone with git")
+    assert len(files) <= 400
+    assert sum(path.stat().st_size for path in files) <= 15e6
+    shown = {
+        (page.parent / picture).resolve()
+        for page in [*PAGES, *(path for path in files if path.suffix == ".md")]
+        for picture in re.findall(r"!\[[^]]*\]\(([^)\s]+)\)", page.read_text("utf-8"))
+    }
+    assert {path for path in files if path.suffix == ".png"} == {
+        path for path in shown if PUBLISHED in str(path)
+    }

@@ -18,6 +18,7 @@ PRINTED = {
     "own_matrices": 0.914625,
     "scene_in_python": 229.700842,
     "series_of_gaps": 0.138673,
+    "will_it_close": 0.014998,
 }
 
 

@@ -246,13 +246,13 @@ def test_enter_on_a_cell_opens_its_row_with_the_command(chromium: Any, tmp_path:
     command = "return document.querySelector('dialog[open] code').textContent"
     chromium.execute_script("document.querySelector('#view td[tabindex=\"0\"]').focus()")
     chromium.execute_script(f"document.activeElement.{press}", "Enter")
-    assert chromium.execute_script(command) == f"python -m harness reproduce results/made {key}"
+    again = "python -m harness run results/made --key '{}' --out results/again"
+    assert chromium.execute_script(command) == again.format(key)
     chromium.execute_script("document.getElementById('row').close()")
     chromium.execute_script("document.querySelector('#view td[tabindex=\"0\"]').focus()")
     chromium.execute_script(f"document.activeElement.{press}", "ArrowDown")
     chromium.execute_script(f"document.activeElement.{press}", "Enter")
-    spelled = odd.replace("'", "'\\''")
-    assert chromium.execute_script(command) == f"python -m harness reproduce results/made '{spelled}'"
+    assert chromium.execute_script(command) == again.format(odd.replace("'", "'\\''"))
 
 
 def test_a_map_of_a_series_has_the_curve_of_a_contact(

@@ -1,0 +1,47 @@
+"""The answers of a results directory: answers/NAME.npz, or the members of one answers.zip."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from problems.input.bounded import MIB, regular_file
+
+from .checksums import arrays_in
+
+ARCHIVE = "answers.zip"
+ANSWER_MIB = 1024  # the largest file of an answer that is read
+
+
+def read_answer(path: Path) -> dict[str, NDArray[Any]]:
+    """x (n,) and lam (m,) of DIR/answers/NAME.npz; without that file, of that member of DIR/answers.zip.
+
+    Raises OSError, ValueError or KeyError if there is none, or if it is damaged.
+    """
+    archive = path.parent.with_name(ARCHIVE)
+    if path.exists() or not archive.is_file():
+        return arrays_in(regular_file(path, "answer", ANSWER_MIB).read_bytes())
+    try:
+        with zipfile.ZipFile(archive) as file:
+            member = file.getinfo(path.name)
+            if member.file_size > ANSWER_MIB * MIB:
+                raise ValueError(f"{path.name}: larger than {ANSWER_MIB} MiB")
+            return arrays_in(file.read(member))
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError) as error:
+        raise ValueError(f"{archive}: {error}") from error
+
+
+def pack(directory: Path) -> None:
+    """Let DIRECTORY/answers.zip take the place of DIRECTORY/answers; the same answers give the same bytes."""
+    folder = directory / "answers"
+    files = sorted(folder.glob("*.npz"))
+    if files:
+        with zipfile.ZipFile(directory / ARCHIVE, "w", zipfile.ZIP_DEFLATED) as archive:
+            for path in files:
+                archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes(), zipfile.ZIP_DEFLATED)
+        shutil.rmtree(folder)

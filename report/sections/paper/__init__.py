@@ -1,1 +1,0 @@
-"""The paper's tables and figures beside ours, and its claims: for the suite `paper` only."""

@@ -1,0 +1,145 @@
+"""The rows of the suite `paper`, found by what was run – solver, form, options –, whatever its name."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from report.analysis.seconds import seconds_text, timed
+from report.results.reader import read
+
+Row = dict[str, Any]
+ByScene = dict[str, Row]
+
+SCALING = "scaling/"  # scenes of one joint at several sizes; all others are of the paper's problems
+
+#: Options of `ipm` that are not given.
+DEFAULTS: dict[str, Any] = {
+    "start": "algorithm_5",
+    "scheme": "algorithm_3",
+    "preconditioner": "V",
+    "ordering": "lexicographic",
+    "cg_tolerance": 1e-3,
+    "theta": 0.995,
+    "sigma": 0.1,
+}
+OPEN_LAST = {"ordering": "open_last"}
+#: The methods that section 6 compares; the second of them the paper does not have.
+METHODS = ("IPM", "IPM, open gaps last", "GI dual", "GI primal")
+FORMS = METHODS[2:]
+BETTER = "the better GI"  # of both forms, on each scene
+#: The ways to solve the Newton systems: options of `ipm`.
+SYSTEMS: dict[str, dict[str, Any]] = {
+    "V = I": {"preconditioner": "none"},
+    "U alone": {"preconditioner": "U"},
+    "V = U + √D": {},
+    "V = U + √D, open gaps last": OPEN_LAST,
+    "splitting": {"preconditioner": "splitting"},
+    "direct Cholesky": {"preconditioner": "direct"},
+}
+
+
+@dataclass(frozen=True)
+class Study:
+    """`rows`: one per scene and setting of the paper's problems, by n and active contacts, with the tightest
+    of several tolerances; `scaling`: those of the scaling scenes; `problems`: a record per scene.
+
+    Each row has the columns of the report's cells, None where missing; of the seconds per load case,
+    `at_least` (None if nothing is known), `cut` if that is a lower bound, and `shown`, the same as text;
+    `asked`, all options of `ipm`; `method`, one of METHODS, "" for other variants of `ipm`, else as reports
+    call it.
+    """
+
+    rows: list[Row]
+    scaling: list[Row]
+    problems: list[Row]
+
+    def ipm(self, **changed: Any) -> ByScene:
+        """The rows of `ipm` whose options are DEFAULTS except for `changed`."""
+        return {r["scene"]: r for r in self.rows if r["solver"] == "ipm" and r["asked"] == DEFAULTS | changed}
+
+    def of(self, method: str, n: int | None = None) -> ByScene:
+        """The rows of one of METHODS, or of BETTER."""
+        if method == BETTER:
+            rows = [r for name in FORMS for r in self.of(name, n).values()]
+            rows.sort(key=lambda r: (r["at_least"] is None, r["at_least"] or 0.0, r["cut"]), reverse=True)
+            return {r["scene"]: r for r in rows}  # the last one stays
+        return {r["scene"]: r for r in self.rows if r["method"] == method and n in (None, r["n"])}
+
+    @property
+    def sizes(self) -> list[int]:
+        """Those with at least two scenes of METHODS."""
+        scenes = {(r["n"], r["scene"]) for r in self.rows if r["method"] in METHODS}
+        return sorted({int(n) for n, _ in scenes if sum(n == other for other, _ in scenes) > 1})
+
+
+def study(directory: Path) -> Study:
+    """Raises FileNotFoundError if DIRECTORY has no rows, ValueError if several machines made them."""
+    results = read(directory)
+    if results.rows["machine"].nunique() > 1:
+        raise ValueError(f"{directory}: times of several machines cannot be compared")
+    cells = timed(results.cells[results.cells["status"] != "unsupported"])
+    cells = cells.sort_values(["tolerance", "threads"], ascending=[True, False], kind="stable")
+    rows: dict[tuple[str, ...], Row] = {}
+    for row in _records(cells.sort_values(["n", "active", "scene"], kind="stable")):
+        row |= {name: row.get(name) or {} for name in ("options", "details")}
+        row["asked"] = {key: row["options"].get(key, default) for key, default in DEFAULTS.items()}
+        row |= {"method": _method(row), "shown": seconds_text(row)}
+        setting = json.dumps(row["asked"]) if row["solver"] == "ipm" else row["variant"]
+        rows.setdefault((row["scene"], row["solver"], row["form"], setting), row)
+    scaling = [row for row in rows.values() if row["scene"].startswith(SCALING)]
+    others = [row for row in rows.values() if not row["scene"].startswith(SCALING)]
+    return Study(others, scaling, _records(results.problems))
+
+
+def _records(frame: pd.DataFrame) -> list[Row]:
+    plain = frame.astype(object).where(frame.notna(), None)
+    return plain.to_dict("records")  # type: ignore[return-value]
+
+
+def _method(row: Row) -> str:
+    if row["solver"] == "gi":
+        return f"GI {row['form']}"
+    if row["solver"] != "ipm":
+        return str(row["method"])
+    changed = {key: value for key, value in row["asked"].items() if value != DEFAULTS[key]}
+    return "IPM" if not changed else METHODS[1] if changed == OPEN_LAST else ""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """CG iterations by outer iteration. `cut`: stopped before the last system was solved."""
+
+    predictor: Sequence[int]
+    corrector: Sequence[int]
+    cut: bool = False
+
+    @property
+    def total(self) -> int:
+        return sum(self.predictor) + sum(self.corrector)
+
+    @property
+    def largest(self) -> int:
+        return max(*self.predictor, *self.corrector)
+
+    @property
+    def late(self) -> int:
+        """The largest in the second half of the outer iterations."""
+        half = len(self.predictor) // 2
+        return max([*self.predictor[half:], *self.corrector[half:]])
+
+    def __str__(self) -> str:
+        return f"{'≥ ' * self.cut}{self.total}"
+
+
+def counts(row: Mapping[str, Any] | None) -> Counts | None:
+    """None if the run ended before it could report them."""
+    cg = row["details"].get("cg") if row else None
+    if row is None or not cg or not cg["predictor"]:
+        return None
+    return Counts(cg["predictor"], cg.get("corrector", []), row["status"] == "iteration_limit")

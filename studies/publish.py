@@ -1,0 +1,187 @@
+"""Measures the published suites with this commit: `python -m studies.publish [SUITE...]`.
+
+Takes hours; Ctrl-C stops it, and the same command goes on. A suite is measured in results/publishing/COMMIT.
+It takes its place in results/published when it is whole: the run ended well, and every row is of this commit,
+without changes. What has such rows already is not measured again. At the end, and alone with --index, the
+index is written anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from harness.planning.suite import read_suite
+from harness.results import records
+from harness.results.answer_files import pack
+from harness.results.provenance import ROOT, commit
+from harness.results.schema import CASES, GAPS, VERDICTS
+from harness.terminal.exit_codes import INTERRUPTED
+from studies.paper.__main__ import write as write_study
+
+PUBLISHED = ROOT / "results" / "published"
+STAGED = ROOT / "results" / "publishing"
+#: Made by the command `series`, not by a suite.
+SERIES = {"gaps": ("4386/1074", "--cases", "1000", "--sd", "0.2", "--correlation-length", "150")}
+#: In the order of measurement; the other suites are for a user's own runs and for the CI.
+NAMES = (
+    *("default", "speed", "series", "gaps", "methods", "uncondensed", "scaling", "hard", "hard-full"),
+    *("drawn", "outside", "paper", "accuracy"),
+)
+DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
+#: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.
+KEPT_MIB = 5
+#: A longer time between two rows is not counted: the run was interrupted.
+LONGEST_PAUSE_S = 1200.0
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Returns 0, 1 if a suite is not whole, or 130; exits with 2 on wrong usage or code that has changes."""
+    parser = argparse.ArgumentParser("python -m studies.publish", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="SUITE", help=f"only these of: {', '.join(NAMES)}")
+    parser.add_argument("--index", action="store_true", help="only write the index")
+    asked = parser.parse_args(arguments)
+    if unknown := sorted(set(asked.names) - set(NAMES)):
+        parser.error(f"unknown: {', '.join(unknown)}")
+    failed: list[str] = []
+    if not asked.index:
+        digits, clean = commit()
+        if not clean or Path.cwd().resolve() != ROOT:
+            parser.error(f"must run in {ROOT}, a clone whose code is as committed")
+        try:
+            failed = measure([name for name in NAMES if not asked.names or name in asked.names], digits)
+        except KeyboardInterrupt:
+            return INTERRUPTED
+    print(f"Index: {write_index(PUBLISHED)}")
+    if failed:
+        print(f"Not published: {', '.join(failed)}. Run the same command again.", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def measure(names: Sequence[str], digits: str) -> list[str]:
+    """Measure and publish what has no rows of this commit; returns the names that are not whole."""
+    due = [name for name in names if not is_of(rows_of(PUBLISHED / name), digits)]
+    for name in due:
+        if name not in SERIES:
+            read_suite(name)  # refuses solvers that are not installed, now rather than in hours
+    failed = []
+    for k, name in enumerate(due):
+        last = minutes(rows_of(PUBLISHED / name))
+        print(f"{k + 1} of {len(due)}: {name}" + (f", {last:.0f} minutes the last time" if last else ""))
+        directory = STAGED / digits[:DIGITS] / name
+        words = ["series", *SERIES[name]] if name in SERIES else ["run", name]
+        code = ended([*words, "--out", str(directory)])
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+        if code or not is_of(rows_of(directory), digits):
+            failed.append(name)
+            continue
+        if name == "paper":
+            write_study(directory)
+        publish(name, directory)
+    return failed
+
+
+def ended(command: Sequence[str]) -> int:
+    """The exit code of a command of the harness, which a Ctrl-C ends before this process."""
+    with subprocess.Popen([sys.executable, "-m", "harness", *command], cwd=ROOT) as child:
+        try:
+            return child.wait()
+        except KeyboardInterrupt:  # the child has it, too
+            return child.wait()
+
+
+def rows_of(directory: Path) -> Rows:
+    """The rows of a suite or a series; none if there is no such directory."""
+    return records.read(directory / CASES) or records.read(directory / records.MEASUREMENTS)
+
+
+def is_of(rows: Rows, digits: str) -> bool:
+    """Whether there are rows, and all were measured with that commit, without changes."""
+    return bool(rows) and all((row.get("commit"), row.get("clean")) == (digits, True) for row in rows)
+
+
+def minutes(rows: Rows) -> float | None:
+    """How long the measurement took, by the times of the rows; None if they have none."""
+    times = sorted(datetime.fromisoformat(str(row["recorded_at"])) for row in rows if row.get("recorded_at"))
+    steps = [(after - before).total_seconds() for before, after in pairwise(times)]
+    return sum(step for step in steps if step <= LONGEST_PAUSE_S) / 60 if steps else None
+
+
+def publish(name: str, directory: Path) -> None:
+    """Let a whole directory take the place of what is published under that name; both on one disk."""
+    for unwanted in _unwanted(directory):
+        shutil.rmtree(unwanted) if unwanted.is_dir() else unwanted.unlink()
+    pack(directory)
+    target, old = PUBLISHED / name, directory.with_name(f"{name}.old")
+    PUBLISHED.mkdir(parents=True, exist_ok=True)
+    if target.exists():
+        shutil.rmtree(old, ignore_errors=True)  # of an earlier attempt
+        target.rename(old)
+    directory.rename(target)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _unwanted(directory: Path) -> Iterator[Path]:
+    """What is not published: locks, gaps of a series, the scenes' arrays, and answers that are large."""
+    yield from directory.glob("**/*.lock")
+    yield from directory.glob(GAPS)
+    yield from directory.glob("scenes")
+    if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_MIB * 2**20:
+        yield directory / "answers"
+
+
+def write_index(folder: Path) -> Path:
+    """Write FOLDER/index.md, a table of the suites in it; returns its path."""
+    found = {name: rows for name in NAMES if (rows := rows_of(folder / name))}
+    lines = []
+    for name, rows in found.items():
+        taken, verdicts = minutes(rows), Counter(row["verdict"] for row in rows)
+        days = sorted({str(row["recorded_at"])[:DAY] for row in rows if row.get("recorded_at")})
+        title, study = _title(folder / name), f"{name}/study/study.md"
+        if (folder / study).is_file():
+            title = f"[{title}]({study})"
+        line: dict[str, Any] = {"suite": f"[{name}]({name})", "what": title}
+        line |= {"measured": " to ".join(dict.fromkeys([*days[:1], *days[-1:]]))}
+        line |= {"minutes": "–" if taken is None else f"{taken:.0f}", "commit": _commits(rows)}
+        lines.append(line | {"rows": len(rows)} | {verdict: verdicts[verdict] for verdict in VERDICTS})
+    machines = sorted({str(row["machine"]) for rows in found.values() for row in rows if row.get("machine")})
+    text = (
+        f"# Published results\n\nMeasured on {', '.join(machines)}. `python -m harness report DIRECTORY` "
+        "draws the report of a suite from its rows.\n\n"
+    )
+    table = pd.DataFrame(lines).rename(columns=lambda name: name.replace("_", " "))
+    path = folder / "index.md"
+    path.write_text(text + table.to_markdown(index=False) + "\n", "utf-8")
+    return path
+
+
+def _title(directory: Path) -> str:
+    suite = directory / "suite.toml"
+    if not suite.is_file():
+        return "Many load cases of random gaps"
+    return str(tomllib.loads(suite.read_text("utf-8")).get("title", ""))
+
+
+def _commits(rows: Rows) -> str:
+    """In short; what is not known of one is said."""
+    words = {True: "", False: ", with changes", None: ", changes not known"}
+    known = {(str(row.get("commit") or "not recorded")[:DIGITS], row.get("clean")) for row in rows}
+    return "; ".join(sorted(digits + words[clean] for digits, clean in known))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

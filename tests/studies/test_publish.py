@@ -1,0 +1,151 @@
+"""`publish`: what is measured, what counts as this code; nothing is lost before its time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from harness.planning.suite import suite_names
+from harness.results.records import MEASUREMENTS, append
+from harness.results.schema import GAPS
+from studies import publish as published
+
+CODE = "c" * 40
+SUITES = ["default", "scaling"]
+
+
+def row(commit: str | None = CODE, clean: bool | None = True, minute: int = 0) -> dict[str, object]:
+    when = f"2026-01-01T00:{minute:02}:00+00:00"
+    about = {"scene": "4386/0107", "solver": "gi", "form": "dual", "status": "solved", "verdict": "within"}
+    facts = {"machine": "m", "commit": commit, "clean": clean, "recorded_at": when, "threads": 2}
+    return {"key": f"{minute}", "repeat": minute, "tolerance": 1e-9, **about, **facts}
+
+
+def measured(directory: Path, *rows: dict[str, object]) -> None:
+    directory.mkdir(parents=True, exist_ok=True)
+    append(directory / MEASUREMENTS, *rows)
+
+
+@pytest.fixture
+def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An earlier publication of two suites; the code is clean."""
+    monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
+    monkeypatch.setattr(published, "STAGED", tmp_path / "publishing")
+    monkeypatch.setattr(published, "commit", lambda: (CODE, True))
+    monkeypatch.chdir(published.ROOT)
+    for name in SUITES:
+        measured(tmp_path / "published" / name, row("b" * 40))
+    return tmp_path / "published"
+
+
+def publish(monkeypatch: pytest.MonkeyPatch, run: Callable[[Sequence[str]], int]) -> tuple[int, list[str]]:
+    """Exit code, and what was measured, each by `run`, which is given the words of a command."""
+    asked: list[str] = []
+
+    def ended(words: Sequence[str]) -> int:
+        asked.append(words[1])
+        return run(words)
+
+    monkeypatch.setattr(published, "ended", ended)
+    return published.main(SUITES), asked
+
+
+def good(words: Sequence[str]) -> int:
+    measured(Path(words[-1]), row(), row(minute=1))
+    return 0
+
+
+def test_every_suite_but_those_of_users_and_of_the_ci_is_published_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert sorted(published.NAMES) == sorted([*set(suite_names()) - {"gate", "scenes"}, "gaps"])
+    with pytest.raises(SystemExit, match="2"):
+        published.main(["sped"])
+    assert "unknown: sped" in capsys.readouterr().err
+
+
+def test_what_is_whole_takes_the_place_of_the_old_and_is_not_measured_again(
+    there: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert publish(monkeypatch, good) == (0, SUITES)
+    for name in SUITES:
+        assert published.is_of(published.rows_of(there / name), CODE)
+    lines = (there / "index.md").read_text("utf-8").splitlines()
+    assert [line.split(" | ")[0].strip("| ") for line in lines[-2:]] == [f"[{n}]({n})" for n in SUITES]
+    assert all("cccccccccccc |" in line for line in lines[-2:])
+    assert publish(monkeypatch, good) == (0, [])
+
+
+def test_a_suite_that_is_not_whole_leaves_the_old_and_is_continued(
+    there: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(words: Sequence[str]) -> int:
+        if words[1] == "scaling":
+            measured(Path(words[-1]), row())
+            return 130
+        return good(words)
+
+    assert publish(monkeypatch, stopped) == (130, SUITES)
+    assert published.is_of(published.rows_of(there / "default"), CODE)
+    assert published.is_of(published.rows_of(there / "scaling"), "b" * 40)
+    assert publish(monkeypatch, good) == (0, ["scaling"])
+    assert len(published.rows_of(there / "scaling")) == 3
+
+
+def test_one_that_fails_or_is_of_changed_code_is_not_published_and_the_others_are(
+    there: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert publish(monkeypatch, lambda words: 1 if words[1] == "default" else good(words))[0] == 1
+    assert published.is_of(published.rows_of(there / "default"), "b" * 40)
+    assert published.is_of(published.rows_of(there / "scaling"), CODE)
+
+    def changed(words: Sequence[str]) -> int:
+        measured(Path(words[-1]), row(clean=False))
+        return 0
+
+    assert publish(monkeypatch, changed) == (1, ["default"])
+    assert published.is_of(published.rows_of(there / "default"), "b" * 40)
+
+
+def test_scenes_large_answers_gaps_and_locks_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
+    for name, size in (("small", 1000), ("large", published.KEPT_MIB * 2**20 + 1)):
+        folder = tmp_path / name
+        measured(folder, row())
+        for file in ("answers/a.npz", "answers/.lock", ".lock", GAPS, "scenes/a.npz"):
+            (folder / file).parent.mkdir(exist_ok=True)
+            (folder / file).write_bytes(bytes(10 if file in (".lock", GAPS) else size))
+        published.publish(name, folder)
+    kept = {str(path.relative_to(tmp_path / "published")) for path in (tmp_path / "published").rglob("*.*")}
+    assert kept == {f"small/{MEASUREMENTS}", f"large/{MEASUREMENTS}", "small/answers.zip"}
+
+
+@pytest.mark.parametrize("known", [(CODE, False), ("0.1.0", None)])
+def test_code_of_no_commit_is_refused(
+    there: Path, monkeypatch: pytest.MonkeyPatch, known: tuple[str, bool | None]
+) -> None:
+    monkeypatch.setattr(published, "commit", lambda: known)
+    with pytest.raises(SystemExit, match="2"):
+        publish(monkeypatch, good)
+
+
+def test_another_checkout_is_refused(there: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        publish(monkeypatch, good)
+
+
+def test_an_interruption_is_not_counted_as_time() -> None:
+    assert published.minutes([row(minute=minute) for minute in (0, 2, 7, 50)]) == 7
+    assert published.minutes([row()]) is None
+
+
+def test_the_commands_exist(tmp_path: Path) -> None:
+    """Each is known to the command line, which then names what is missing."""
+    assert published.ended(["run", "no-such-suite", "--out", str(tmp_path)]) == 2
+    words = ["series", *published.SERIES["gaps"], "--out", str(tmp_path)]
+    assert published.ended([*words, "--solver", "nobody"]) == 2
