@@ -111,7 +111,7 @@ def test_a_page_shows_hostile_text_as_it_is(made: Any, written: Any, tmp_path: P
 
 
 @pytest.mark.parametrize(("made", "written"), MADE)
-@pytest.mark.parametrize("name", ["a" * 20_000, "$x_{$ \\frac{1}{0} $" * 9, "_|\ud800"])
+@pytest.mark.parametrize("name", ["$x_{$ \\frac{1}{0} $" * 900, "_|\ud800"])
 def test_any_text_is_drawn_in_seconds(made: Any, written: Any, name: str, tmp_path: Path) -> None:
     begun = time.perf_counter()
     page = written(made(tmp_path, name))
