@@ -68,7 +68,7 @@ def test_a_refused_import_leaves_what_is_there(own: bool, tmp_path: Path) -> Non
     before = out.read_bytes()
     refused = invoke("import", bad, "--out", out)
     assert refused.exit_code == 2
-    assert str(bad) in refused.output
+    assert str(bad)[:60] in refused.output  # a long path is cut
     assert out.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
 
