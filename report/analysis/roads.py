@@ -82,27 +82,3 @@ def _seconds(problem: Mapping[str, Any], step: str) -> float:
 def _first(*values: float | None) -> float:
     """The first that is known, else NaN."""
     return next((value for value in values if value is not None and np.isfinite(value)), np.nan)
-
-
-def fastest(lines: pd.DataFrame) -> pd.DataFrame:
-    """Per scene and number of load cases, what is the fastest in any form; lines as of `roads`.
-
-    `method` and `seconds`; `next` and `to_next`, how many times as fast as the next; `library` and
-    `to_library`, the same for the fastest library. Missing where there is none.
-    """
-    found: list[dict[str, Any]] = []
-    for scene in lines.sort_values(["n", "active", "scene"])["scene"].unique():
-        for k in LOAD_CASES:
-            total = f"total_{k}_s"
-            ranked = lines[(lines["scene"] == scene) & lines[total].notna()].sort_values(total)
-            ranked = ranked.drop_duplicates("method")
-            if ranked.empty:
-                continue
-            best, others = ranked.iloc[0], ranked.iloc[1:]
-            line = {"scene": scene, "n": best["n"], "active": best["active"], "load_cases": k}
-            line |= {"method": best["method"], "seconds": best[total], "in_house": best["in_house"]}
-            for name, among in (("next", others), ("library", ranked[~ranked["in_house"]])):
-                known = among.iloc[0] if len(among) else {"method": "", total: np.nan}
-                line |= {name: known["method"], f"to_{name}": known[total] / best[total]}
-            found.append(line)
-    return pd.DataFrame(found)

@@ -1,118 +1,125 @@
-"""The ranking of the solvers: answers within the limit first, then time.
+"""The ranking of the solvers, and the one rule of all advice.
 
-Times of different solvers are averaged only over the same scenes. At each size, the lines within the limit on
-more than half of its scenes are compared by the geometric mean over those scenes that all of them answered
-within the limit. Failures are counted, but enter no mean.
+Advised is the fastest line whose answer is good on every scene of a size, by the geometric mean of its
+seconds over these scenes. Good: within the limit, or with an error of at most a given accuracy.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from report.results.labels import in_order
-from report.results.reader import Results
 
-#: Lines that take at most this many times as long as the fastest count as equally fast, more if the repeats
-#: of one of them differ by more: single runs on a shared machine vary by as much.
+from .precision import judged, with_errors
+
+#: Lines that take at most this many times as long as the fastest count as equally fast: single runs on a
+#: shared
+#: machine vary by as much.
 TIE = 1.15
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """The geometric means at one size: seconds per load case by label, over `common` of `scenes`."""
-
-    n: int
-    scenes: list[str]
-    common: list[str]
-    seconds: dict[str, float]
+#: A chart shows the methods that were run on at least this share of its scenes.
+SHOWN = 0.5
+NOT_RUN = ("unsupported", "not_run")
 
 
 def geometric_mean(values: pd.Series[float]) -> float:
     return float(np.exp(np.log(values).mean()))
 
 
-def seconds_within(cells: pd.DataFrame) -> pd.DataFrame:
-    """Seconds per load case by scene (rows) and label (columns), missing if not within the limit."""
-    within = cells[(cells["verdict"] == "within") & cells["load_case_s"].notna()]
-    table = within.pivot_table(index="scene", columns="label", values="load_case_s", aggfunc="first")
-    return table.reindex(index=cells.drop_duplicates("scene").sort_values("active")["scene"])
+def best_tolerances(cells: pd.DataFrame) -> pd.DataFrame:
+    """One cell per method and scene: of its tolerances the fastest within the limit, else the least wrong."""
+    missed = cells["verdict"] != "within"
+    error = cells["displacement_error_mm"].where(missed, 0.0)
+    order = cells.assign(missed=missed, error=error).sort_values(
+        ["missed", "error", "load_case_s"], kind="stable"
+    )
+    return cells.loc[order.drop_duplicates(["method", "scene"]).index.sort_values()]
 
 
-def preferred(seconds: pd.Series[float], cells: pd.DataFrame) -> pd.DataFrame:
-    """One line per method with the setting to use, the fastest first: `label` (the index), `method`,
-    `tolerance` and `seconds`. It is the tightest of the tolerances that are as fast as the method's fastest.
+def shown(cells: pd.DataFrame) -> pd.DataFrame:
+    """The cells that a chart shows; none if fewer than two methods are left to compare."""
+    cells = cells[~cells["status"].isin(NOT_RUN)]
+    often = cells.groupby("method")["scene"].nunique() >= SHOWN * cells["scene"].nunique()
+    return cells[cells["method"].map(often).astype(bool)] if often.sum() > 1 else cells.iloc[:0]
 
-    seconds : by label, of the settings to choose from.
+
+def standings(cells: pd.DataFrame) -> pd.DataFrame:
+    """One line per method with the best of its tolerances, the best method first: by the share of scenes
+    within the limit, then by time relative to the fastest on the scenes it answered.
+
+    load_case_s_<n> : the geometric mean at size n, of the methods within the limit on every scene of it.
     """
-    known = cells.drop_duplicates("label").set_index("label")[["method", "tolerance"]].loc[seconds.index]
-    known = known.assign(seconds=seconds)
-    several = cells.groupby("label")["tolerance"].nunique() > 1  # each scene's own, found by a search
-    known["tolerance"] = known["tolerance"].mask(several)
-    as_fast = known["seconds"] <= TIE * known.groupby("method")["seconds"].transform("min")
-    tightest = known[as_fast].sort_values(["tolerance", "seconds"]).drop_duplicates("method")
-    return tightest.sort_values("seconds")
-
-
-def tie_of(cells: pd.DataFrame, *labels: str) -> float:
-    """TIE, or the ratio of slowest to fastest repeat of one of these lines, its mean over the scenes."""
-    ratios = cells[cells["label"].isin(labels)].assign(ratio=lambda line: line["most_s"] / line["least_s"])
-    ratios = ratios[ratios["least_s"] > 0]
-    return max([TIE, *ratios.groupby("label")["ratio"].agg(geometric_mean)])
-
-
-def compare(results: Results, n: int) -> Comparison:
-    seconds = seconds_within(results.of_size(n))
-    compared = seconds.loc[:, seconds.notna().sum() * 2 > len(seconds)]
-    common = compared.dropna()
-    means = {str(label): geometric_mean(common[label]) for label in common} if len(common) else {}
-    return Comparison(n, seconds.index.tolist(), common.index.tolist(), means)
-
-
-def standings(results: Results) -> pd.DataFrame:
-    """One line per label, the best first: by the share of scenes within the limit, then by time relative to
-    the fastest on the scenes it answered.
-    """
-    cells = results.cells[results.cells["status"] != "unsupported"]
-    comparisons = [compare(results, n) for n in results.sizes]
-    seconds = seconds_within(cells)
-    slower = seconds.div(seconds.min(axis=1), axis=0)
+    cells = best_tolerances(cells[cells["status"] != "unsupported"])
+    if cells.empty:
+        return cells
+    good = cells[cells["verdict"] == "within"]
+    slower = good["load_case_s"] / good.groupby("scene")["load_case_s"].transform("min")
     lines = []
-    for label in in_order(cells):
-        line = cells[cells["label"] == label]
-        verdicts = line["verdict"].value_counts()
-        missed = line[line["verdict"] == "no_answer"]["status"]
-        outside = line[line["verdict"] == "outside"]
-        record = {
-            "label": label,
-            "method": line["method"].iloc[0],
-            "solver": line["solver"].iloc[0],
-            "form": line["form"].iloc[0],
-            "scenes": len(line),
-            "within": int(verdicts.get("within", 0)),
-            "outside": len(outside),
-            "outside_claimed": int((outside["status"] == "solved").sum()),
-            "cannot_be_judged": int(verdicts.get("cannot_be_judged", 0)),
-            "no_answer": len(missed),
-            "no_answer_because": ", ".join(f"{k} {_words(s)}" for s, k in Counter(missed).most_common()),
-            "worst_error_mm": line["displacement_error_mm"].max(),
+    for method in in_order(cells, "method"):
+        mine = cells[cells["method"] == method]
+        counts, missed = mine["verdict"].value_counts(), mine.loc[mine["verdict"] == "no_answer", "status"]
+        claimed = (mine["verdict"] == "outside") & (mine["status"] == "solved")
+        line: dict[str, Any] = {"method": method, "scenes": len(mine), "within": int(counts.get("within", 0))}
+        line |= {"outside": int(counts.get("outside", 0)), "outside_claimed": int(claimed.sum())}
+        line |= {"cannot_be_judged": int(counts.get("cannot_be_judged", 0)), "no_answer": len(missed)}
+        because = [f"{count} {status.replace('_', ' ')}" for status, count in Counter(missed).most_common()]
+        line |= {
+            "no_answer_because": ", ".join(because),
+            "worst_error_mm": mine["displacement_error_mm"].max(),
         }
-        for comparison in comparisons:
-            record[f"load_case_s_{comparison.n}"] = comparison.seconds.get(label)
-        record["peak_rss_mib"] = line["peak_rss_mib"].max()
-        record["slower"] = geometric_mean(slower[label].dropna()) if label in slower else np.inf
-        lines.append(record)
+        own = slower[good["method"] == method].dropna()
+        line |= {"share": line["within"] / len(mine), "slower": geometric_mean(own) if len(own) else np.inf}
+        lines.append(line | {"peak_rss_mib": mine["peak_rss_mib"].max()})
     table = pd.DataFrame(lines)
-    if table.empty:
-        return table
-    table["share"] = table["within"] / table["scenes"]
-    keys = {"share": False, "within": False, "slower": True, "no_answer": True, "worst_error_mm": True}
-    table = table.sort_values([*keys], ascending=[*keys.values()], kind="stable")
-    return table.drop(columns=["share", "slower"]).reset_index(drop=True)
+    for n, of_size in cells.groupby("n"):
+        means = fastest_first(of_size, "method").set_index("method")["seconds"]
+        table[f"load_case_s_{n:.0f}"] = table["method"].map(means)
+    order = {"share": False, "within": False, "slower": True, "no_answer": True, "worst_error_mm": True}
+    return table.sort_values([*order], ascending=[*order.values()], kind="stable", ignore_index=True)
 
 
-def _words(status: str) -> str:
-    return status.replace("_", " ")
+def fastest_first(
+    cells: pd.DataFrame, name: str = "label", seconds: str = "load_case_s", accuracy_mm: float | None = None
+) -> pd.DataFrame:
+    """By the rule above: solver, form and `seconds` of each `name` that is good on every scene of
+    `cells`. accuracy_mm : if not given, the limit.
+    """
+    good = cells["verdict"] == "within" if accuracy_mm is None else with_errors(cells)["error"] <= accuracy_mm
+    known = cells[good & (cells[seconds] > 0)]
+    known = known[known.groupby(name)["scene"].transform("nunique") == cells["scene"].nunique()]
+    means = np.exp(np.log(known[seconds]).groupby(known[name]).mean()).rename("seconds")
+    lines = known.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "in_house"]]
+    return lines.assign(seconds=means).sort_values("seconds", ignore_index=True)
+
+
+def recommended(
+    cells: pd.DataFrame, accuracy_mm: float | None = None, seconds: str = "load_case_s"
+) -> dict[str, Any]:
+    """The advice for the scenes of one size: `use` and its `seconds`; `next`, the fastest other method, and
+    `library`, the fastest library, each with how many times as long it takes.
+    """
+    line = {"n": cells["n"].iloc[0], "scenes": cells["scene"].nunique(), "accuracy_mm": accuracy_mm}
+    line |= {
+        "use": "none on every scene",
+        "seconds": None,
+        "next": "",
+        "to_next": None,
+        "library": "",
+        "to_library": None,
+    }
+    if accuracy_mm is not None and not judged(cells, accuracy_mm):
+        return line | {"use": "cannot be judged: the reference is not accurate enough"}
+    lines = fastest_first(cells, "label", seconds, accuracy_mm)
+    if lines.empty:
+        return line
+    best = lines.iloc[0]
+    others = (lines[["solver", "form"]] != best[["solver", "form"]]).any(axis=1)
+    line |= {"use": best["label"], "seconds": best["seconds"]}
+    for name, among in (("next", others), ("library", ~lines["in_house"])):
+        if among.any():
+            other = lines[among].iloc[0]
+            line |= {name: other["label"], f"to_{name}": other["seconds"] / best["seconds"]}
+    return line

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
@@ -75,12 +75,20 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, saved as NAME.png; `caption` explains it."""
+    """A picture, saved as NAME.png; `caption` explains it. data : what it shows, in NAME.csv, if no table
+    has it.
+    """
 
     kind: ClassVar[str] = "figure"
     name: str
     caption: str
     drawing: Drawing
+    data: pd.DataFrame | None = None
+
+    @property
+    def alt(self) -> str:
+        """What the picture shows, without markup: the emphasised beginning of its caption."""
+        return self.caption.split("*")[1].rstrip(".:") if self.caption.startswith("*") else self.name
 
 
 Block = Text | Table | Figure
@@ -89,14 +97,4 @@ Block = Text | Table | Figure
 @dataclass(frozen=True)
 class Section:
     title: str
-    blocks: list[Block]
-
-
-@dataclass(frozen=True)
-class Place:
-    """The place of a section in the report, by increasing `number`, and the results it is given: those on
-    the rungs of ladders, on scenes drawn at random, on all other scenes, or all.
-    """
-
-    number: int
-    about: Literal["scenes", "ladders", "drawn", "all"] = "scenes"
+    blocks: Sequence[Block]

@@ -1,7 +1,6 @@
 """Every solver on every rung of every ladder, as one picture.
 
-A wrong answer says by how much: k if its error is up to 10ᵏ times the limit, ∞ beyond 10⁹⁹. A rung
-whose limit is wider than the one asked for has it below its name.
+A wrong answer says by how much: k if its error is up to 10ᵏ times the limit, ∞ beyond 10⁹⁹.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ from report.analysis.outcomes import (
     WRONG_UNCLAIMED,
 )
 from report.document.blocks import records
-from report.document.numbers import power, tidy_power
 
 from . import style
 
-ROW, COLUMN = 0.18, 0.17  # inches
+ROW, COLUMN = 0.145, 0.112  # inches
+AROUND = 1.15  # inches above and below the cells of a panel
 GAP = 0.6  # between ladders, in columns
-LABELS = 1.9  # inches to the left of the cells, for the names of the lines
+LABELS = 1.55  # inches to the left of the cells, for the names of the lines
 
 #: Face, hatch and mark of an outcome, distinct in greyscale too.
 LOOKS: dict[str, tuple[str, str, str]] = {
@@ -63,14 +62,11 @@ COUNTED = {
 def ladder_map(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Figure:
     """cells : with outcomes. order : labels, the rows. ladders : the rungs of each ladder, the columns."""
     panels = _panels(ladders)
-    height = len(order) * ROW * len(panels) + 1.75 * len(panels) + 0.4
-    drawing = style.figure(height)
+    drawing = style.figure((len(order) * ROW + AROUND) * len(panels) + 0.4)
     table = cells.assign(text=[_text(cell) for cell in records(cells)])
     places: Any = table.set_index(["label", "ladder", "rung"])[["outcome", "text"]].to_dict("index")
-    wider = cells[cells["limit_mm"] > cells["limit_asked_mm"]].groupby(["ladder", "rung"])["limit_mm"].max()
-    limits: Any = {rung: f"  ≤ {tidy_power(power(limit, 2))} mm" for rung, limit in wider.items()}
     for axes, names in zip(drawing.subplots(len(panels), 1, squeeze=False)[:, 0], panels, strict=True):
-        _panel(axes, places, limits, order, {name: ladders[name] for name in names})
+        _panel(axes, places, order, {name: ladders[name] for name in names})
     handles = [
         Patch(facecolor=face, hatch=hatch, edgecolor="#888888", linewidth=0.5, label=f"{name} {mark}".strip())
         for name, (face, hatch, mark) in LOOKS.items()
@@ -101,10 +97,8 @@ def _panels(ladders: dict[str, list[str]]) -> list[list[str]]:
     return panels
 
 
-def _panel(
-    axes: Axes, places: dict[tuple[str, str, str], dict[str, str]], limits: dict[tuple[str, str], str],
-    order: list[str], ladders: dict[str, list[str]],
-) -> None:  # fmt: skip
+def _panel(axes: Axes, places: Any, order: list[str], ladders: dict[str, list[str]]) -> None:
+    """places : the outcome and text by label, ladder and rung."""
     x, ticks, names = 0.0, [], []
     for ladder, rungs in ladders.items():
         left = x
@@ -113,11 +107,11 @@ def _panel(
                 if (label, ladder, rung) in places:
                     _cell(axes, x, y, **places[label, ladder, rung])
             ticks.append(x)
-            names.append(rung + limits.get((ladder, rung), ""))
+            names.append(rung)
             x += 1
         for text, above, size, weight in (
-            (ladder, 12, 8, "bold"),
-            (COUNTED.get(ladder, ""), 3, 6.5, "normal"),
+            (ladder, 10, 6.5, "bold"),
+            (COUNTED.get(ladder, ""), 3, 5.5, "normal"),
         ):
             axes.annotate(
                 text, ((left + x - 1) / 2, 1), (0, above), xycoords=axes.get_xaxis_transform(),
@@ -126,8 +120,8 @@ def _panel(
         x += GAP
     room = (style.WIDTH - LABELS) / COLUMN
     axes.set(xlim=(-0.6, max(x - GAP, room) - 0.4), ylim=(len(order) - 0.4, -0.6))
-    axes.set_xticks(ticks, names, rotation=90, fontsize=6.5)
-    axes.set_yticks(range(len(order)), order, fontsize=8)
+    axes.set_xticks(ticks, names, rotation=90, fontsize=5.5)
+    axes.set_yticks(range(len(order)), order, fontsize=7)
     axes.tick_params(length=0)
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
@@ -139,5 +133,5 @@ def _cell(axes: Axes, x: float, y: float, outcome: str, text: str) -> None:
     axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, **looks))
     ink = {WRONG_CLAIMED: "white", WRONG_UNCLAIMED: "black"}.get(outcome, "#555555")
     box = {"facecolor": "white", "pad": 0.4, "linewidth": 0} if hatch else None
-    size = 8 if len(text) < 2 else 6.5
+    size = 6.5 if len(text) < 2 else 5.0
     axes.text(x, y + 0.03, text, ha="center", va="center", color=ink, fontsize=size, weight="bold", bbox=box)

@@ -1,15 +1,92 @@
-"""Maps of the junction: a field on the contact nodes, and the outline of some of them."""
+"""Maps of the junction: fields on its nodes in true proportions, with outlines of some of them and marks.
+
+Scales are linear, or those of the square root, so that small values are visible; their labels say so.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize, PowerNorm
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .sheet import Array, Sheet, sheet
+
 Grid = tuple[Array, Array, NDArray[np.intp]]
+Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
+
+#: Shapes of the marks; other kinds are crosses. More than MANY of a kind are small dots, which hide nothing.
+SHAPES = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
+MANY = 60
+MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", "#E8112D", "#444444"
+THINNEST = 0.02  # a map's shorter side over its longer one
+NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    label: str
+    colours: str
+    norm: Normalize
+
+
+def rooted(label: str, colours: str, *values: Array) -> Scale:
+    """The scale of the square root from 0, or the least value if negative, to the largest."""
+    low = min(0.0, *(float(np.nanmin(each, initial=0.0)) for each in values))
+    high = max(float(np.nanmax(each, initial=low)) for each in values)
+    return Scale(f"{label}\n(√ scale)", colours, PowerNorm(0.5, low, high if high > low else low + 1.0))
+
+
+@dataclass(frozen=True)
+class Map:
+    """A field on `nodes`. outlines : which nodes, in what colour, and what they are."""
+
+    title: str
+    nodes: Array
+    values: Array
+    scale: Scale
+    outlines: Sequence[tuple[NDArray[np.bool_], str, str]] = ()
+    marks: Marks = field(default_factory=dict)
+
+
+def drawn(maps: Sequence[Map], beside: int, corners: Array | None = None) -> tuple[Figure, list[Axes]]:
+    """A sheet of maps, `beside` of them in a row, with a colour bar for each scale. corners : points that
+    every map shows; by default all nodes.
+    """
+    entries = {
+        *(kind for each in maps for kind in each.marks),
+        *(o[2] for each in maps for o in each.outlines),
+    }
+    scales = list(dict.fromkeys(each.scale for each in maps))
+    shown = np.concatenate([each.nodes for each in maps]) if corners is None else corners
+    page = _sheet(shown, [each.title for each in maps], beside, len(entries), len(scales))
+    found: dict[Scale, ScalarMappable] = {}
+    for axes, each in zip(page.axes, maps, strict=True):
+        found[each.scale] = draw(axes, each.nodes, each.values, each.scale)
+        for inside, colour, label in each.outlines:
+            _outlined(axes, each.nodes, inside, colour, label)
+        _marked(axes, each.marks)
+    return page.finished(*((found[scale], scale.label) for scale in scales)), page.axes
+
+
+def _sheet(nodes: Array, titles: list[str], beside: int, marks: int, bars: int) -> Sheet:
+    """Maps of the bounding box of the nodes: stacked if it is a wide strip, all side by side if it is
+    upright, else `beside` and at most three per row.
+    """
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    thin = THINNEST * (high - low).max() or 1.0
+    size, middle = np.maximum(high - low, thin), (low + high) / 2
+    ratio = size[1] / size[0]
+    columns = 1 if ratio < NARROW else len(titles) if ratio > UPRIGHT else min(beside, 3)
+    return sheet(middle - size / 2, middle + size / 2, titles, columns, marks, bars)
 
 
 def grid_of(nodes: Array) -> Grid | None:
@@ -21,26 +98,51 @@ def grid_of(nodes: Array) -> Grid | None:
     return (x, y, place) if full else None
 
 
-def draw(axes: Axes, nodes: Array, values: Array, norm: Normalize, colours: str) -> ScalarMappable:
-    """A field on the nodes in true proportions: cells if they are a grid, otherwise dots."""
+def draw(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappable:
+    """A field on the nodes: cells if they are a grid, otherwise dots."""
     axes.set(aspect="equal", ylabel="y, mm")
     axes.grid(visible=False)
+    look: dict[str, Any] = {"norm": scale.norm, "cmap": scale.colours}
     grid = grid_of(nodes)
     if grid is None:
-        return axes.scatter(nodes[:, 0], nodes[:, 1], c=values, s=4, norm=norm, cmap=colours)
+        return axes.scatter(nodes[:, 0], nodes[:, 1], c=values, s=4, **look)
     x, y, place = grid
-    field = np.empty(len(x) * len(y))
-    field[place] = values
-    cells = field.reshape(len(y), len(x))
-    return axes.pcolormesh(_edges(x), _edges(y), cells, norm=norm, cmap=colours)
+    cells = np.empty(len(x) * len(y))
+    cells[place] = values
+    return axes.pcolormesh(_edges(x), _edges(y), cells.reshape(len(y), len(x)), **look)
+
+
+def _outlined(axes: Axes, nodes: Array, inside: NDArray[np.bool_], colour: str, label: str) -> None:
+    """The border of some contacts, if they lie on a grid, with a dark rim, so that it shows on any colour."""
+    grid = grid_of(nodes)
+    if grid and inside.any():
+        look: dict[str, Any] = {"linewidth": 0.9}
+        if colour != RIM:
+            look["path_effects"] = [withStroke(linewidth=1.7, foreground=RIM)]
+        axes.add_collection(LineCollection(outline(grid, inside), color=colour, **look))
+        axes.plot([], [], color=colour, label=label, **look)
+
+
+def _marked(axes: Axes, marks: Marks) -> None:
+    """Rings with a white rim, visible on any colour without hiding what is inside them; dots if they are
+    many.
+    """
+    for kind, points in marks.items():
+        x, y = np.array(points).T
+        many = len(points) > MANY
+        look: dict[str, Any] = {"linestyle": "", "clip_on": False, "markerfacecolor": "none"}
+        look |= {"marker": "." if many else SHAPES.get(kind, "x"), "markersize": 3.0 if many else 4.5}
+        axes.plot(x, y, markeredgecolor="#FFFFFF90", markeredgewidth=1.2 if many else 1.6, **look)
+        width = 0.6 if many else 1.0
+        axes.plot(x, y, markeredgecolor=MARK, markeredgewidth=width, label=kind.replace("_", " "), **look)
 
 
 def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
     """The edges between the cells of closed contacts and the rest, as line segments."""
     x, y, place = grid
-    field = np.zeros(len(x) * len(y), dtype=bool)
-    field[place] = inside
-    padded = np.pad(field.reshape(len(y), len(x)), 1)
+    cells = np.zeros(len(x) * len(y), dtype=bool)
+    cells[place] = inside
+    padded = np.pad(cells.reshape(len(y), len(x)), 1)
     xe, ye = _edges(x), _edges(y)
     rows, columns = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])
     upright = [np.array([[xe[c], ye[r]], [xe[c], ye[r + 1]]]) for r, c in zip(rows, columns, strict=True)]

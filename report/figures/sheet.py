@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from report.document.escape import LONGEST_LABEL
 
 from . import style
-from .maps import Array
 
+Array = NDArray[np.float64]
 # inches
-LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.2, 0.35, 0.5
+LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.3, 0.35, 0.5
 BESIDE, BELOW = 0.5, 0.4  # between maps; the title of the next one is below a map
 NAME_LEFT, NAME_BELOW = 0.6, 0.27  # of an axis, from the map
 LOWEST, TALLEST = 0.4, 5.5  # of a row, which has room for "y, mm"; of a map

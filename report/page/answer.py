@@ -5,6 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from report.document.numbers import listed, significant
+from report.figures.answer import pair_name
 from report.results.series import Array
 
 from .banner import banner
@@ -30,9 +31,36 @@ def answer_data(record: Data, arrays: dict[str, Array]) -> Data:
     return {
         "kind": "answer",
         "banner": _banner([record]),
+        "headline": headline(record, arrays),
+        "fasteners": [
+            [entry["kind"], pair_name(entry), entry["x"], entry["y"], entry["force_N"]]
+            for entry in record.get("fasteners", [])
+        ],
         "facts": [[name, str(value)] for name, value in facts.items() if value is not None],
         "maps": answer_maps(record, arrays),
     }
+
+
+def headline(record: Data, arrays: dict[str, Array]) -> Data:
+    """What the reader asks first: whether a gap is larger than allowed, if that was asked, and how large the
+    largest is and where. kind : "pass", "fail" or "" if neither can be said.
+    """
+    if not record["m"]:
+        return {"kind": "", "text": "The scene has no contact."}
+    gap = arrays["gap_after"]
+    worst = int(gap.argmax())
+    pair = next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
+    at = f"contact {worst}"
+    if "contact_nodes" in arrays:
+        x, y = arrays["contact_nodes"][worst]
+        at = f"x = {significant(x)}, y = {significant(y)} mm"
+    largest = f"the largest gap left is {significant(gap[worst])} mm, at {at} ({pair_name(pair)})"
+    check = record.get("allowed_gap")
+    if check is None:
+        return {"kind": "", "text": f"{largest[0].upper()}{largest[1:]}."}
+    kinds = {None: ("", "CANNOT BE TOLD"), True: ("fail", "FAIL"), False: ("pass", "PASS")}
+    kind, word = kinds[check["exceeded"]]
+    return {"kind": kind, "text": f"{word} at {significant(check['allowed_mm'])} mm: {largest}."}
 
 
 def two_answers_data(records: list[Data], answers: list[dict[str, Array]], names: list[str]) -> Data:

@@ -95,6 +95,7 @@ function ranking(cells, limit) {
   }
   const ranked = [...lines.values()].sort((a, b) => b.within / b.scenes - a.within / a.scenes || b.within - a.within
     || d3.ascending(a.slower, b.slower) || a.missing - b.missing || d3.ascending(a.worst, b.worst));
-  ranked.forEach((line, place) => { line.rank = place + 1; });
+  // Without an answer within the limit there is no rank.
+  ranked.forEach((line, place) => Object.assign(line, {place, rank: line.within ? place + 1 : "–"}));
   return {lines: ranked, fastest};
 }

@@ -85,7 +85,7 @@ function drawMap(box, map, field, nodes, values, known) {
     pen.fillRect(left, top, sharp(x(xe[c + 1])) - left, sharp(y(ye[r])) - top);
   }
   if (threshold !== null) contour(pen, on, values, threshold, x, y, at);
-  for (const [mx, my] of map.marks) ring(pen, x(mx), y(my), "#D55E00");
+  for (const [mx, my] of map.marks) ring(pen, x(mx), y(my), "#111111", map.marks.length > 60 ? 1 : 3.2);
   if (STATE.node !== "" && Number(STATE.node) < on.count) ring(pen, x(on.x(Number(STATE.node))), y(on.y(Number(STATE.node))), "#000000", 6);
   const svg = d3.create("svg").attr("width", width).attr("height", height + 52).attr("class", "over");
   svg.append("g").attr("class", "axis").attr("transform", `translate(0,${height + 12})`).call(d3.axisBottom(x).ticks(Math.max(1, scale * span[0] / 80)));
@@ -114,13 +114,13 @@ function ring(pen, x, y, colour, size = 3.2) {
 // The edges between contacts above the threshold and the rest; rings around those above it without a grid.
 function contour(pen, on, values, threshold, x, y, at) {
   const above = (c, r) => { const i = at(c, r); return i !== undefined && values[i] > threshold; };
-  if (!on.full) return d3.range(on.count).filter(i => values[i] > threshold).forEach(i => ring(pen, x(on.x(i)), y(on.y(i)), "#D55E00", 3.5));
+  if (!on.full) return d3.range(on.count).filter(i => values[i] > threshold).forEach(i => ring(pen, x(on.x(i)), y(on.y(i)), "#E8112D", 3.5));
   pen.beginPath();
   for (let c = 0; c <= on.columns.length; c++) for (let r = 0; r <= on.rows.length; r++) {
     if (r < on.rows.length && above(c, r) !== above(c - 1, r)) { pen.moveTo(x(on.xe[c]), y(on.ye[r])); pen.lineTo(x(on.xe[c]), y(on.ye[r + 1])); }
     if (c < on.columns.length && above(c, r) !== above(c, r - 1)) { pen.moveTo(x(on.xe[c]), y(on.ye[r])); pen.lineTo(x(on.xe[c + 1]), y(on.ye[r])); }
   }
-  for (const [width, stroke] of [[3.5, "#ffffff"], [1.6, "#D55E00"]]) { pen.lineWidth = width; pen.strokeStyle = stroke; pen.stroke(); }
+  for (const [width, stroke] of [[3.5, "#ffffff"], [1.6, "#E8112D"]]) { pen.lineWidth = width; pen.strokeStyle = stroke; pen.stroke(); }
 }
 
 // The arrow keys walk over the contacts; Enter chooses one.

@@ -50,9 +50,13 @@ def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     for pair in record["pairs"]:
         own = slice(pair["start"], pair["stop"])
         of_pair = {name: arrays[name][own] for name in ("gap_before", "gap_after", "lam")}
-        marks = [point for points in record["marks"].values() for point in points]
-        _add(page, _fields_map(pair_name(pair), arrays["contact_nodes"][own], of_pair, np.array(marks)))
+        _add(page, _fields_map(pair_name(pair), arrays["contact_nodes"][own], of_pair, _places(record)))
     return page
+
+
+def _places(record: Data) -> Array:
+    """Of all marks on the junction."""
+    return np.array([point for points in record.get("marks", {}).values() for point in points])
 
 
 def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
@@ -67,7 +71,7 @@ def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
         step = _step(len(nodes))
         fields = [_field("first", first[::step]), _field("second", second[::step])]
         fields.append(_field("second − first", (second - first)[::step]) | {"signed": True})
-        _add(page, _map(pair_name(pair), nodes, fields))
+        _add(page, _map(pair_name(pair), nodes, fields, _places(record)))
     return page
 
 
@@ -77,7 +81,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
 
     quantiles : (len(names), m), mm.
     """
-    if series.nodes is None or not len(series.cases) or not len(series.gaps):
+    if series.nodes is None or not len(series.cases):
         return _empty()
     step = _step(len(series.nodes))
     numbers = series.cases["case"].to_numpy()
@@ -108,7 +112,7 @@ def _chosen(series: Series) -> Iterator[int]:
 
 def _exceeded(series: Series, step: int) -> str:
     """(contacts, len(SHARES)), mm: the gap that this share of the cases exceeds."""
-    numbers, m = series.cases["case"].to_numpy(), series.gaps.shape[1]
+    numbers, m = series.cases["case"].to_numpy(), series.gaps.m
     found = []
     width = max(2**22 // len(numbers), 1) * step
     for start in range(0, m, width):

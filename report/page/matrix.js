@@ -25,8 +25,8 @@ function matrix(main) {
   const head = el("tr", {}, heads.map(([name, text, hint], place) => el("th", {
     scope: "col", class: place < 2 ? `stuck${place}` : place > 3 ? upright : "",
     "aria-sort": STATE.sort === name ? (STATE.down ? "descending" : "ascending") : "none",
-  }, el("button", {type: "button", title: hint, "data-sort": name,
-    onclick: () => update({sort: name, down: STATE.sort === name && !STATE.down ? "1" : ""})},
+    onclick: () => update({sort: name, down: (STATE.sort === name ? !STATE.down : name === "within") ? "1" : ""}), // the most first
+  }, el("button", {type: "button", title: hint, "data-sort": name},
   el("span", {}, text), STATE.sort === name ? (STATE.down ? " ▾" : " ▴") : ""))));
   const body = lines.map(line => el("tr", {class: line === base ? "base" : ""},
     el("td", {class: "stuck0 number"}, String(line.rank)),
@@ -50,12 +50,14 @@ function sorted(lines) {
   const of = STATE.sort.startsWith("scene ") ? STATE.sort.slice(6) : "";
   const limit = Number(STATE.limit);
   const value = line => {
+    if (STATE.sort === "rank") return line.place;
+    if (STATE.sort === "within") return line.within / line.scenes;
     if (!of) return line[STATE.sort];
     const cell = line.cells.get(of);
     if (!cell || figure(cell) == null) return Infinity;
     return STATE.metric === "error" || verdict(cell, limit) === "within" ? figure(cell) : 1e30 + figure(cell);
   };
-  lines.sort((a, b) => (STATE.down ? -1 : 1) * (d3.ascending(value(a), value(b)) || a.rank - b.rank));
+  lines.sort((a, b) => (STATE.down ? -1 : 1) * d3.ascending(value(a), value(b)) || a.place - b.place);
 }
 
 function textOf(cell, judged, against, pinned) {
@@ -107,4 +109,26 @@ function csv(lines, limit) {
   const cells = lines.flatMap(line => [...line.cells.values()]);
   download("rows.csv", [[...names, "limit_mm", "verdict"],
     ...cells.map(cell => [...names.map(name => cell[name]), limitOf(cell, limit), verdict(cell, limit)])]);
+}
+
+// All rungs at once: a square per solver and rung, in the colour of its verdict; each ladder grows harder to the right.
+function ladderView(main) {
+  const limit = Number(STATE.limit), {lines} = ranking(filtered(), limit);
+  const rungs = DATA.scenes.filter(scene => scene.ladder && lines.some(line => line.cells.has(scene.scene)));
+  if (!rungs.length) return main.append(el("p", {}, "No rung passes the filters."));
+  const ladders = d3.nest().key(scene => scene.ladder).entries(rungs), ends = new Set(ladders.map(({values}) => values[values.length - 1]));
+  lines.sort((a, b) => DATA.order.findIndex(label => label.startsWith(a.name)) - DATA.order.findIndex(label => label.startsWith(b.name)));
+  const square = (line, scene) => {
+    const cell = line.cells.get(scene.scene), judged = cell && verdict(cell, limit);
+    const node = el("td", {class: `${cell ? `number ${judged} ${claimed(cell, judged) ? "claimed" : ""}` : "none"} ${ends.has(scene) ? "last" : ""}`, ...(cell ? {"data-key": cell.key, tabindex: "-1"} : {})});
+    node.cell = cell;
+    return node;
+  };
+  const table = el("table", {class: "matrix squares"}, el("thead", {}, el("tr", {}, el("th", {scope: "col"}, "solver (form)"),
+    ladders.map(({key, values}) => el("th", {scope: "col", colspan: values.length, title: key}, key)))),
+  el("tbody", {}, lines.map(line => el("tr", {}, el("th", {scope: "row"}, line.name), rungs.map(scene => square(line, scene))))));
+  table.querySelector("td[data-key]")?.setAttribute("tabindex", "0");
+  moves(table);
+  main.append(el("p", {class: "note"}, "A square per rung; each ladder grows harder to the right. Blue: correct; pale orange: wrong; dark orange: wrong, though reported as solved; "
+    + "grey: no answer; hatched: cannot be judged; white: not run. A click or Enter opens the row."), el("div", {class: "scroll"}, table));
 }

@@ -1,16 +1,25 @@
 // The banner, the views and their controls.
 const VIEWS = {
-  run: {matrix: ["Matrix", matrix], precision: ["Work and precision", precision], profiles: ["Performance profiles", profileView],
+  run: {...((DATA.scenes ?? []).some(scene => scene.ladder) ? {ladders: ["Ladders", ladderView]} : {}), matrix: ["Matrix", matrix], precision: ["Work and precision", precision], profiles: ["Performance profiles", profileView],
     solver: ["One solver", solverView], maps: ["Gap maps", mapView]},
   answer: {maps: ["Gap maps", mapView], answer: ["Answer", answerView]},
   series: {maps: ["Gap maps", mapView], curves: ["Exceedance", curveView]},
   compare: {compare: ["Comparison", compareView]},
 }[DATA.kind];
-const JUDGED = ["matrix", "precision", "profiles", "solver"];
+const JUDGED = ["ladders", "matrix", "precision", "profiles", "solver"];
 
 function banner() {
   const facts = DATA.banner, box = document.getElementById("banner"), warned = facts.warnings.length > 0;
   box.className = warned ? "warned" : "";
+  const answer = DATA.headline;
+  if (answer) {
+    const fasteners = DATA.fasteners ?? [];
+    box.before(el("section", {id: "headline", class: answer.kind}, el("p", {}, answer.text),
+      fasteners.length ? el("details", {open: fasteners.length <= 12}, el("summary", {}, `forces of ${fasteners.length} fasteners`), el("table", {},
+        el("thead", {}, el("tr", {}, ["kind", "contact", "x, mm", "y, mm", "force, N"].map((text, k) => el("th", {scope: "col", class: k > 1 ? "number" : ""}, text)))),
+        el("tbody", {}, fasteners.map(line => el("tr", {}, line.map((value, k) => el("td", {class: k > 1 ? "number" : ""}, k > 1 ? number(value, 5) : words(value)))))))) : ""));
+    if (!warned) document.getElementById("view").after(box); // first the answer, last the machine
+  }
   box.replaceChildren(
     el("p", {}, el("b", {}, facts.machines.join(" / ")), facts.counts ? ` · ${facts.counts}` : "", facts.measured ? ` · measured ${facts.measured}` : "",
       facts.commits ? ` · commit ${facts.commits}` : ""),

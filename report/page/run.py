@@ -97,7 +97,12 @@ def _banner(results: Results) -> Data:
     versions = rows[rows["solver_version"] != ""].groupby("solver")["solver_version"].unique()
     return banner(
         rows,
-        counts=f"{len(rows)} rows",
+        counts=f"{len(rows) + results.left_out} rows"
+        + (
+            f", {results.left_out} of them measured again or in search of a tolerance"
+            if results.left_out
+            else ""
+        ),
         versions=[f"{solver} {listed(sorted(found))}" for solver, found in versions.items()],
         warnings=warnings(results),
     )

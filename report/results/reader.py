@@ -38,6 +38,16 @@ class Results:
     suite: dict[str, Any] = field(default_factory=dict)
     machines: dict[str, dict[str, Any]] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    left_out: int = 0  # rows of equal measurements, and of tolerances tried in a search for one
+
+    @property
+    def title(self) -> str:
+        """The suite's, or of a run on one scene that scene's."""
+        scenes = self.rows["scene"].unique()
+        if len(scenes) == 1 and "title" in self.problems:
+            own = self.problems.loc[self.problems["scene"] == scenes[0], "title"].dropna()
+            return f"{scenes[0]}: {own.iloc[-1]}" if len(own) and own.iloc[-1] else str(scenes[0])
+        return str(self.suite.get("title") or "Results")
 
     @property
     def sizes(self) -> list[int]:
@@ -48,10 +58,6 @@ class Results:
         """The accuracy required, as text: '1e-7 mm'."""
         limits = sorted(self.rows["limit_asked_mm"].dropna().unique())
         return " / ".join(tidy_power(limit) for limit in limits or [1e-7]) + " mm"
-
-    def of_size(self, n: int) -> pd.DataFrame:
-        """The cells of one size without the forms that a solver does not take."""
-        return self.cells[(self.cells["n"] == n) & (self.cells["status"] != "unsupported")]
 
     def scene_arrays(self, scene: str) -> dict[str, NDArray[np.float64]] | None:
         """The arrays of a scene's file; empty if it is damaged, None without a file or contact nodes."""
@@ -86,7 +92,9 @@ class Results:
     def cells_by_threads(self) -> pd.DataFrame:
         """All cells, their names without the number of threads: for tables with a column for it."""
         counts = sorted(self.rows["threads"].dropna().unique())
-        return pd.concat([self.of_threads(count).cells for count in counts], ignore_index=True)
+        return pd.concat(
+            [self.cells.iloc[:0], *(self.of_threads(k).cells for k in counts)], ignore_index=True
+        )
 
     def by_machine(self) -> list[Results]:
         """The results of each machine, so that no table or mean can mix two of them."""
@@ -111,7 +119,8 @@ def read(directory: Path) -> Results:
     facts = [_loaded(file, json.loads, more) for file in sorted(directory.glob("machine*.json"))]
     machines = {str(fact.get("machine", "")): fact for fact in facts}
     rows = frame(records, problems, suite)
-    return Results(directory, rows, cells_of(rows), problems, suite, machines, (*warnings, *more))
+    left_out = len(records) - len(rows)
+    return Results(directory, rows, cells_of(rows), problems, suite, machines, (*warnings, *more), left_out)
 
 
 def _loaded(path: Path, parse: Callable[[str], Any], warnings: list[str]) -> dict[str, Any]:

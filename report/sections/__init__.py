@@ -1,7 +1,58 @@
-"""The sections of the report, one per file, found by discovery.
+"""The sections of the report in their order.
 
-To add one, write a file with
-
-    PLACE = Place(345)                                      # where it stands, and what it is about
-    def section(results: Results) -> Section | None: ...    # None if the results have nothing for it
+A section is a function from results to tables and the charts of them, or None if the results have nothing
+for it. To add one, write the function and name it here, after the results that it is given: those on the
+rungs of ladders, on scenes drawn at random, on all other scenes, or all.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+from report.document.blocks import Section
+from report.results.reader import Results
+
+from . import (
+    accuracy,
+    details,
+    drawn,
+    gap_map,
+    ladders,
+    machine,
+    methods,
+    outside,
+    problems,
+    series,
+    speed,
+    summary,
+)
+
+About = Literal["scenes", "ladders", "drawn", "all"]
+
+SECTIONS: list[tuple[About, Callable[[Results], Section | None]]] = [
+    ("ladders", ladders.section),
+    ("ladders", ladders.rungs),
+    ("drawn", drawn.section),
+    ("scenes", outside.section),
+    ("scenes", summary.advice),
+    ("scenes", summary.summary),
+    ("scenes", speed.from_scene),
+    ("scenes", speed.steps),
+    ("scenes", speed.relative),
+    ("scenes", speed.contacts),
+    ("scenes", speed.machine),
+    ("scenes", speed.variants),
+    ("scenes", speed.scaling),
+    ("scenes", methods.section),
+    ("scenes", series.section),
+    ("scenes", speed.profiles),
+    ("scenes", accuracy.costs),
+    ("scenes", accuracy.tolerances),
+    ("scenes", accuracy.residuals),
+    ("scenes", accuracy.repeats),
+    ("scenes", problems.section),
+    ("scenes", gap_map.section),
+    ("scenes", details.section),
+    ("all", machine.section),
+]

@@ -9,13 +9,11 @@ from urllib.parse import urlencode
 import pandas as pd
 
 from harness.results.schema import VERDICTS
-from report.document.blocks import Block, Column, Place, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Section, Table, Text, number, word
 from report.document.contents import scene_anchor
 from report.document.escape import file_name, plain
 from report.document.numbers import MISSING, power, significant, whole
 from report.results.reader import Results
-
-PLACE = Place(420)
 
 FIGURES = [
     *("scene", "n", "m", "active", "solver", "form", "variant", "tolerance", "threads", "repeats"),
@@ -31,13 +29,7 @@ MARKS = {"within": "✓ within", "outside": "✗ outside", "cannot_be_judged": "
 def section(results: Results) -> Section | None:
     if results.cells.empty:
         return None
-    blocks: list[Block] = [
-        Text(
-            "One table per scene: answers within the limit first, then by total time; its CSV has the "
-            "seconds of each step; a verdict leads to the row on the page, with the command that measures "
-            "it again. The last section explains the columns."
-        )
-    ]
+    blocks: list[Block] = []
     for n in [*results.sizes, None]:
         of_size = results.cells[results.cells["n"].isna() if n is None else results.cells["n"] == n]
         if len(of_size):

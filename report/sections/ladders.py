@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.results.schema import LADDERS
 from report.analysis.outcomes import (
     CORRECT,
     CORRECT_UNCLAIMED,
@@ -17,16 +18,14 @@ from report.analysis.outcomes import (
     is_correct,
     with_outcomes,
 )
-from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, word
-from report.document.numbers import MISSING, counted, listed, power, whole
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.numbers import MISSING, as_number, counted, power, whole
 from report.figures.ladder_map import ladder_map
 from report.results.labels import in_order
 from report.results.reader import Results
 
-PLACE = Place(10, "ladders")
-
+OUTCOMES = (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, WRONG_CLAIMED, NO_ANSWER, UNJUDGED)
 NOT_RUN = "not run"
-CONDITION = 1e12  # of K: up to it the in-house solvers are required to be correct
 
 
 def section(results: Results) -> Section | None:
@@ -36,19 +35,13 @@ def section(results: Results) -> Section | None:
     order = in_order(cells)
     ladders = rungs_in_order(results, cells)
     blocks: list[Block] = [
-        Text(f"{in_house(results, cells)} {libraries(cells)}".strip()),
+        Text(claims(cells)),
         Figure(
             "ladders",
-            "*Every solver on every rung; each ladder grows harder to the right.* Dark: correct and reported "
-            "as solved; pale: correct, but not reported as solved; hatched: wrong, and not reported as "
-            "solved; red: wrong, but reported as solved; –: no answer; empty: not run. A k in a wrong "
-            "answer: its error is up to 10ᵏ times the limit, ∞ beyond 10⁹⁹. A rung whose limit is wider than "
-            f"{results.limit} has it below the figure.",
+            "*Every solver on every rung; each ladder grows harder to the right.* A number k in a wrong "
+            "answer: its error is up to 10ᵏ times the limit max(1e-7 mm, 100 cond(K) 2⁻⁵³ max|x*|), what "
+            "conditioning allows in float64; ∞: beyond 10⁹⁹. Empty: not run.",
             ladder_map(cells, order, ladders),
-        ),
-        Text(
-            "An answer on a rung is correct if its error is at most max(1e-7 mm, 100 cond(K) 2⁻⁵³ max|x*|): "
-            "what conditioning allows a solver that works in float64."
         ),
         honesty(cells, order),
         breaking_points(cells, order, ladders),
@@ -66,94 +59,117 @@ def rungs_in_order(results: Results, cells: pd.DataFrame) -> dict[str, list[str]
     return ladders
 
 
-def in_house(results: Results, cells: pd.DataFrame) -> str:
-    """Whether the in-house solvers meet their requirements."""
-    own = cells[cells["in_house"]]
-    if own.empty or not {"scene", "cond_K"} <= set(results.problems):
-        return ""
-    known = results.problems.drop_duplicates("scene", keep="last").set_index("scene")["cond_K"]
-    asked = own[own["scene"].map(known) <= CONDITION * (1 + 1e-6)]
-    wrong = int((own["outcome"] == WRONG_CLAIMED).sum())
-    missed = asked.loc[~is_correct(asked), "solver"].value_counts()
-    named = [f"{name} ({count})" for name, count in missed.items()]
-    others = f", the others being of {listed(named)}" if named else ""
-    return (
-        f"The in-house solvers are correct in {len(asked) - missed.sum()} of "
-        f"{counted(len(asked), 'row')} up to cond(K) = 1e12{others}; "
-        f"in all their {counted(len(own), 'row')}, "
-        f"{wrong or 'no'} wrong {'answers are' if wrong > 1 else 'answer is'} reported as solved."
-    )
-
-
-def libraries(cells: pd.DataFrame) -> str:
-    """How often a library says solved of a wrong answer."""
-    others = cells[~cells["in_house"]]
-    if others.empty:
-        return ""
-    wrong = int((others["outcome"] == WRONG_CLAIMED).sum())
-    return (
-        f"Of {counted(len(others), 'row')} of the libraries, {wrong or 'no'} "
-        f"wrong {'answer is' if wrong == 1 else 'answers are'} reported as solved."
-    )
+def claims(cells: pd.DataFrame) -> str:
+    """How often a wrong answer is reported as solved."""
+    wrong = cells["outcome"] == WRONG_CLAIMED
+    counts = [
+        f"{int(wrong[ours].sum())} of {counted(int(ours.sum()), 'row')} of {whose}"
+        for whose, ours in (
+            ("the in-house solvers", cells["in_house"]),
+            ("the libraries", ~cells["in_house"]),
+        )
+    ]
+    return f"Wrong answers reported as solved: {' and '.join(counts)}."
 
 
 def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
-    records = []
+    lines = []
     for label in order:
-        line = cells[cells["label"] == label]
-        share = line["displacement_error_mm"] / line["limit_mm"]
-        counts = line["outcome"].value_counts()
-        record: dict[str, Any] = {"label": label, "rungs": len(line)}
-        record |= {
-            name: int(counts.get(name, 0))
-            for name in (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, WRONG_CLAIMED, NO_ANSWER, UNJUDGED)
-        }
-        solved = line["status"] == "solved"
-        record["worst_share"] = share[solved].max()
-        record["backward_error"] = line.loc[solved, "backward_error"].median()
-        record["where"] = ", ".join(_short(line[line["outcome"] == WRONG_CLAIMED]))
-        records.append(record)
+        mine = cells[cells["label"] == label]
+        line: dict[str, Any] = {"label": label, "rungs": len(mine)}
+        line |= {name: int((mine["outcome"] == name).sum()) for name in OUTCOMES}
+        solved = mine[mine["status"] == "solved"]
+        line["worst_share"] = (solved["displacement_error_mm"] / solved["limit_mm"]).max()
+        line["backward_error"] = solved["backward_error"].median()
+        wrong = mine.loc[mine["outcome"] == WRONG_CLAIMED, "scene"]
+        lines.append(line | {"where": ", ".join(scene.split("/", 1)[1] for scene in wrong)})
     columns = [word("solver (form)", "label"), number("rungs", "rungs", whole)]
     columns += [
         number(name, name, whole) for name in (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, NO_ANSWER)
     ]
     columns.append(Column("**wrong, reported solved**", _bold(WRONG_CLAIMED)))
-    columns += [
-        number("largest error / limit, reported solved", "worst_share", power),
-    ]
+    columns.append(number("largest error / limit, reported solved", "worst_share", power))
     caption = "*Wrong answers reported as solved* are the worst outcome."
-    return Table("honesty", caption, pd.DataFrame(records), columns)
+    return Table("honesty", caption, pd.DataFrame(lines), columns)
 
 
 def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Table:
-    records = []
+    lines = []
     for label in order:
-        line = cells[cells["label"] == label]
-        record = {"label": label}
-        for ladder, rungs in ladders.items():
-            record[ladder] = _first_broken(line[line["ladder"] == ladder], rungs)
-        records.append(record)
+        mine = cells[cells["label"] == label]
+        broken = {
+            ladder: _first_broken(mine[mine["ladder"] == ladder], rungs) for ladder, rungs in ladders.items()
+        }
+        lines.append({"label": label} | broken)
     columns = [word("solver (form)", "label"), *(word(ladder, ladder) for ladder in ladders)]
     caption = (
         "*Breaking points: the first rung of each ladder without a correct answer.* ×: reported as solved. "
         f"{MISSING}: correct on every rung that was run."
     )
-    return Table("breaking-points", caption, pd.DataFrame(records), columns)
+    return Table("breaking-points", caption, pd.DataFrame(lines), columns)
 
 
 def _first_broken(line: pd.DataFrame, rungs: list[str]) -> str:
     if line.empty:
         return NOT_RUN
     broken = line[~is_correct(line)].set_index("rung")["outcome"]
-    for rung in rungs:
-        if rung in broken:
-            return f"{rung} ×" if broken[rung] == WRONG_CLAIMED else rung
-    return MISSING
-
-
-def _short(line: pd.DataFrame) -> list[str]:
-    return [scene.split("/", 1)[1] for scene in line["scene"]]
+    first = next((rung for rung in rungs if rung in broken), MISSING)
+    return f"{first} ×" if broken.get(first) == WRONG_CLAIMED else first
 
 
 def _bold(name: str) -> Callable[[Mapping[str, Any]], str]:
     return lambda row: f"**{row[name]}**" if row[name] else "0"
+
+
+def rungs(results: Results) -> Section | None:
+    """The rungs themselves, the measurements without a correct answer, and what the model rejects."""
+    if results.cells.empty or "scene" not in results.problems:
+        return None
+    known = results.problems[results.problems["scene"].str.startswith(LADDERS)]
+    known = known.drop_duplicates("scene", keep="last").reset_index(drop=True)
+    limits = results.rows.groupby("scene")["limit_mm"].max()
+    names = ("n", "m", "active", "cond_K", "reference_bound_mm")
+    taken = known[known["scene"].isin(limits.index)].reindex(columns=["scene", "title", *names])
+    taken = taken.assign(**{name: taken[name].map(as_number).astype(float) for name in names})
+    taken["limit_mm"] = taken["scene"].map(limits)
+    columns = [word("rung", "scene"), word("description", "title")]
+    columns += [number(name, name, whole) for name in ("n", "m", "active")]
+    columns += [
+        number("cond(K)", "cond_K", power),
+        number("limit, mm", "limit_mm", power),
+        number("reference error bound, mm", "reference_bound_mm", power),
+    ]
+    blocks: list[Block] = [
+        Table("rungs", "*The measured rungs.* Bound 0: the reference is exact.", taken, columns)
+    ]
+    broken = with_outcomes(results.cells).query("verdict != 'within'").sort_values(["scene", "label"])
+    if len(broken):
+        figures = ("displacement_error_mm", "limit_mm", "backward_error")
+        kept = [
+            "label",
+            "scene",
+            "status",
+            "verdict",
+            "outcome",
+            *figures,
+            "iterations",
+            "solve_s",
+            "message",
+        ]
+        columns = [word("rung", "scene"), word("solver (form)", "label"), word("status", "status")]
+        columns += [
+            number(name, key, power)
+            for name, key in zip(("error, mm", "limit, mm", "backward error"), figures, strict=True)
+        ]
+        blocks.append(
+            Table("rungs-broken", "*Every measurement without a correct answer.*", broken[kept], columns)
+        )
+    if "refused" in known and known["refused"].notna().any():
+        refused = known.loc[known["refused"].notna(), ["scene", "title", "refused"]]
+        refused = refused.replace({"refused": {"": "**accepted, although the model does not cover it**"}})
+        columns = [word("rung", "scene"), word("description", "title"), word("error message", "refused")]
+        caption = (
+            "*What the model rejects, as it should*: a clear error rather than a plausible wrong answer."
+        )
+        blocks.append(Table("rungs-refused", caption, refused, columns))
+    return Section("The rungs", blocks)

@@ -8,12 +8,11 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.seconds import seconds_text
-from report.document.blocks import Block, Column, Place, Section, Table, Text, records, word
-from report.document.numbers import counted, listed, significant, span, whole
+from report.analysis.standings import best_tolerances
+from report.document.blocks import Column, Section, Table, records, word
+from report.document.numbers import whole
 from report.results.labels import in_order
 from report.results.reader import Results
-
-PLACE = Place(145)
 
 CAPTION = (
     "*Time and products with Q*: seconds per load case, and in brackets the products with Q per load case, "
@@ -28,30 +27,17 @@ def section(results: Results) -> Section | None:
     cells = cells.assign(products=[_products(cell.get("details")) for cell in records(cells)])
     if cells.loc[cells["products"].notna(), "solver"].nunique() < 2:
         return None
-    cells = _of_best_tolerance(cells)
+    cells = best_tolerances(cells)
     scenes = list(cells.sort_values(["n", "active"])["scene"].unique())
     lines = [_line(cells[cells["method"] == method]) for method in in_order(cells, "method")]
     columns = [word("method", "method"), *(Column(scene, _shown(scene)) for scene in scenes)]
-    blocks: list[Block] = [
-        Text(_advice(cells, scenes)),
-        Table("methods", CAPTION, pd.DataFrame(lines), columns),
-    ]
-    return Section("Methods for contact problems", blocks)
+    table = Table("methods", CAPTION, pd.DataFrame(lines), columns)
+    return Section("Methods for contact problems", [table])
 
 
 def _products(details: object) -> float:
     found = details.get("products") if isinstance(details, Mapping) else None
     return float("nan") if found is None else float(found)
-
-
-def _of_best_tolerance(cells: pd.DataFrame) -> pd.DataFrame:
-    """One cell for each method and scene: of its tolerances the fastest within the limit, else the least
-    wrong.
-    """
-    within = cells["verdict"] == "within"
-    keys = {"missed": ~within, "error": cells["displacement_error_mm"].mask(within, 0)}
-    ranked = cells.assign(**keys).sort_values(["missed", "error", "load_case_s"], kind="stable")
-    return cells.loc[ranked.drop_duplicates(["method", "scene"]).index.sort_values()]
 
 
 def _line(cells: pd.DataFrame) -> dict[str, Any]:
@@ -70,37 +56,3 @@ def _shown(scene: str) -> Callable[[Mapping[str, Any]], str]:
         return seconds + (f" ({whole(products)})" if products == products else "")
 
     return text
-
-
-def _advice(cells: pd.DataFrame, scenes: list[str]) -> str:
-    """Which method is the fastest, and which makes the fewest products; which are not accurate enough."""
-    within = cells[cells["verdict"] == "within"]
-    on_all = within.groupby("method")["scene"].nunique() == len(scenes)
-    complete = within[within["method"].map(on_all)]
-    words = []
-    if len(complete):
-        fastest = complete.loc[complete.groupby("scene")["load_case_s"].idxmin(), "method"].value_counts()
-        wins = [
-            f"**{name}** on {count} of {counted(len(scenes), 'scene')}" for name, count in fastest.items()
-        ]
-        words.append(
-            f"Of the methods within the limit on every scene, the fastest per load case: {listed(wins)}."
-        )
-        least = complete.groupby("method")["products"].agg(["count", "min", "max"])
-        least = least[least["count"] == len(scenes)].sort_values("max")
-        if len(least):
-            few, many = whole(least["min"].iloc[0]), whole(least["max"].iloc[0])
-            words.append(
-                f"Of products with Q, the fewest: **{least.index[0]}**, {span(few, many)} per load case."
-            )
-    missed = cells[cells["verdict"] != "within"].groupby("method", sort=False)
-    if len(missed):
-        named = [f"{name} ({_worst(group)})" for name, group in missed]
-        words.append(f"Not within the limit on every scene they were tried on: {listed(named)}.")
-    return " ".join(words)
-
-
-def _worst(cells: pd.DataFrame) -> str:
-    """How far off, or that there was no answer."""
-    error = cells["displacement_error_mm"].max()
-    return "no answer" if pd.isna(error) else f"off by up to {significant(error, 2)} mm"

@@ -9,11 +9,9 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.seconds import seconds_text
-from report.document.blocks import Block, Column, Place, Section, Table, Text, number, records, word
-from report.document.numbers import MISSING, counted, power, significant, whole
+from report.document.blocks import Column, Section, Table, number, records, word
+from report.document.numbers import MISSING, power, significant, whole
 from report.results.reader import Results
-
-PLACE = Place(100)
 
 PREFIX = "outside/"
 DIGITS = 9  # of an objective as shown
@@ -27,17 +25,7 @@ def section(results: Results) -> Section | None:
         return None
     best = answered.sort_values("displacement_error_mm").drop_duplicates("scene")
     tables = [_printed(best, results.problems), _refined(best)]
-    blocks: list[Block] = [Text(_sentence(cells, best)), *(table for table in tables if table)]
-    return Section("Problems from outside", blocks)
-
-
-def _sentence(cells: pd.DataFrame, best: pd.DataFrame) -> str:
-    scenes = cells["scene"].nunique()
-    return (
-        f"Of {counted(scenes, 'scene')} generated from formulas in the literature, "
-        f"{len(best)} have an answer within the limit. The objective ½xᵀKx − fᵀx is that of the answer with "
-        "the smallest error."
-    )
+    return Section("Problems from outside", [table for table in tables if table])
 
 
 def _printed(best: pd.DataFrame, problems: pd.DataFrame) -> Table | None:

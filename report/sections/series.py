@@ -7,25 +7,14 @@ from typing import Any
 import pandas as pd
 
 from harness.results.schema import ANSWERED
-from report.document.blocks import Column, Place, Section, Table, Text, number, word
+from report.document.blocks import Column, Section, Table, number, word
 from report.document.numbers import power, spread, whole
 from report.results.labels import named
 from report.results.reader import Results
 from report.results.rows import CELL
 
-PLACE = Place(170)
-
 CASE = ["setup_s", "solve_s", "form_s"]
 ROUND = ["scene", "threads"]
-
-#: What each library offers for the next load case with the same matrices.
-REPEATED = {
-    "piqp": "PIQP `update` of the vectors, no warm start",
-    "proxqp": "ProxQP `update` and a warm start (in the dual form from the previous case, since it "
-    "accepts no multipliers of bounds)",
-    "clarabel": "Clarabel `update` of the vectors, no warm start",
-    "osqp": "OSQP `update` and `warm_start` from the nearest case",
-}
 
 
 def section(results: Results) -> Section | None:
@@ -47,14 +36,11 @@ def section(results: Results) -> Section | None:
         Column("time relative to the fastest library", spread("to_library")),
     ]
     caption = (
-        "*Series: load cases on one assembly, in one process.* *Per case*: update, solve and form, the "
-        "median over the cases after the first (if batched, after the first batch). *Per assembly*: "
-        "convert and prepare. The CSV has the first case, too. *Relative to the fastest library*: the time "
-        "of these cases over the median of the fastest library on the scene with as many threads, by its "
-        "update or, if that is faster, from the start as in its first case; the median, and in brackets the "
-        "range; 0.1 is ten times as fast. Only answers within the limit count."
+        "*Load cases on one assembly, in one process*: the median over the cases after the first (of "
+        "batches: after the first batch); relative to the fastest library, by its update or from the start, "
+        "the median (range)."
     )
-    return Section("Series of load cases", [Text(_ways(rows)), Table("series", caption, lines, columns)])
+    return Section("Series of load cases", [Table("series", caption, lines, columns, keys=3)])
 
 
 def compared(rows: pd.DataFrame) -> pd.DataFrame:
@@ -89,16 +75,3 @@ def _line(group: pd.DataFrame) -> dict[str, Any]:
     }
     line |= {"to_library": group["to_library"].median(), "to_library_least": group["to_library"].min()}
     return line | {"to_library_most": group["to_library"].max()}
-
-
-def _ways(rows: pd.DataFrame) -> str:
-    """How the solvers proceed from one case to the next."""
-    seen = [way for solver, way in REPEATED.items() if (rows["solver"] == solver).any()]
-    words = "Each solver takes one load case after another, each in its own way"
-    words += f": {'; '.join(seen)}." if seen else "."
-    if rows["batched"].notna().any():
-        words += (
-            " *Batched*: given many load cases at once, whose time is divided equally among them; all others "
-            "are given one load case at a time."
-        )
-    return words

@@ -1,34 +1,74 @@
-"""The summary: which solvers are within the limit, how fast they are, and which one to use."""
+"""Which solver to use, and the standing of every solver."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from report.analysis.advice import advice
-from report.analysis.drawn import omission_note, rare_variants
-from report.analysis.precision import CURVE_POINTS
-from report.analysis.standings import TIE, compare, standings
-from report.document.blocks import Block, Column, Figure, Place, Section, Table, Text, number, word
-from report.document.numbers import counted, listed, power, whole
-from report.figures.scoreboard import scoreboard
+import pandas as pd
+
+from report.analysis.precision import ACCURACIES, swept
+from report.analysis.roads import roads
+from report.analysis.standings import best_tolerances, recommended, shown, standings
+from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.document.numbers import MISSING, power, significant, tidy_power, whole
+from report.figures.scoreboard import explained, scoreboard
 from report.results.reader import Results
 
-PLACE = Place(110)
+EACH, PREPARED, FROM_SCENE = "each load case", "one, with preparation", "one, from the scene on"
 
 
-def section(results: Results) -> Section | None:
-    table = standings(results)
+def advice(results: Results) -> Section | None:
+    """The fastest line within the limit on every scene of a size, by three ways of counting seconds and,
+    after a sweep over tolerances, for other accuracies.
+    """
+    cells = results.cells[results.cells["status"] != "unsupported"]
+    if not cells.groupby("n")["method"].nunique().max() >= 2:
+        return None
+    ways = roads(results)
+    counted = [(EACH, cells, "load_case_s"), (PREPARED, cells, "total_s"), (FROM_SCENE, ways, "total_1_s")]
+    lines, sweep = [], swept(results)
+    for n in results.sizes:
+        limit = cells.loc[cells["n"] == n, "limit_mm"].max()
+        for what, among, seconds in counted:
+            if len(of_size := among[among["n"] == n]):
+                line = recommended(of_size, None, seconds)
+                lines.append(line | {"accuracy_mm": limit, "seconds of": what})
+        of_size = sweep[sweep["n"] == n]
+        for accuracy_mm in ACCURACIES if len(of_size) else ():
+            if accuracy_mm != limit:
+                lines.append(recommended(of_size, accuracy_mm) | {"seconds of": EACH})
+    columns = [
+        number("n", "n", whole),
+        number("error ≤, mm", "accuracy_mm", tidy_power),
+        word("seconds of", "seconds of"),
+        word("use", "use"),
+        number("s", "seconds"),
+        Column("next (times as long)", lambda line: _other(line, "next"), "left"),
+        Column("fastest library", lambda line: _other(line, "library"), "left"),
+    ]
+    caption = (
+        "*The fastest solver whose error is small enough on every scene of that size*, by the geometric "
+        "mean of its seconds over the scenes."
+    )
+    return Section("Which solver to use", [Table("advice", caption, pd.DataFrame(lines), columns)])
+
+
+def _other(line: Mapping[str, Any], name: str) -> str:
+    times = line[f"to_{name}"]
+    if times is None or times != times:
+        return MISSING
+    return "the same" if line[name] == line["use"] else f"{line[name]} ({significant(times, 2)} ×)"
+
+
+def summary(results: Results) -> Section | None:
+    table = standings(results.cells)
     if table.empty:
         return None
-    several = table.groupby("method")["label"].transform("size") >= CURVE_POINTS
-    table = table[~(several & table["method"].duplicated())]
-    limit = results.limit
-    rare = rare_variants(results)["label"]
-    comparisons = [compare(results, n) for n in results.sizes]
+    limit, drawn = results.limit, shown(best_tolerances(results.cells))
     columns = [
-        word("solver (form)", "label"),
-        Column(f"within {limit}", lambda row: f"{row['within']} of {row['scenes']}"),
+        word("solver (form)", "method"),
+        Column(f"within {limit}", lambda line: f"{line['within']} of {line['scenes']}"),
         Column("outside", _outside),
         Column("no answer", _no_answer),
     ]
@@ -36,35 +76,14 @@ def section(results: Results) -> Section | None:
         columns.append(number("cannot be judged", "cannot_be_judged", whole))
     columns.append(number("worst error, mm", "worst_error_mm", power))
     columns += [number(f"s per load case, n = {n}", f"load_case_s_{n}") for n in results.sizes]
-
-    compared = [
-        f"n = {c.n}: {len(c.common)} of {counted(len(c.scenes), 'scene')}" for c in comparisons if c.seconds
-    ]
-    means = (
-        "Seconds per load case (set-up + solve + form) are geometric means over the scenes that every "
-        "compared line answered within the limit "
-        f"({'; '.join(compared) or 'there is none'}). Compared are the lines within the limit on more than "
-        "half of the scenes of a size; the others show –. Failures are counted, but enter no mean."
+    blocks: list[Block] = []
+    if len(drawn):
+        blocks.append(Figure("summary", explained(drawn, table, limit), scoreboard(drawn, table)))
+    caption = (
+        "*Answers within the limit, then time*, with the best tolerance on each scene. Seconds are "
+        "geometric means of the methods within the limit on every scene of the size."
     )
-    if several.any():
-        means += f" Of {CURVE_POINTS} or more tolerances of a solver, the best; the tables by scene have all."
-    blocks: list[Block] = [
-        Text("### The fastest of these solvers"),
-        Text(advice(results)),
-        Text(_small_print(results)),
-        Figure(
-            "summary",
-            f"*Every solver on every scene, the best first.* Blue: within {limit}, seconds per load case; "
-            "the darker, the closer to the fastest on the scene (palest: 100 times as long). Hatched: "
-            "outside the limit, with the error in mm. Grey: no answer, and why (not run: predicted to exceed "
-            "the time limit, from a looser tolerance or from every scene of the next smaller size). Empty: "
-            "not in the plan. On the right, the number of scenes within the limit." + omission_note(results),
-            scoreboard(results.cells, table[~table["label"].isin(rare)]),
-        ),
-        Text("### Answers within the limit, then time"),
-        Table("summary", means, table, columns),
-    ]
-    return Section("Summary", blocks)
+    return Section("Summary", [*blocks, Table("summary", caption, table, columns)])
 
 
 def _outside(row: Mapping[str, Any]) -> str:
@@ -74,12 +93,3 @@ def _outside(row: Mapping[str, Any]) -> str:
 
 def _no_answer(row: Mapping[str, Any]) -> str:
     return f"{row['no_answer']} ({row['no_answer_because']})" if row["no_answer"] else "0"
-
-
-def _small_print(results: Results) -> str:
-    repeats = int(results.cells["repeats"].max())
-    runs = "Each time is one run" if repeats == 1 else f"Times are medians of up to {repeats} runs"
-    unsupported = sorted(results.cells.loc[results.cells["status"] == "unsupported", "label"].unique())
-    omitted = f" Form not taken by the solver: {listed(unsupported)}." if unsupported else ""
-    apart = f"less than {TIE - 1:.0%} apart, or than their own repeats differ by,"
-    return f"{runs}; lines {apart} count as equally fast.{omitted}"

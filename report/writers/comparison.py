@@ -9,16 +9,14 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.comparison import ADDED, BETTER, CHANGED, SAME, WORSE
-from report.analysis.solver_changes import by_solver
+from report.analysis.comparison import ADDED, BETTER, CHANGED, SAME, WORSE, by_solver
 from report.document.blocks import Block, Column, Section, Table, Text, number, word
 from report.document.escape import csv_frame
 from report.document.numbers import MISSING, as_number, counted, power, significant, whole
 from report.page.comparison import comparison_data
 from report.page.write import write as write_page
 
-from .markdown import save_block
-from .pages import rendered
+from .pages import written
 
 
 @dataclass(frozen=True)
@@ -104,32 +102,25 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
     """Write the comparisons with one older run into the folder `out`, and return the path of the page."""
     out.mkdir(parents=True, exist_ok=True)
     sections = [Section("How to read this", [Text(NOTE)])]
-    for place, comparison in enumerate(comparisons, start=1):
-        prefix = f"{place}-" if len(comparisons) > 1 else ""
-        blocks = [save_block(block, out, prefix) for block in _blocks(comparison)]
-        sections.append(Section(f"{comparison.old} → {comparison.new}", blocks))
-    every = [each.table.assign(old=each.old, new=each.new) for each in comparisons]
-    csv_frame(pd.concat(every, ignore_index=True).drop(columns="kind")).to_csv(
-        out / "comparison.csv", index=False
-    )
-    path = out / "comparison.md"
+    for place, each in enumerate(comparisons, start=1):
+        blocks = _blocks(each.table, each.summary, f"{place}-" if len(comparisons) > 1 else "")
+        sections.append(Section(f"{each.old} → {each.new}", blocks))
+    every = pd.concat([each.table.assign(old=each.old, new=each.new) for each in comparisons])
+    csv_frame(every.drop(columns="kind")).to_csv(out / "comparison.csv", index=False)
     title = f"Compared with {comparisons[0].old}"
-    path.write_text(rendered("sections.md.j2", title=title, sections=sections, csv=False), "utf-8")
     pairs = [(each.old, each.new, each.summary, each.table) for each in comparisons]
-    write_page(
-        out / "index.html", title, comparison_data(pairs, pd.concat([each.rows for each in comparisons]))
-    )
-    return path
+    rows = pd.concat([each.rows for each in comparisons])
+    write_page(out / "index.html", title, comparison_data(pairs, rows))
+    return written(out / "comparison.md", title, sections)
 
 
-def _blocks(comparison: Comparison) -> list[Block]:
-    table = comparison.table
-    blocks: list[Block] = [Text(f"{comparison.summary} Every measurement: [comparison.csv](comparison.csv).")]
+def _blocks(table: pd.DataFrame, summary: str, prefix: str) -> list[Block]:
+    blocks: list[Block] = [Text(f"{summary} Every measurement: [comparison.csv](comparison.csv).")]
     for name, caption, kinds in GROUPS:
-        lines = table[table["kind"].isin(kinds)]
+        lines = table[table["kind"].isin(kinds)].drop(columns="kind")
         if len(lines):
-            blocks.append(Table(name, caption, lines.drop(columns="kind"), COLUMNS))
+            blocks.append(Table(prefix + name, caption, lines, COLUMNS))
     solvers = by_solver(table)
     if len(solvers):
-        blocks.append(Table("solvers", "*Solver by solver.*", solvers, SOLVERS))
+        blocks.append(Table(f"{prefix}solvers", "*Solver by solver.*", solvers, SOLVERS))
     return blocks

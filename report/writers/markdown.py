@@ -6,16 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from report.analysis.checks import warnings
-from report.document.blocks import Block, Figure, Section, Table
+from report.document.blocks import Block, Section, Text
 from report.document.contents import contents
-from report.document.escape import csv_frame, picture
+from report.document.escape import wrapped
 from report.figures import style
 from report.page.run import run_data
 from report.page.write import write as write_page
 from report.results.reader import Results, read
+from report.sections import SECTIONS
 
-from .discovery import sections
-from .pages import rendered
+from .pages import emptied, written
 
 LONG = 4  # sections, from which a report begins with links to them
 
@@ -28,43 +28,36 @@ def write(directory: Path) -> Path:
     Raises FileNotFoundError if DIRECTORY has no measurements.jsonl.
     """
     results = read(directory)
-    target = directory / "report"
-    target.mkdir(exist_ok=True)
-    for stale in [*target.glob("*.png"), *target.glob("*.csv")]:
-        stale.unlink()
-    parts = []
+    target, machines = emptied(directory / "report"), results.by_machine()
     with style.applied():
-        for i, part in enumerate(results.by_machine()):
-            parts.append((part, [_save(section, target, i) for section in _made(part)]))
-    path = target / "report.md"
-    titles = [section.title for _, made in parts for section in made]
-    links = contents(titles) if len(titles) >= LONG else ""
-    page = rendered("report.md.j2", results=results, parts=parts, warnings=warnings(results), contents=links)
-    path.write_text(page, "utf-8")
-    title = str(results.suite.get("title") or "Results")
-    write_page(target / "index.html", title, run_data(results), directory)
-    return path
+        sections = [
+            section for k, part in enumerate(machines) for section in _made(part, k if machines[1:] else None)
+        ]
+    intro = [wrapped(str(results.suite.get("description", "")))]
+    intro += [f"> **Warning.** {warning}" for warning in warnings(results)]
+    if results.rows.empty:
+        intro.append("Nothing was measured: `measurements.jsonl` holds no row.")
+    if len(sections) >= LONG:
+        intro.append(f"Contents: {contents([section.title for section in sections])}")
+    write_page(target / "index.html", results.title, run_data(results), directory)
+    return written(target / "report.md", results.title, sections, [text for text in intro if text])
 
 
-def _made(results: Results) -> list[Section]:
-    """The sections that have something to say of the results, in their order."""
-    made = [module.section(results.about(module.PLACE.about)) for module in sections()]
-    return [section for section in made if section]
-
-
-def _save(section: Section, target: Path, machine: int) -> Section:
-    """Write the section's files; from the second machine on, their names begin with its number."""
+def _made(results: Results, machine: int | None) -> list[Section]:
+    """The sections that have something to say of the results. machine : its place, if there are several; it
+    is in the titles, and from the second on in the names of files.
+    """
+    parts = {about: results.about(about) for about, _ in SECTIONS}
+    made = [section for about, of in SECTIONS if len(parts[about].rows) and (section := of(parts[about]))]
+    if machine is None:
+        return made
+    name = results.rows["machine"].iloc[0] or "machine not recorded"
     prefix = f"machine{machine + 1}-" if machine else ""
-    return replace(section, blocks=[save_block(block, target, prefix) for block in section.blocks])
+    return [
+        Section(f"{section.title}: {name}", [_renamed(each, prefix) for each in section.blocks])
+        for section in made
+    ]
 
 
-def save_block(block: Block, target: Path, prefix: str = "") -> Block:
-    """Write a table's CSV or a figure's PNG; returns the block with the name of its file."""
-    match block:
-        case Table():
-            block = replace(block, name=prefix + block.name)
-            csv_frame(block.data).to_csv(target / f"{block.name}.csv", index=False)
-        case Figure():
-            block = replace(block, name=prefix + block.name)
-            picture(block.drawing).savefig(target / f"{block.name}.png", dpi=style.DPI)
-    return block
+def _renamed(block: Block, prefix: str) -> Block:
+    return block if isinstance(block, Text) else replace(block, name=prefix + block.name)

@@ -1,24 +1,49 @@
-"""The templates of the pages."""
+"""The writer of every report: Markdown from sections, with a PNG per figure and a CSV per table beside it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import jinja2
 
-from report.document.escape import markdown, short, wrapped
+from report.document.blocks import Figure, Section, Table
+from report.document.escape import csv_frame, markdown, picture, short
 from report.document.numbers import significant
+from report.figures import style
+
+
+def written(path: Path, title: str, sections: Sequence[Section], intro: Sequence[str] = ()) -> Path:
+    """Write PATH and the files of its tables and figures; returns PATH. intro : paragraphs below the
+    title.
+    """
+    with style.applied():
+        for block in [block for section in sections for block in section.blocks]:
+            if isinstance(block, Figure):
+                picture(block.drawing).savefig(path.parent / f"{block.name}.png", dpi=style.DPI)
+            if isinstance(block, Figure | Table) and block.data is not None:
+                csv_frame(block.data).to_csv(path.parent / f"{block.name}.csv", index=False)
+    path.write_text(rendered("sections.md.j2", title=title, sections=sections, intro=intro), "utf-8")
+    return path
+
+
+def emptied(directory: Path) -> Path:
+    """The directory, made if need be, without the pictures and tables of an older report."""
+    directory.mkdir(parents=True, exist_ok=True)
+    for stale in [*directory.glob("*.png"), *directory.glob("*.csv")]:
+        stale.unlink()
+    return directory
 
 
 def rendered(name: str, **content: Any) -> str:
     """A page from report/writers/templates, in which quoted text is spelled out for Markdown.
 
-    Filters: significant, short, wrapped.
+    Filters: significant, short.
     """
     loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
     environment = jinja2.Environment(
         loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"significant": significant, "short": short, "wrapped": wrapped}
+    environment.filters |= {"significant": significant, "short": short}
     return markdown(environment.get_template(name).render(content))

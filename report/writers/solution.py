@@ -17,7 +17,7 @@ from report.document.escape import csv_cell, picture, quoted
 from report.figures import style
 from report.figures.answer import answer_figures, pair_name
 from report.figures.maps import Array
-from report.page.answer import answer_data
+from report.page.answer import answer_data, headline
 from report.page.write import write as write_page
 
 from .pages import rendered
@@ -50,7 +50,9 @@ def write(directory: Path) -> Path:
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
     path = directory / "answer.md"
     parts, pairs = _summary(record, arrays)
-    page = rendered("solution.md.j2", record=record, parts=parts, pairs=pairs, figures=list(figures), vtu=vtu)
+    first = headline(record, arrays)["text"]
+    content = {"record": record, "parts": parts, "pairs": pairs, "figures": list(figures), "vtu": vtu}
+    page = rendered("solution.md.j2", headline=first, **content)
     path.write_text(page, "utf-8")
     write_page(directory / "index.html", str(record["title"]), answer_data(record, arrays))
     return path

@@ -16,15 +16,12 @@ import pandas as pd
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.escape import csv_frame, quoted
 from report.document.numbers import significant, whole
-from report.figures import style
-from report.figures.answer import pair_name
+from report.figures.answer import Answer, gap_maps, pair_name
 from report.figures.maps import Array
-from report.figures.two_answers import Answer, gap_maps
 from report.page.answer import two_answers_data
 from report.page.write import write as write_page
 
-from .markdown import save_block
-from .pages import rendered
+from .pages import written
 
 
 def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
@@ -59,14 +56,11 @@ def write(directory: Path, folders: list[str]) -> tuple[Path, pd.DataFrame]:
         blocks.append(Table("fasteners", f"*Force in each fastener, N: {both}.*", fasteners, shown))
     csv_frame(_contacts(first, second)).to_csv(directory / "contacts.csv", index=False)
     blocks.append(Text("Every contact: [contacts.csv](contacts.csv)."))
-    with style.applied():
-        section = Section("Two scenes on one junction", [save_block(block, directory) for block in blocks])
-    path = directory / "comparison.md"
     title = f"{names[0]} and {names[1]}"
-    path.write_text(rendered("sections.md.j2", title=title, sections=[section], csv=False), "utf-8")
     data = two_answers_data([first[0], second[0]], [first[1], second[1]], names)
     write_page(directory / "index.html", title, data)
-    return path, pairs
+    section = Section("Two scenes on one junction", blocks)
+    return written(directory / "comparison.md", title, [section]), pairs
 
 
 def _read(folder: Path) -> Answer:

@@ -12,11 +12,11 @@ from synthetic_results import row, write_rows
 
 from problems.manufactured.ladder import ladders
 from report.analysis.outcomes import with_outcomes
-from report.analysis.relative import load_cases
 from report.figures import style
 from report.figures.ladder_map import COUNTED, ladder_map
+from report.figures.maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
 from report.results.reader import read
-from report.sections.speed import section as speed
+from report.sections.speed import steps
 from solvers import methods
 
 NAMED = {"floating", "loads", "parts"}  # ladders whose rungs are words
@@ -69,22 +69,35 @@ def test_a_wrong_answer_on_a_rung_says_by_how_much(tmp_path: Path, error: float,
     texts = [text.get_text() for text in axes.texts]
     assert shown in texts
     assert "cond(K)" in texts
-    assert axes.get_xticklabels()[0].get_text() == "1e+10  ≤ 1e-6 mm"
+    assert axes.get_xticklabels()[0].get_text() == "1e+10"
 
 
-def test_relative_speed_is_drawn_against_the_size_if_each_size_has_one_scene(tmp_path: Path) -> None:
-    rows = [
-        row(solver=solver, n=n, m=n // 2, solve_s=n / 1e3, cholesky_s=0.1, product_s=0.01)
-        | {"scene": f"scaling/{n}"}
-        for n in (1000, 2000, 4000)
-        for solver in ("newton", "gi")
-    ]
+def test_the_picture_of_steps_shows_seconds_the_fastest_first(tmp_path: Path) -> None:
+    rows = [row(solver="newton", solve_s=0.5), row(solver="gi", solve_s=54.0)]
     results = read(write_rows(tmp_path, rows))
-    section = speed(results)
-    figure = section.blocks[-1]
-    assert len(figure.drawing.axes) == 1  # type: ignore[union-attr]
-    line = figure.drawing.axes[0].lines[0]  # type: ignore[union-attr]
-    assert list(line.get_xdata()) == [1000, 2000, 4000]
-    cases = load_cases(results)
-    wanted = cases[cases["solver"] == "gi"].sort_values("n")["to_cholesky"]
-    assert list(line.get_ydata()) == pytest.approx(list(wanted))
+    section = steps(results)
+    (axes,) = section.blocks[0].drawing.axes  # type: ignore[union-attr]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["newton (dual)", "gi (dual)"]
+    rows = [[bar for bar in axes.patches if round(bar.get_y() + 0.4) == k] for k in (0, 1)]
+    ends = [max(bar.get_x() + bar.get_width() for bar in bars) for bars in rows]
+    assert ends == pytest.approx(results.cells.sort_values("total_s")["total_s"].tolist())
+
+
+def test_many_marks_hide_no_field() -> None:
+    nodes = np.column_stack([np.repeat(np.arange(20.0), 20), np.tile(np.arange(20.0), 20)])
+    scale = rooted("gap, mm", "viridis", np.ones(400))
+    sizes = {}
+    for count in (4, 252):
+        marks = {"fasteners": np.linspace(0, 19, count)[:, None].repeat(2, axis=1).tolist()}
+        _, (axes,) = drawn([Map("", nodes, np.ones(400), scale, (), marks)], 1)
+        sizes[count] = max(line.get_markersize() for line in axes.lines)
+    assert sizes[252] < sizes[4] / 1.4
+
+
+def test_what_is_larger_than_allowed_looks_like_nothing_else() -> None:
+    others = [lab(colour, "normal") for colour in (MARK, CLOSED, RIM)]
+    assert min(np.linalg.norm(lab(LARGER, "normal") - other) for other in others) > 40
+
+
+def test_a_scale_of_roots_says_so() -> None:
+    assert "√" in rooted("force, N", "magma_r", np.ones(3)).label

@@ -21,6 +21,7 @@ from test_series_report import made as made_series
 from report.analysis.remaining_gaps import QUANTILES, quantile_maps
 from report.figures import style
 from report.page import answer, comparison, maps, run
+from report.page.answer import headline
 from report.page.packed import packed
 from report.page.run import run_data
 from report.page.write import write
@@ -234,3 +235,38 @@ def test_that_no_browser_tried_the_page_is_said_in_the_summary(monkeypatch: pyte
     pytest_terminal_summary(summary)
     assert said[0] == "31 browser tests SKIPPED"
     assert said[1].startswith("The page was not tried: no Chromium")
+
+
+@pytest.mark.parametrize(
+    ("exceeded", "kind", "begins"),
+    [
+        (
+            True,
+            "fail",
+            "FAIL at 0.200 mm: the largest gap left is 0.300 mm, at x = 4.00, y = 1.00 mm (a – b)",
+        ),
+        (False, "pass", "PASS at 0.200 mm: "),
+        (None, "", "CANNOT BE TOLD at 0.200 mm: "),
+        ("not asked", "", "The largest gap left is 0.300 mm, at x = 4.00"),
+    ],
+)
+def test_an_answer_opens_with_its_largest_gap(exceeded: Any, kind: str, begins: str) -> None:
+    arrays = {
+        "gap_after": np.array([0.1, 0.3, 0.0]),
+        "contact_nodes": np.array([[0.0, 1.0], [4.0, 1.0], [8.0, 1.0]]),
+    }
+    record: dict[str, Any] = {"m": 3, "pairs": [{"pair": ["a", "b"], "start": 0, "stop": 3}]}
+    if exceeded != "not asked":
+        record["allowed_gap"] = {"exceeded": exceeded, "allowed_mm": 0.2}
+    found = headline(record, arrays)
+    assert found["kind"] == kind
+    assert found["text"].startswith(begins)
+
+
+def test_every_row_is_counted(tmp_path: Path) -> None:
+    """Also those of tolerances tried in a search for one."""
+    rows = [
+        row(tolerance=10.0**-k, searched=True, verdict="within" if k > 8 else "outside") for k in (7, 8, 9)
+    ]
+    found = run_data(read(write_rows(tmp_path, [*rows, row(solver="gi")])))
+    assert found["banner"]["counts"].startswith("4 rows, 2 of them")

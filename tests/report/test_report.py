@@ -12,14 +12,14 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import everything, no_answer, row, write_rows
 
-from report.analysis.drawn import drawn_cells, omission_note
 from report.analysis.precision import pareto
-from report.analysis.standings import compare, standings
+from report.analysis.standings import shown, standings
 from report.document.numbers import significant
 from report.figures import style
-from report.figures.scoreboard import scoreboard
+from report.figures.scoreboard import explained, scoreboard
 from report.results.reader import read
-from report.sections import times as active
+from report.sections.speed import contacts
+from report.sections.summary import EACH, PREPARED, advice
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -58,7 +58,7 @@ def tiny(tmp_path: Path) -> Path:
 
 
 def test_standings_of_a_tiny_run(tiny: Path) -> None:
-    table = standings(read(tiny)).set_index("label")
+    table = standings(read(tiny).cells).set_index("method")
     # a: sqrt(2 · 8) = 4; b: sqrt(1 · 36) = 6; c answers half of the scenes, d none: not compared
     assert table["load_case_s_4386"].to_dict() == pytest.approx(
         {"a (dual)": 4.0, "b (primal)": 6.0, "c (dual)": math.nan, "d (dual)": math.nan}, nan_ok=True
@@ -70,51 +70,6 @@ def test_standings_of_a_tiny_run(tiny: Path) -> None:
         3e-6,
     ]
     assert table.loc["c (dual)", ["no_answer", "no_answer_because"]].tolist() == [1, "1 time limit"]
-
-
-def test_summary_says_which_solver_is_the_fastest(tiny: Path) -> None:
-    text = write(tiny).read_text("utf-8")
-    assert "**a (dual)**: within 1e-7 mm on both scenes, 4.00 s per load case" in text
-    assert "Next is b (primal), which takes 1.5 times as long." in text
-    assert "At 100 active contacts, c (dual) is 20 times as fast." in text
-    assert "1 run of 8 gave no answer (1 time limit)." in text
-    assert re.search(r"\| d \(dual\) +\| +0 of 2 \| +2 \(1 reported solved\) \|", text)
-
-
-def test_a_failure_enters_no_mean_and_takes_its_scene_out_of_everyones(tmp_path: Path) -> None:
-    scenes = [f"4386/{k}00" for k in (1, 2, 3)]
-    rows = [row(s, "a", **times(solve_s=t)) for s, t in zip(scenes, (1.0, 4.0, 50.0), strict=True)]
-    rows += [row(s, "b", **times(solve_s=3.0)) for s in scenes[:2]]
-    rows.append(row(scenes[2], "b", **no_answer("crashed") | {"solve_s": 0.001}))
-    comparison = compare(read(write_rows(tmp_path, rows)), 4386)
-    assert comparison.common == scenes[:2]
-    assert comparison.seconds == pytest.approx({"a (dual)": 2.0, "b (dual)": 3.0})
-
-
-def test_lines_that_are_nearly_as_fast_are_named_as_such(tmp_path: Path) -> None:
-    rows = [row(LOW, solver, **times(solve_s=t)) for solver, t in (("a", 1.0), ("b", 1.1), ("c", 2.0))]
-    text = write(write_rows(tmp_path, rows)).read_text("utf-8")
-    assert ":** **a (dual)**: within" in text
-    assert "As fast, to within 15% or what its repeats differ by: b (dual) (1.10 s). Next is c (dual)" in text
-    assert "which takes 2.0 times as long." in text
-
-
-def test_what_is_closer_than_its_own_repeats_counts_as_equal(tmp_path: Path) -> None:
-    seconds = {"a": (1.0, 1.0, 1.0), "b": (1.0, 1.3, 1.6), "c": (1.29, 1.3, 1.31)}
-    rows = [
-        row(LOW, solver, repeat=k, **times(solve_s=t))
-        for solver in seconds
-        for k, t in enumerate(seconds[solver])
-    ]
-    text = write(write_rows(tmp_path, rows)).read_text("utf-8")
-    assert "what its repeats differ by: b (dual) (1.30 s). Next is c (dual)" in text
-
-
-def test_no_solver_is_recommended_where_none_is_within_on_every_scene(tmp_path: Path) -> None:
-    rows = [row(LOW, "a"), row(HIGH, "a", **outside(1e-6)), row(LOW, "b", **outside(1e-6)), row(HIGH, "b")]
-    text = write(write_rows(tmp_path, rows)).read_text("utf-8")
-    assert "a (dual) and b (dual) are each within it on 1 of 2." in text
-    assert "(dual)**" not in text
 
 
 def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> None:
@@ -131,9 +86,7 @@ def test_runs_of_several_machines_are_told_apart(tmp_path: Path) -> None:
     rows = [row(LOW, "a", machine=name, **times(solve_s=t)) for name, t in (("First", 1.0), ("Second", 9.0))]
     text = write(write_rows(tmp_path, rows)).read_text("utf-8")
     assert "come from 2 machines: First (1 row) and Second (1 row)." in text
-    first, second = re.split("# Machine 2: Second", text)
-    assert "1.00 s per load case" in first
-    assert "9.00 s per load case" in second
+    assert text.index("## Summary: First") < text.index("## Summary: Second")
     own = pd.read_csv(tmp_path / "report" / "machine2-summary.csv")
     assert own["load_case_s_4386"].tolist() == pytest.approx([9.0])
 
@@ -168,17 +121,17 @@ def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
         "Every solver on every scene",
         "Machine and method",
     ]
-    assert [path.name for path in (failed / "report").glob("*.png")] == ["summary.png"]
+    assert not [*(failed / "report").glob("*.png")]
     empty = write(write_rows(tmp_path / "empty", []))
     assert "Nothing was measured" in empty.read_text("utf-8")
 
 
 def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> None:
     text = write(everything(tmp_path, {4386: [107, 1074], 6112: [1500]})).read_text("utf-8")
-    assert len(re.findall("^## ", text, re.M)) == 8
+    assert len(re.findall("^## ", text, re.M)) == 7
     for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
         assert imread(tmp_path / "report" / name)[..., :3].std() > 0.05, f"{name} is blank"
-    assert re.search(r"\| +4386 \| +2193 \| +2 \| +2.63e6 \| +20.0 \|", text)
+    assert re.search(r"\| +4386, 2193 \| +1074 \(49.0 %\) \| +2.63e6 \| +20.0 \|", text)
     assert "nan" not in re.findall(r"\w+", text.lower())
     assert "None" not in text
 
@@ -222,23 +175,11 @@ def variants(counts: dict[str, int]) -> list[dict[str, Any]]:
     return [row(f"4386/{k:04d}", "a", variant=name) for name, most in counts.items() for k in range(most)]
 
 
-def test_of_many_variants_those_run_on_few_scenes_are_not_drawn(tmp_path: Path) -> None:
-    rows = [*variants({"": 4, "x": 3, "y": 2, "z": 1}), row("4386/0000", "b")]
-    results = read(write_rows(tmp_path / "many", rows))
-    assert set(drawn_cells(results)["method"]) == {"a (dual)", "a (dual) x", "a (dual) y", "b (dual)"}
-    assert "Not drawn: 1 variant of a run on fewer than half of its scenes" in omission_note(results)
-    text = write(tmp_path / "many").read_text("utf-8")
-    assert re.search(r"\| a \(dual\) z +\| ✓ within", text)
-    few = read(write_rows(tmp_path / "few", variants({"": 4, "x": 3, "z": 1})))
-    assert len(drawn_cells(few)) == 8
-    assert omission_note(few) == ""
-
-
 def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> None:
     rows = [row(f"{n}/{k:04d}", "a") for n, most in ((4386, 12), (6112, 7), (11308, 7)) for k in range(most)]
     rows += [row("4386/0000", "b")]
-    results = read(write_rows(tmp_path, rows))
-    upper, lower = scoreboard(results.cells, standings(results)).axes
+    cells = read(write_rows(tmp_path, rows)).cells
+    upper, lower = scoreboard(cells, standings(cells)).axes
     assert [[tick.get_text() for tick in axes.get_yticklabels()] for axes in (upper, lower)] == [
         ["a (dual)", "b (dual)"],
         ["a (dual)"],
@@ -250,8 +191,9 @@ def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> 
 
 def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
     rows = [row(f"4386/{k}", "a", **times(solve_s=1.0)) for k in (100, 200, 400)]
-    rows += [row("4386/300", "a", **no_answer("time_limit")), row("4386/300", "b")]
-    section = active.section(read(write_rows(tmp_path, rows)))
+    rows += [row("4386/300", "a", **no_answer("time_limit"))]
+    rows += [row(f"4386/{k}", "b") for k in (100, 300)]
+    section = contacts(read(write_rows(tmp_path, rows)))
     (axes,) = section.blocks[0].drawing.axes[:1]  # type: ignore[union-attr]
     seconds = axes.lines[0].get_ydata()
     assert [math.isnan(s) for s in seconds] == [False, False, True, False]
@@ -280,3 +222,55 @@ def test_significant_figures(value: float | None, text: str) -> None:
 def test_a_directory_without_measurements_is_named(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"measurements\.jsonl"):
         write(tmp_path)
+
+
+# Which solver to use, and what charts show.
+
+
+def advised(directory: Path, seconds: str = EACH) -> dict[str, Any]:
+    section = advice(read(directory))
+    data: pd.DataFrame = section.blocks[0].data  # type: ignore[union-attr, assignment]
+    return dict(data[data["seconds of"] == seconds].iloc[0])
+
+
+def test_the_fastest_on_every_scene_is_advised(tiny: Path) -> None:
+    """c is faster, but on one scene only; the mean of a is sqrt(2 · 8) = 4, of b sqrt(1 · 36) = 6."""
+    line = advised(tiny)
+    assert [line[name] for name in ("use", "seconds", "next", "to_next")] == [
+        "a (dual)",
+        4.0,
+        "b (primal)",
+        1.5,
+    ]
+    assert advised(tiny, PREPARED)["use"] == "b (primal)"  # a prepares for 7 s on one of the scenes
+
+
+def test_nothing_is_advised_where_none_is_within_on_every_scene(tmp_path: Path) -> None:
+    rows = [row(LOW, "a"), row(HIGH, "a", **outside(1e-6)), row(LOW, "b", **outside(1e-6)), row(HIGH, "b")]
+    assert advised(write_rows(tmp_path, rows))["use"] == "none on every scene"
+
+
+def test_without_two_methods_there_is_no_advice(tmp_path: Path) -> None:
+    assert advice(read(write_rows(tmp_path, [row(LOW, "a"), row(HIGH, "a")]))) is None
+
+
+def test_charts_show_methods_run_on_half_of_the_scenes_and_name_the_others(tmp_path: Path) -> None:
+    rows = [
+        row(f"4386/{k:04d}", solver) for solver, most in (("a", 4), ("b", 2), ("c", 1)) for k in range(most)
+    ]
+    cells = read(write_rows(tmp_path / "some", rows)).cells
+    assert set(shown(cells)["method"]) == {"a (dual)", "b (dual)"}
+    caption = explained(shown(cells), standings(cells), "1e-7 mm")
+    assert "Run on fewer than half of the scenes: c (dual)." in caption
+    assert "Hatched" not in caption
+    alone = read(write_rows(tmp_path / "alone", [r for r in rows if r["solver"] != "b"])).cells
+    assert shown(alone).empty
+
+
+def test_a_run_of_one_scene_is_titled_after_it(tmp_path: Path) -> None:
+    write_rows(tmp_path, [row(LOW, "a"), row(LOW, "b")])
+    (tmp_path / "suite.toml").write_text('title = "On all three sizes"', "utf-8")
+    (tmp_path / "problems.jsonl").write_text(json.dumps({"scene": LOW, "title": "A joint"}) + "\n", "utf-8")
+    assert write(tmp_path).read_text("utf-8").startswith(f"# {LOW}: A joint\n")
+    write_rows(tmp_path, [row(LOW, "a"), row(HIGH, "a")])
+    assert write(tmp_path).read_text("utf-8").startswith("# On all three sizes\n")

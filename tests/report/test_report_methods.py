@@ -30,13 +30,7 @@ def test_seconds_and_products_stand_together(tmp_path: Path) -> None:
     rows += [measured(LOW, "piqp", 1.25, None), measured(HIGH, "piqp", 1.5, None)]
     rows += [measured(HIGH, "rough", 0.01, 9, verdict="outside", displacement_error_mm=3e-5)]
     section = told(tmp_path, rows)
-    advice, table = section.blocks
-    assert "**newton (dual)** on 1 of 2 scenes and **mprgp (dual)** on 1 of 2 scenes" in advice.markdown or (
-        "**mprgp (dual)** on 1 of 2 scenes and **newton (dual)** on 1 of 2 scenes" in advice.markdown
-    )
-    assert "the fewest: **mprgp (dual)**, 11 to 14 per load case" in advice.markdown
-    assert "rough (dual) (off by up to 3.0e-5 mm)" in advice.markdown
-    assert "slow (dual) (no answer)" in advice.markdown
+    (table,) = section.blocks
     lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.markdown.splitlines()]
     assert lines[0] == ["method", LOW, HIGH]
     cells = {line[0]: line[1:] for line in lines[2:]}
@@ -55,8 +49,7 @@ def test_a_method_counts_with_its_best_tolerance(tmp_path: Path) -> None:
     rows += [measured(LOW, "rough", 2.0, None, tolerance=1e-9, **missed | {"displacement_error_mm": 1e-5})]
     rows += [measured(LOW, "rough", 1.0, None, tolerance=1e-8, **missed | {"displacement_error_mm": 1e-4})]
     section = told(tmp_path, rows)
-    advice, table = (block.markdown for block in section.blocks)
-    assert advice.endswith("were tried on: rough (dual) (off by up to 1.0e-5 mm).")
+    (table,) = (block.markdown for block in section.blocks)
     assert " 1.50 |" in table
     assert " 2.00 (outside) |" in table
 

@@ -10,10 +10,10 @@ from synthetic_results import no_answer, row, write_rows
 
 from harness.results import schema
 from problems.forms import names
-from report.analysis.roads import fastest, roads
+from report.analysis.roads import roads
 from report.results.reader import Results, read
-from report.sections import problems, speed
-from report.sections import roads as section_of
+from report.sections import problems, summary
+from report.sections.speed import from_scene
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0107", "4386/1471"
@@ -53,15 +53,6 @@ def totals(line: pd.Series) -> list[float]:
 def test_the_reports_forms_are_those_of_the_problems() -> None:
     assert set(schema.FORMS) == set(names.FORMS)
     assert set(schema.DENSE_FORMS) == set(names.DENSE_FORMS)
-
-
-def test_speed_from_the_scene_on_is_relative_to_the_fastest_library_in_any_form(tmp_path: Path) -> None:
-    """newton 0.9 s on the sparse form and 11.9 s on the dual; Clarabel 1.8 s on the sparse form."""
-    rows = [sparse(), dense(cholesky_s=0.5, product_s=0.01), sparse(solver="clarabel", solve_s=1.1)]
-    section = speed.section(results(tmp_path, rows))
-    ratios = section.blocks[0].data.set_index("method")["scene_to_library"]
-    expected = {"newton (sparse)": 0.5, "newton (dual)": 11.9 / 1.8, "clarabel (sparse)": 1.0}
-    assert ratios.to_dict() == pytest.approx(expected)
 
 
 def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
@@ -105,75 +96,29 @@ def test_only_answers_within_the_limit_have_a_total(tmp_path: Path) -> None:
     lines = roads(results(tmp_path, rows))
     for method in ("piqp (dual)", "osqp (dual)"):
         assert not line_of(lines, method)[["total_1_s", "total_1000_s"]].notna().any()
-    assert set(fastest(lines)["library"]) == {""}
 
 
 def test_matrices_of_unknown_cost_give_no_total(tmp_path: Path) -> None:
     """A dense form whose condensation nobody timed wins nothing."""
     lines = roads(results(tmp_path, [sparse(), dense()], build_s={"model": 0.4}))
     assert pd.isna(line_of(lines, "newton (dual)")["total_1_s"])
-    assert set(fastest(lines)["method"]) == {"newton (sparse)"}
-
-
-def test_the_fastest_by_the_number_of_load_cases(tmp_path: Path) -> None:
-    rows = [sparse(), dense(), sparse(solver="clarabel", solve_s=10.0), dense(solver="piqp", solve_s=4.0)]
-    best = fastest(roads(results(tmp_path, rows))).set_index("load_cases")
-    assert best["method"].to_dict() == {1: "newton (sparse)", 10: "newton (sparse)", 1000: "newton (dual)"}
-    assert best["library"].to_dict() == {1: "clarabel (sparse)", 10: "piqp (dual)", 1000: "piqp (dual)"}
-    assert best.loc[1, "to_library"] == pytest.approx((0.9 + 9.8) / 0.9)
-    assert best.loc[1, "next"] == "clarabel (sparse)"
-    assert best.loc[1000, "next"] == "newton (sparse)"
-    assert best.loc[1000, "to_next"] == pytest.approx((0.9 + 999 * 0.3) / (11.9 + 99.9))
-
-
-def test_the_section_names_the_winner_and_its_factors(tmp_path: Path) -> None:
-    rows = [
-        r for scene in (LOW, HIGH) for r in (sparse(scene), dense(scene), dense(scene, "piqp", solve_s=6.1))
-    ]
-    section = section_of.section(results(tmp_path, rows))
-    text, figure, best, table = section.blocks
-    won = "13 times as fast as the next and 20 times as fast as the fastest library"
-    assert f"- 1 load case: **newton (sparse)** on 2 of 2 scenes, {won}." in text.markdown
-    assert "- 1000 load cases: **newton (dual)** on 2 of 2 scenes" in text.markdown
-    assert "as if they were not" in text.markdown
-    assert (figure.name, best.name, table.name) == ("roads", "roads-fastest", "roads")
-    assert "| 4386/0107" in table.markdown
-    page = write(tmp_path).read_text("utf-8")
-    assert "## From scene to answer" in page
-    assert (tmp_path / "report" / "roads.png").stat().st_size > 10_000
-    saved = pd.read_csv(tmp_path / "report" / "roads.csv")
-    assert {"model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery_s"} <= set(saved)
-    assert saved["total_1_s"].min() == pytest.approx(0.9)
-
-
-def test_a_tie_is_said_to_be_one(tmp_path: Path) -> None:
-    section = section_of.section(results(tmp_path, [sparse(), sparse(solver="other", solve_s=0.3), dense()]))
-    assert "on 1 of 1 scene, about as fast as the next" in section.blocks[0].markdown
-
-
-def test_a_library_that_wins_is_not_compared_with_itself(tmp_path: Path) -> None:
-    section = section_of.section(results(tmp_path, [sparse(solver="clarabel"), dense()]))
-    assert (
-        "**clarabel (sparse)** on 1 of 1 scene, 13 times as fast as the next." in section.blocks[0].markdown
-    )
 
 
 @pytest.mark.parametrize("forms", [("dual", "primal"), ("sparse",)])
 def test_it_takes_both_roads(tmp_path: Path, forms: tuple[str, ...]) -> None:
     rows = [sparse() if form == "sparse" else dense(form=form) for form in forms]
-    assert section_of.section(results(tmp_path, rows)) is None
+    assert from_scene(results(tmp_path, rows)) is None
 
 
 def test_series_and_forms_that_are_not_taken_do_not_count(tmp_path: Path) -> None:
     """A later case of a series is neither cold, nor has it paid for the matrices."""
     rows = [dense(), sparse(case=3), sparse(status="unsupported")]
-    assert section_of.section(results(tmp_path, rows)) is None
+    assert from_scene(results(tmp_path, rows)) is None
 
 
 def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
-    section = section_of.section(results(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
-    text, table = section.blocks
-    assert text.markdown.startswith("No answer is within the limit.")
+    section = from_scene(results(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
+    (table,) = section.blocks
     assert "(outside)" in table.markdown
 
 
@@ -181,10 +126,35 @@ def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
     own = {"unknowns": 46956, "reference_bound_mm": 1.6e-11, "from_condensed_mm": 3e-12}
     facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
     section = problems.section(results(tmp_path, [sparse(), dense()], **facts, sparse=own))
-    scenes = section.blocks[1]
+    scenes = section.blocks[0]
     assert scenes.data["sparse_unknowns"].tolist() == [46956]
     assert "difference of the two references, mm" in scenes.markdown
     assert all(text in scenes.markdown for text in ("46956", "1.60e-11", "3.00e-12", "2.00e-12"))
-    assert "The sparse form" in scenes.caption
+    assert "condensation" in scenes.caption
     without = problems.section(results(tmp_path / "dense", [dense()], **facts))
-    assert "sparse" not in without.blocks[1].markdown + without.blocks[1].caption
+    assert "sparse" not in without.blocks[0].markdown + without.blocks[0].caption
+
+
+def test_the_section_has_a_picture_and_a_table_of_all_stages(tmp_path: Path) -> None:
+    rows = [r for s in (LOW, HIGH) for r in (sparse(s), dense(s), dense(s, "piqp", solve_s=6.1))]
+    section = from_scene(results(tmp_path, rows))
+    assert [block.name for block in section.blocks] == ["roads", "roads"]
+    write(tmp_path)
+    assert (tmp_path / "report" / "roads.png").stat().st_size > 10_000
+    saved = pd.read_csv(tmp_path / "report" / "roads.csv")
+    assert {"model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery_s"} <= set(saved)
+    assert saved["total_1_s"].min() == pytest.approx(0.9)
+
+
+def test_the_advice_counts_from_the_scene_on_too(tmp_path: Path) -> None:
+    """newton 0.9 s on the sparse form and 11.9 s on the dual; Clarabel 1.8 s on the sparse form."""
+    rows = [sparse(), dense(), sparse(solver="clarabel", solve_s=1.1)]
+    section = summary.advice(results(tmp_path, rows))
+    lines = section.blocks[0].data.set_index("seconds of")
+    assert lines["use"].to_dict() == {
+        summary.EACH: "newton (dual)",
+        summary.PREPARED: "newton (dual)",
+        summary.FROM_SCENE: "newton (sparse)",
+    }
+    line = lines.loc[summary.FROM_SCENE]
+    assert (line["library"], line["to_library"]) == ("clarabel (sparse)", pytest.approx(1.8 / 0.9))

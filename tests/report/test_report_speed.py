@@ -6,9 +6,10 @@ from typing import Any
 import pytest
 from synthetic_results import no_answer, row, write_rows
 
+from report.analysis.relative import load_cases
 from report.figures import style
 from report.results.reader import read
-from report.sections import ingredients, same_method, scaling, speed
+from report.sections import speed
 
 LOW, HIGH = "4386/0052", "4386/1074"
 TIMES = {"setup_s": 0.0, "form_s": 0.0}
@@ -28,7 +29,7 @@ def test_ratios_are_to_the_median_of_the_fastest_library(tmp_path: Path) -> None
     rows += [timed(LOW, "newton", 2.0, repeat=1), timed(LOW, "piqp", 6.0, repeat=1)]
     rows += [timed(HIGH, "newton", 1.0), timed(HIGH, "piqp", 10.0)]
     rows += [timed(HIGH, "proxqp", 1.0, "primal", verdict="outside")]  # fast, and wrong
-    cases = speed.load_cases(results(tmp_path, rows))
+    cases = load_cases(results(tmp_path, rows))
     mine = cases[cases["solver"] == "newton"].set_index(["scene", "repeat"])["to_library"]
     assert mine.to_dict() == pytest.approx({(LOW, 0): 1 / 4, (LOW, 1): 2 / 4, (HIGH, 0): 1 / 10})
     assert cases["to_cholesky"].tolist() == pytest.approx((cases["load_case_s"] / 0.5).tolist())
@@ -38,8 +39,9 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
     rows = [timed(scene, "piqp", 10.0, repeat=k) for scene in (LOW, HIGH) for k in range(3)]
     seconds = {LOW: (1.0, 2.0, 3.0), HIGH: (4.0, 4.0, 4.0)}
     rows += [timed(scene, "newton", s, repeat=k) for scene in seconds for k, s in enumerate(seconds[scene])]
-    section = speed.section(results(tmp_path, rows))
-    table, yardsticks, figure = section.blocks
+    found = results(tmp_path, rows)
+    section, machine = speed.relative(found), speed.machine(found)
+    (table,), (yardsticks,) = section.blocks, machine.blocks
     line = table.data[table.data["method"] == "newton (dual)"].iloc[0]
     found = [line[name] for name in ("to_library", "to_library_least", "to_library_most")]
     assert found == pytest.approx([0.3, 0.1, 0.4])
@@ -48,75 +50,50 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
     known = yardsticks.data.iloc[0]
     assert known["gflops"] == pytest.approx(2193**3 / 3 / 0.5 / 1e9)
     assert known["gb_per_s"] == pytest.approx(8 * 2193**2 / 0.01 / 1e9)
-    assert figure.name == "speed"
 
 
 def test_without_an_answering_library_there_is_no_ratio_to_it(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0), timed(LOW, "piqp", 8.0) | no_answer("time_limit")]
-    section = speed.section(results(tmp_path, rows))
+    section = speed.relative(results(tmp_path, rows))
     assert "–" in section.blocks[0].markdown
 
 
 def test_without_a_yardstick_there_is_no_section(tmp_path: Path) -> None:
-    assert speed.section(results(tmp_path, [row(LOW, "newton")])) is None
+    assert speed.relative(results(tmp_path, [row(LOW, "newton")])) is None
+    assert speed.machine(results(tmp_path, [row(LOW, "newton")])) is None
 
 
 def test_where_no_answer_is_within_the_limit_the_yardsticks_stand_alone(tmp_path: Path) -> None:
-    section = speed.section(results(tmp_path, [timed(LOW, "newton", 1.0, verdict="cannot_be_judged")]))
-    assert [block.name for block in section.blocks] == ["speed-yardsticks"]
+    found = results(tmp_path, [timed(LOW, "newton", 1.0, verdict="cannot_be_judged")])
+    assert speed.relative(found) is None
+    assert speed.machine(found) is not None
 
 
 def test_with_preparation_the_ratio_is_to_the_library_that_is_fastest_with_its_own(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0, convert_s=0.0, prepare_s=3.0)]
     rows += [timed(LOW, "piqp", 10.0, convert_s=0.0, prepare_s=0.0)]
     rows += [timed(LOW, "proxqp", 8.0, convert_s=1.0, prepare_s=7.0)]
-    cases = speed.load_cases(results(tmp_path, rows)).set_index("solver")
+    cases = load_cases(results(tmp_path, rows)).set_index("solver")
     assert cases.loc["newton", "to_library"] == pytest.approx(1 / 8)
     assert cases.loc["newton", "total_to_library"] == pytest.approx(4 / 10)
 
 
 def test_lines_of_several_numbers_of_threads_are_named_without_it(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0, threads=k) for k in (1, 2)]
-    cases = speed.load_cases(results(tmp_path, rows))
+    cases = load_cases(results(tmp_path, rows))
     assert cases["method"].tolist() == ["newton (dual)"] * 2
-
-
-def test_a_code_of_the_same_method_that_ran_out_of_time_bounds_the_ratio(tmp_path: Path) -> None:
-    rows = [timed(LOW, "gi", 2.0, "primal"), timed(HIGH, "gi", 2.0, "primal"), timed(LOW, "gi", 1.0)]
-    rows += [timed(LOW, "gi", 3.0, "primal", threads=1)]
-    rows += [timed(LOW, "quadprog", 40.0, "primal")]
-    rows += [timed(HIGH, "quadprog", 0.0, "primal") | no_answer("time_limit") | {"time_limit_s": 50.0}]
-    section = same_method.section(results(tmp_path, rows))
-    (table,) = section.blocks
-    assert table.data["ratio"].tolist() == pytest.approx([2 / 40, 2 / 50])
-    assert table.data["method"].tolist() == ["gi (primal)"] * 2
-    assert "0.0500" in table.markdown
-    assert "< 0.0400" in table.markdown
-    assert "> 50" in table.markdown
 
 
 def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path: Path) -> None:
     rows = [timed(LOW, "ipm-fast", 1.0), timed(HIGH, "ipm-fast", 10.0)]
     rows += [timed(scene, "ipm-fast", s, variant="no finish") for scene, s in ((LOW, 3.0), (HIGH, 20.0))]
     rows += [timed(LOW, "ipm-fast", 9.0, variant="bad", verdict="outside")]
-    section = ingredients.section(results(tmp_path, rows))
+    section = speed.variants(results(tmp_path, rows))
     data = section.blocks[0].data.set_index("method")
     line = data.loc["ipm-fast (dual) no finish"]
     assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
     assert data.loc["ipm-fast (dual) bad", "within"] == 0
     assert "2.50 (2.0 to 3.0)" in section.blocks[0].markdown
-
-
-def test_variants_that_are_not_drawn_stand_in_the_tables_alone(tmp_path: Path) -> None:
-    scenes = [f"4386/{k:04d}" for k in (52, 107, 418)]
-    rows = [timed(scene, solver, 1.0) for scene in scenes for solver in ("ipm-fast", "piqp")]
-    rows += [timed(scenes[0], "ipm-fast", 2.0, variant=f"without {k}") for k in "abc"]
-    section = speed.section(results(tmp_path, rows))
-    table, _, figure = section.blocks
-    assert table.data["method"].str.contains("without").sum() == 3
-    legend = [text.get_text() for text in figure.drawing.legends[0].get_texts()]
-    assert legend == ["ipm-fast (dual)", "piqp (dual)"]
-    assert "Not drawn: 3 variants of ipm-fast" in figure.caption
 
 
 def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: Path) -> None:
@@ -126,13 +103,13 @@ def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: P
         memory = {"data_mib": 100.0, "peak_rss_mib": 100.0 + 1e-5 * n**2}
         grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
         rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
-    section = scaling.section(results(tmp_path, rows))
-    data = section.blocks[0].data.set_index("method")
+    section = speed.scaling(results(tmp_path, rows))
+    data = section.blocks[1].data.set_index("method")
     assert data.loc["newton (dual)", "load_case_s"] == pytest.approx(1.5)
     assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
     assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)
     assert data.loc["one product Qv", "load_case_s"] == pytest.approx(2.0)
-    assert scaling.section(results(tmp_path / "few", rows[:2])) is None
+    assert speed.scaling(results(tmp_path / "few", rows[:2])) is None
 
 
 def test_a_size_of_the_sparse_form_alone_leaves_the_benchmarks_of_q_as_they_are(tmp_path: Path) -> None:
@@ -145,11 +122,11 @@ def test_a_size_of_the_sparse_form_alone_leaves_the_benchmarks_of_q_as_they_are(
         if n < 100_000:
             figures = {"cholesky_s": 1e-10 * n**3, "product_s": 1e-9 * n**2}
             rows.append(timed(LOW, "newton", 1e-6 * n**2, **figures, **known) | grid)
-    section = scaling.section(results(tmp_path, rows))
-    data = section.blocks[0].data.set_index("method")
+    section = speed.scaling(results(tmp_path, rows))
+    data = section.blocks[1].data.set_index("method")
     assert data.loc["newton (sparse)", "load_case_s"] == pytest.approx(1.0)
     assert data.loc["newton (sparse)", "largest"] == 100_000
     assert data.loc["one Cholesky of Q", ["sizes", "largest"]].tolist() == [3, 4000]
     assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)
     with style.applied():
-        section.blocks[2].drawing.savefig(tmp_path / "scaling.png")
+        section.blocks[0].drawing.savefig(tmp_path / "scaling.png")

@@ -22,7 +22,7 @@ from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
 from report.results.series import read as read_series
-from report.sections.profiles import compared, ratios
+from report.sections.speed import ratios
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
 
@@ -170,7 +170,7 @@ def test_the_profiles_are_those_of_the_report(chromium: Any, tmp_path: Path, lim
     found = read(everything(tmp_path, {4386: [100, 800, 1500], 6112: [300, 2000]}))
     opened(chromium, write(tmp_path / "index.html", "Made up", run_data(found), tmp_path), f"limit={limit}")
     asked = replace(found, cells=found.cells.assign(limit_mm=float(limit)))
-    times = ratios(compared(asked))
+    times = ratios(asked.cells)
     shown = chromium.execute_script(
         "const {ratios, count} = profiles(filtered(), Number(STATE.limit));"
         "const met = list => list.filter(Number.isFinite).sort(d3.ascending);"
@@ -311,3 +311,39 @@ def test_the_worst_case_of_a_series_is_one_click_away(chromium: Any, tmp_path: P
     opened(chromium, tmp_path / "report" / "index.html")
     chromium.execute_script("document.getElementById('worst').click()")
     assert f"case {worst}, mm" in eventually(chromium, "document.getElementById('about-map').textContent")
+
+
+def test_nothing_is_ranked_without_an_answer(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
+    opened(chromium, made[1], "limit=1e-12")
+    lines = chromium.execute_script(
+        "return ranking(filtered(), Number(STATE.limit)).lines.map(line => [line.within, line.rank])"
+    )
+    assert any(within == 0 for within, _ in lines)
+    assert all((rank == "–") == (within == 0) for within, rank in lines)
+
+
+def test_a_click_beside_a_heading_sorts_the_most_within_first(
+    chromium: Any, made: tuple[pd.DataFrame, Path]
+) -> None:
+    opened(chromium, made[1], "limit=1e-9")
+    chromium.execute_script("document.querySelector('[data-sort=within]').closest('th').click()")
+    texts = chromium.execute_script(
+        "return [...document.querySelectorAll('#view tbody tr')].map(tr => tr.cells[2].textContent)"
+    )
+    shares = [int(within) / int(scenes) for within, scenes in (text.split(" of ") for text in texts)]
+    assert len(set(shares)) > 1
+    assert shares == sorted(shares, reverse=True)
+
+
+def test_all_rungs_are_in_one_view(chromium: Any, tmp_path: Path) -> None:
+    rows = [
+        row(solver=solver) | {"scene": f"hard/{ladder}/{rung:03d}"}
+        for ladder in ("supports", "units", "loads", "parts")
+        for rung in range(27)
+        for solver in ("ipm", "gi")
+    ]
+    opened(chromium, write(tmp_path / "index.html", "", run_data(read(write_rows(tmp_path, rows)))))
+    assert chromium.execute_script(f"return {SEEN}.length") == len(rows)
+    assert chromium.execute_script(
+        "const box = document.querySelector('.scroll'); return box.scrollWidth <= box.clientWidth"
+    )

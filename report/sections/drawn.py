@@ -1,0 +1,95 @@
+"""Scenes drawn at random: every solve time, worst cases beside medians, failures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from harness.results.schema import ANSWERED
+from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.document.numbers import power, whole
+from report.figures import style
+from report.figures.lines import against_contacts, entries, styles_of
+from report.results.labels import in_order
+from report.results.reader import Results
+
+PANEL = 3.0  # inches
+
+
+def section(results: Results) -> Section | None:
+    """Of each method at its usual tolerance: that of most scenes, then the tightest."""
+    cells = results.cells[results.cells["status"] != "unsupported"].dropna(subset=["n", "tolerance"])
+    if cells.empty:
+        return None
+    seconds = (cells["setup_s"].fillna(0.0) + cells["solve_s"]).where(cells["verdict"].isin(ANSWERED))
+    good = (cells["status"] == "solved") & (cells["verdict"] == "within")
+    cells = cells.assign(load_case_s=seconds, good=good)
+    runs = cells.groupby(["n", "method", "tolerance"]).size().reset_index(name="runs")
+    usual = runs.sort_values(["runs", "tolerance"], ascending=[False, True]).drop_duplicates(["n", "method"])
+    cells = cells.merge(usual[["n", "method", "tolerance"]])
+    blocks: list[Block] = [_figure(cells), _times(cells, results.limit)]
+    if not cells["good"].all():
+        blocks.append(_failures(cells[~cells["good"]]))
+    return Section("Scenes drawn at random", blocks)
+
+
+def _figure(cells: pd.DataFrame) -> Figure:
+    dots = {"markersize": 4.0, "linestyle": ""}
+    styles = {name: look | dots for name, look in styles_of(cells).items()}
+    panels = [*cells.groupby("n")]
+    drawing = style.figure(PANEL * len(panels) + 0.3)
+    for axes, (n, of_size) in zip(drawing.subplots(len(panels), 1, squeeze=False)[:, 0], panels, strict=True):
+        against_contacts(axes, of_size, styles)
+        axes.set_title(f"n = {n:.0f}, {of_size['scene'].nunique()} scenes", pad=5)
+    axes.set_xlabel("closed contacts")
+    drawing.legend(handles=entries(cells, styles), loc="outside right upper")
+    return Figure("drawn", "*Seconds of every solve* (set-up + solve) against the closed contacts.", drawing)
+
+
+def _times(cells: pd.DataFrame, limit: str) -> Table:
+    lines = []
+    for n, of_size in cells.groupby("n"):
+        for method in in_order(of_size, "method"):
+            mine = of_size[of_size["method"] == method]
+            good = mine[mine["good"]].sort_values("load_case_s")
+            line: dict[str, Any] = {"n": n, "method": method, "scenes": len(mine), "within": len(good)}
+            line |= {"median_s": good["load_case_s"].median(), "worst_s": good["load_case_s"].max()}
+            line |= {"worst_to_median": line["worst_s"] / line["median_s"]}
+            lines.append(line | {"worst_scene": good["scene"].iloc[-1] if len(good) else ""})
+    columns = [
+        number("n", "n", whole),
+        word("solver (form)", "method"),
+        number("scenes", "scenes", whole),
+        number("solved and within", "within", whole),
+        number("median, s", "median_s"),
+        number("worst, s", "worst_s"),
+        number("worst / median", "worst_to_median"),
+        word("worst scene", "worst_scene"),
+    ]
+    caption = f"*Medians and worst cases* of the answers that are reported solved and within {limit}."
+    return Table("drawn", caption, pd.DataFrame(lines), columns, keys=2)
+
+
+def _failures(cells: pd.DataFrame) -> Table:
+    columns = [
+        word("scene", "scene"),
+        word("solver (form)", "method"),
+        Column("status", lambda line: str(line["status"]).replace("_", " "), "left"),
+        Column("verdict", lambda line: str(line["verdict"]).replace("_", " "), "left"),
+        number("closed contacts", "active", whole),
+        number("error, mm", "displacement_error_mm", power),
+        number("s", "load_case_s"),
+    ]
+    names = [
+        "scene",
+        "method",
+        "tolerance",
+        "status",
+        "verdict",
+        "active",
+        "displacement_error_mm",
+        "load_case_s",
+    ]
+    caption = "*Not solved, or not within the limit.*"
+    return Table("drawn-failures", caption, cells.sort_values(["n", "scene", "method"])[names], columns)
