@@ -1,7 +1,5 @@
 """A file of a results or series directory that was cut off, or is none of ours, is refused by name."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

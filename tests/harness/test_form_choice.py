@@ -1,7 +1,5 @@
 """Which form a scene is solved in by default."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

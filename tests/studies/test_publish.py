@@ -1,7 +1,5 @@
 """`publish`: what is measured, what counts as this code; nothing is lost before its time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
