@@ -26,7 +26,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from harness.conformance.check import run as check_solver
-from harness.planning.road import chosen_form
+from harness.planning.form_choice import chosen_form
 from harness.scene import solution
 from harness.scene.solution import Solution, solver_named
 from harness.series.session import Job, Result, SeriesSession

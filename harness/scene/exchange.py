@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
 
-from harness.planning.road import cheaper
+from harness.planning.form_choice import chosen_form
 from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
@@ -126,7 +126,7 @@ def _refuse_unusable(path: Path, origin: dict[str, Path]) -> tuple[Form, Prepare
     """The problem in its cheaper form. Raises InputError, naming K's own file, if K is indefinite."""
     try:
         scene = read_scene(str(path))
-        form = cheaper(scene, FORMS).form
+        form = chosen_form(scene, FORMS, None).form
         data = prepared(scene, form=form)
         _ = data.assembly.K.factors
         return form, data, load_case(scene, form)
