@@ -50,7 +50,6 @@ def compare(
         from harness.results.sides import read_side
         from harness.terminal.changes import show
         from harness.terminal.exit_codes import DONE, FAILED
-        from report.analysis.comparison import WORSE
         from report.writers.comparison import write
 
         before = read_side(old, key)
@@ -59,7 +58,7 @@ def compare(
             show(comparison, console)
         if out:
             console.print(f"Comparison: {write(out, compared)}")
-        raise typer.Exit(FAILED if any(each.count(*WORSE) for each in compared) else DONE)
+        raise typer.Exit(FAILED if any(each.worse for each in compared) else DONE)
 
 
 def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float | None) -> Comparison:

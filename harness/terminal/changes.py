@@ -22,14 +22,14 @@ def show(comparison: Comparison, console: Console) -> None:
     from report.writers.comparison import COLUMNS
 
     columns = [column for column in COLUMNS if column.heading not in LEFT_OUT]
-    changed = comparison.table[~comparison.table["kind"].isin([ADDED, SAME])]
+    changed = comparison.table[~comparison.table["group"].isin([ADDED, SAME])]
     title = plain(f"{comparison.old} → {comparison.new}")
     table = Table(*(column.heading for column in columns), title=title)
     for line in records(changed.head(LINES)):
-        style = "red" if line["kind"] in WORSE else "green" if line["kind"] == BETTER else "yellow"
+        style = "red" if line["group"] == WORSE else "green" if line["group"] == BETTER else "yellow"
         table.add_row(*(plain(column.show(line)) for column in columns), style=style)
     if len(changed):
         console.print(table)
     if len(changed) > LINES:
         console.print(f"… and {len(changed) - LINES} more: --out writes them all", style="dim")
-    console.print(plain(comparison.summary), style="red" if comparison.count(*WORSE) else "green")
+    console.print(plain(comparison.summary), style="red" if comparison.worse else "green")

@@ -25,9 +25,10 @@ from .standings import TIE
 
 ENOUGH = 3  # repeats whose spread says how much times vary
 MISSING = "not measured"
-#: The kinds of lines, in their order.
-GONE, JUDGED_WORSE, DIGITS, SLOWER, CHANGED, BETTER, ADDED, SAME = range(8)
-WORSE = (GONE, JUDGED_WORSE, DIGITS, SLOWER)
+WORSE, CHANGED, BETTER, ADDED, SAME = "worse", "another status", "better", "new", "alike"
+#: The kinds of lines, in their order, and the group of each.
+GONE, JUDGED_WORSE, DIGITS, SLOWER, OTHER_STATUS, GAINED, NEW, UNCHANGED = range(8)
+GROUPS = (WORSE, WORSE, WORSE, WORSE, CHANGED, BETTER, ADDED, SAME)
 
 
 def compared(
@@ -36,7 +37,7 @@ def compared(
     """One line per measurement of either side. old, new : rows with their `measurement`.
 
     timed : whether times can be compared. Beside the figures of both sides, with the endings _old and _new:
-    `digits_lost`, `ratio` with `ratio_least` and `ratio_most`, `kind` and `change`, what is to be said of it.
+    `digits_lost`, `ratio` with `ratio_least` and `ratio_most`, `group`, and `change` in words.
     """
     before, after = merged(old).add_suffix("_old"), merged(new).add_suffix("_new")
     table = before.join(after, how="outer").reset_index()
@@ -53,7 +54,9 @@ def compared(
     found = [_change(line, max_digits_lost, max_slowdown) for line in table.to_dict("records")]
     table[["kind", "change", "size"]] = pd.DataFrame(found, table.index, ["kind", "change", "size"])
     order = {"kind": True, "size": False, "measurement": True}
-    return table.sort_values([*order], ascending=[*order.values()], ignore_index=True).drop(columns="size")
+    table["group"] = [GROUPS[kind] for kind in table["kind"]]
+    ordered = table.sort_values([*order], ascending=[*order.values()], ignore_index=True)
+    return ordered.drop(columns=["kind", "size"])
 
 
 def merged(rows: pd.DataFrame) -> pd.DataFrame:
@@ -100,7 +103,7 @@ def _change(line: dict[Hashable, Any], max_digits_lost: float, max_slowdown: flo
     if after == MISSING:
         return GONE, "no longer measured", 0.0
     if before == MISSING:
-        return ADDED, "new", 0.0
+        return NEW, "new", 0.0
     if ranks > 0:
         return JUDGED_WORSE, verdict, ranks
     if lost > max_digits_lost:
@@ -108,14 +111,14 @@ def _change(line: dict[Hashable, Any], max_digits_lost: float, max_slowdown: flo
     if ratio > max_slowdown and line["ratio_least"] > 1:
         return SLOWER, f"{ratio:.2f} times as long", ratio
     if ranks < 0:
-        return BETTER, verdict, np.inf
+        return GAINED, verdict, np.inf
     if lost < -max_digits_lost:
-        return BETTER, f"{-lost:.1f} digits gained", -lost
+        return GAINED, f"{-lost:.1f} digits gained", -lost
     if ratio < 1 / max_slowdown and line["ratio_most"] < 1:
-        return BETTER, f"{1 / ratio:.2f} times as fast", 0.0
+        return GAINED, f"{1 / ratio:.2f} times as fast", 0.0
     if line["status_old"] != line["status_new"]:
-        return CHANGED, f"{_words(line['status_old'])} → {_words(line['status_new'])}", 0.0
-    return SAME, "", 0.0
+        return OTHER_STATUS, f"{_words(line['status_old'])} → {_words(line['status_new'])}", 0.0
+    return UNCHANGED, "", 0.0
 
 
 def _words(name: str) -> str:
@@ -127,18 +130,14 @@ def by_solver(table: pd.DataFrame) -> pd.DataFrame:
     in the median and at most, and the geometric mean of the ratios of times.
     """
     both = table[(table[["verdict_old", "verdict_new"]] != MISSING).all(axis=1)]
-    lines = []
-    for solver, own in both.groupby("solver_new"):
-        ratios = own["ratio"].dropna()
-        lines.append(
-            {
-                "solver": solver,
-                "measurements": len(own),
-                "worse": int(own["kind"].isin(WORSE).sum()),
-                "better": int((own["kind"] == BETTER).sum()),
-                "digits_lost": own["digits_lost"].median(),
-                "most_digits_lost": own["digits_lost"].max(),
-                "ratio": float(np.exp(np.log(ratios).mean())) if len(ratios) else np.nan,
-            }
-        )
-    return pd.DataFrame(lines)
+    both = both.assign(worse=both["group"] == WORSE, better=both["group"] == BETTER)
+    both["ratio"] = np.log(both["ratio"])
+    found = both.groupby("solver_new").agg(
+        measurements=("group", "size"),
+        worse=("worse", "sum"),
+        better=("better", "sum"),
+        digits_lost=("digits_lost", "median"),
+        most_digits_lost=("digits_lost", "max"),
+        ratio=("ratio", "mean"),
+    )
+    return found.assign(ratio=np.exp(found["ratio"])).rename_axis("solver").reset_index()

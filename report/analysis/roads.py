@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.results.schema import BUILDING, DENSE_FORMS, MODEL
+from harness.results.schema import BUILDING, DENSE_FORMS
 from report.document.blocks import records
 from report.document.numbers import as_number
 from report.results.cells import cells_of
@@ -52,33 +52,18 @@ def roads(results: Results) -> pd.DataFrame:
 
 def _built(cell: Mapping[str, Any], problem: Mapping[str, Any]) -> dict[str, float]:
     """Seconds of what stands before the solver's own preparation, and MiB of the dense matrices."""
-    none = {"model_s": 0.0, "K_s": 0.0, "factors_s": 0.0, "Q_s": 0.0, "stored_mib": 0.0}
+    found = {"model_s": 0.0, "K_s": 0.0, "factors_s": 0.0, "Q_s": 0.0, "stored_mib": 0.0}
     if cell["form"] not in DENSE_FORMS:
-        own = _first(cell["model_s"], _seconds(_part(problem, "sparse"), MODEL), cell["load_s"])
-        return none | {"model_s": own}
-    found, sizes = dict(none), _part(problem, "stored_mib")
-    for stage in _stages(cell):
-        first, *others = (_seconds(problem, step) for step in BUILDING[stage])
+        return found | {"model_s": cell["model_s"]}
+    seconds, sizes = _known(problem.get("build_s")), _known(problem.get("stored_mib"))
+    for stage in BUILDING.keys() & str(cell["stages"]).split():
+        first, *others = (seconds.get(step, np.nan) for step in BUILDING[stage])
         found[f"{stage}_s"] = first + float(np.nansum(others))  # springs between parts, if there are any
-        found["stored_mib"] += _first(as_number(sizes.get(stage)))
+        found["stored_mib"] += sizes.get(stage, np.nan)
     return found
 
 
-def _stages(cell: Mapping[str, Any]) -> list[str]:
-    """Of K, factors and Q what a row of a dense form needed; older rows do not say."""
-    known = [stage for stage in str(cell["stages"]).split() if stage in BUILDING]
-    return known or (["K", "factors", "Q"] if cell["form"] == "dual" or cell["in_house"] else ["K"])
-
-
-def _part(problem: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    part = problem.get(name)
-    return part if isinstance(part, dict) else {}
-
-
-def _seconds(problem: Mapping[str, Any], step: str) -> float:
-    return _first(as_number(_part(problem, "build_s").get(step)))
-
-
-def _first(*values: float | None) -> float:
-    """The first that is known, else NaN."""
-    return next((value for value in values if value is not None and np.isfinite(value)), np.nan)
+def _known(part: object) -> dict[str, float]:
+    """The numbers of a part of a scene's row."""
+    found = {name: as_number(value) for name, value in part.items()} if isinstance(part, dict) else {}
+    return {name: value for name, value in found.items() if value is not None}

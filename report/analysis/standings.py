@@ -17,8 +17,7 @@ from report.results.labels import in_order
 from .precision import judged, with_errors
 
 #: Lines that take at most this many times as long as the fastest count as equally fast: single runs on a
-#: shared
-#: machine vary by as much.
+#: shared machine vary by as much.
 TIE = 1.15
 #: A chart shows the methods that were run on at least this share of its scenes.
 SHOWN = 0.5
@@ -66,10 +65,8 @@ def standings(cells: pd.DataFrame) -> pd.DataFrame:
         line |= {"outside": int(counts.get("outside", 0)), "outside_claimed": int(claimed.sum())}
         line |= {"cannot_be_judged": int(counts.get("cannot_be_judged", 0)), "no_answer": len(missed)}
         because = [f"{count} {status.replace('_', ' ')}" for status, count in Counter(missed).most_common()]
-        line |= {
-            "no_answer_because": ", ".join(because),
-            "worst_error_mm": mine["displacement_error_mm"].max(),
-        }
+        line["no_answer_because"] = ", ".join(because)
+        line["worst_error_mm"] = mine["displacement_error_mm"].max()
         own = slower[good["method"] == method].dropna()
         line |= {"share": line["within"] / len(mine), "slower": geometric_mean(own) if len(own) else np.inf}
         lines.append(line | {"peak_rss_mib": mine["peak_rss_mib"].max()})
@@ -102,14 +99,8 @@ def recommended(
     `library`, the fastest library, each with how many times as long it takes.
     """
     line = {"n": cells["n"].iloc[0], "scenes": cells["scene"].nunique(), "accuracy_mm": accuracy_mm}
-    line |= {
-        "use": "none on every scene",
-        "seconds": None,
-        "next": "",
-        "to_next": None,
-        "library": "",
-        "to_library": None,
-    }
+    line |= {"use": "none on every scene", "seconds": None, "next": "", "library": ""}
+    line |= {"to_next": None, "to_library": None}
     if accuracy_mm is not None and not judged(cells, accuracy_mm):
         return line | {"use": "cannot be judged: the reference is not accurate enough"}
     lines = fastest_first(cells, "label", seconds, accuracy_mm)

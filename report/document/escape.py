@@ -18,6 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
 
+from .numbers import as_number
+
 LONGEST = 1000  # characters of a text; what is longer ends in a fingerprint, so that it stays distinct
 LONGEST_NAME = 50  # characters of a file name
 LONGEST_LABEL = 80  # characters of a text in a picture
@@ -28,7 +30,6 @@ MARKDOWN = {
     **{"<": "&lt;", ">": "&gt;", "&": "&amp;", "`": "&#96;", "\n": " "},
 }
 QUOTED = {character: chr(0xE000 + place) for place, character in enumerate(MARKDOWN)}
-LINE_BREAK = QUOTED["\n"]
 #: Characters to be quoted; an underscore within a word has no meaning.
 ACTIVE = re.compile(r"[\\*\[\]#!~|$<>&`\n]|(?<![^\W_])_|_(?![^\W_])")
 #: Control characters, those that reverse the direction of text, lone surrogates, and the private ones.
@@ -76,11 +77,6 @@ def markdown(page: str) -> str:
     return page.translate(TO_MARKDOWN)
 
 
-def wrapped(text: str) -> str:
-    """Quoted text that keeps its line breaks where the next line begins with a letter."""
-    return re.sub(LINE_BREAK + r"(?=[^\W\d_])", "\n", text)
-
-
 def script_json(value: Any) -> str:
     """JSON for a script element of an HTML page: texts as they were, and nothing that could end the element.
 
@@ -108,7 +104,7 @@ def csv_cell(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     text = plain(value)
-    return f"'{text}" if text.lstrip()[:1] in tuple("=+-@") and not _is_number(text) else text
+    return f"'{text}" if text.lstrip()[:1] in tuple("=+-@") and as_number(text) is None else text
 
 
 def csv_frame(frame: pd.DataFrame) -> pd.DataFrame:
@@ -120,17 +116,9 @@ def csv_frame(frame: pd.DataFrame) -> pd.DataFrame:
     return spelled.rename(columns=csv_cell)
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 def label(text: str) -> str:
     """A text in a picture: one line, bounded, without mathematics."""
-    return short(plain(text.replace(LINE_BREAK, " ")), LONGEST_LABEL).replace("$", r"\$")
+    return short(plain(text.replace(QUOTED["\n"], " ")), LONGEST_LABEL).replace("$", r"\$")
 
 
 def picture(drawing: Figure) -> Figure:

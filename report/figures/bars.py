@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -37,22 +38,12 @@ def stacked(lines: pd.DataFrame, total: str, looks: Looks) -> Figure:
         places, left = np.arange(len(of_scene)), np.zeros(len(of_scene))
         for name, (_, color, hatch) in looks.items():
             width = of_scene[name].fillna(0.0).to_numpy(dtype=float)
-            axes.barh(
-                places,
-                width,
-                left=left,
-                height=0.74,
-                color=color,
-                hatch=hatch,
-                edgecolor="white",
-                linewidth=0.4,
-            )
+            look: Any = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.4}
+            axes.barh(places, width, left=left, height=0.74, **look)
             left += width
         for place, line in enumerate(records(of_scene)):
-            text = significant(line[total])
-            axes.annotate(
-                text, (left[place], place), (4, 0), textcoords="offset points", va="center", fontsize=8
-            )
+            at: Any = {"textcoords": "offset points", "va": "center", "fontsize": 8}
+            axes.annotate(significant(line[total]), (left[place], place), (4, 0), **at)
         axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of_scene) - 0.5, -0.5), xlabel="seconds")
         axes.set_yticks(places, [short(name, LONGEST) for name in of_scene["method"]])
         axes.tick_params(axis="y", length=0)

@@ -26,17 +26,12 @@ SHORT = {"memory_limit": "memory", "iteration_limit": "iterations", "unsupported
 
 
 def explained(cells: pd.DataFrame, standings: pd.DataFrame, limit: str) -> str:
-    """The caption of `scoreboard`: what occurs in it, and which methods it lacks."""
+    """The caption of `scoreboard`, with the methods that it lacks."""
     words = (
-        f"*Every solver on every scene, the best first.* Blue: within {limit}, seconds per load case; the "
-        f"darker, the closer to the fastest on the scene."
+        f"*Every solver on every scene, the best first.* Blue: within {limit}, seconds per load case, the "
+        "darker, the closer to the fastest on the scene; hatched: outside, the error in mm; grey: no answer, "
+        "and why; empty: not in the plan."
     )
-    if (cells["verdict"] == "outside").any():
-        words += " Hatched: outside the limit, with the error in mm."
-    if cells["verdict"].isin(["no_answer", "cannot_be_judged"]).any():
-        words += " Grey: no answer, and why; ?: cannot be judged."
-    if cells.groupby("method")["scene"].nunique().min() < cells["scene"].nunique():
-        words += " Empty: not in the plan."
     missing = sorted(set(standings["method"]) - set(cells["method"]))
     return words + (f" Run on fewer than half of the scenes: {listed(missing)}." if missing else "")
 

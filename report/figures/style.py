@@ -121,6 +121,13 @@ def figure_above(height: float, handles: list[Line2D]) -> Figure:
     return drawing
 
 
+def panels(count: int, height: float, handles: list[Line2D], **shared: bool) -> tuple[Figure, list[Axes]]:
+    """Panels of that height, one below the other, with a legend beside them."""
+    drawing = figure(height * count + 0.4)
+    drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
+    return drawing, list(drawing.subplots(count, 1, squeeze=False, **shared)[:, 0])
+
+
 def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Keyword arguments of `Axes.plot` for each method of some cells."""
     unknown = sorted(set(cells["solver"]) - set(KNOWN))
@@ -157,10 +164,6 @@ def forms_text(cells: pd.DataFrame) -> str:
     """How the forms of some cells look: 'Solid and filled: dual form; dashed and hollow: primal form.'"""
     words = "; ".join(words for form, words in FORMS.items() if (cells["form"] == form).any())
     return f" {words[0].upper()}{words[1:]}." if words else ""
-
-
-def line_only(style: dict[str, Any]) -> dict[str, Any]:
-    return {**style, "marker": ""}
 
 
 def marker_only(style: dict[str, Any]) -> dict[str, Any]:

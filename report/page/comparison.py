@@ -7,20 +7,12 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.code import commits_text
-from report.analysis.comparison import ADDED, BETTER, CHANGED, SAME, WORSE
 from report.document.blocks import records
 from report.document.numbers import listed
 
 from .banner import banner
 from .packed import Data
 
-GROUPS = {
-    **dict.fromkeys(WORSE, "worse"),
-    CHANGED: "another status",
-    BETTER: "better",
-    ADDED: "new",
-    SAME: "alike",
-}
 #: name, heading, whether it is a number
 COLUMNS = [
     ("measurement", "measurement", False),
@@ -68,7 +60,5 @@ def _banner(rows: pd.DataFrame) -> Data:
 
 
 def _line(line: dict[str, Any]) -> Data:
-    shown = {name: line.get(name) for name, *_ in COLUMNS}
-    return {name: None if pd.isna(value) else value for name, value in shown.items()} | {
-        "group": GROUPS[line["kind"]]
-    }
+    names = ["group", *(name for name, *_ in COLUMNS)]
+    return {name: None if pd.isna(line[name]) else line[name] for name in names}

@@ -95,14 +95,10 @@ def _look(style: dict[str, Any]) -> dict[str, str]:
 def _banner(results: Results) -> Data:
     rows = results.rows
     versions = rows[rows["solver_version"] != ""].groupby("solver")["solver_version"].unique()
+    again = f", {results.left_out} of them measured again or in search of a tolerance"
     return banner(
         rows,
-        counts=f"{len(rows) + results.left_out} rows"
-        + (
-            f", {results.left_out} of them measured again or in search of a tolerance"
-            if results.left_out
-            else ""
-        ),
+        counts=f"{len(rows) + results.left_out} rows{again if results.left_out else ''}",
         versions=[f"{solver} {listed(sorted(found))}" for solver, found in versions.items()],
         warnings=warnings(results),
     )

@@ -10,8 +10,6 @@ import pandas as pd
 from harness.results.schema import of_kind
 from report.document.escape import quoted
 
-from .older import as_today
-
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
 CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
@@ -24,7 +22,7 @@ def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str
     needs on top of the data. The size and the limits of a row that lacks them are those of its scene,
     of `problems` and of the suite.
     """
-    rows = pd.DataFrame([as_today(record) for record in records])
+    rows = pd.DataFrame(records)
     for name in [*NUMBERS, *FLAGS]:
         column = rows[name] if name in rows else pd.Series(np.nan, index=rows.index)
         rows[name] = pd.to_numeric(column, errors="coerce").astype(float)

@@ -50,7 +50,6 @@ SECTIONS: list[tuple[About, Callable[[Results], Section | None]]] = [
     ("scenes", accuracy.costs),
     ("scenes", accuracy.tolerances),
     ("scenes", accuracy.residuals),
-    ("scenes", accuracy.repeats),
     ("scenes", problems.section),
     ("scenes", gap_map.section),
     ("scenes", details.section),

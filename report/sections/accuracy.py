@@ -1,4 +1,4 @@
-"""Accuracy: what it costs, whose tolerance and which residual can be trusted, how well times repeat."""
+"""Accuracy: what it costs, whose tolerance and which residual can be trusted."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from harness.results.schema import ANSWERED
-from report.analysis.precision import ACCURACIES, CURVE_POINTS, ZERO_ERROR_MM, curves, judged, pareto, swept
+from report.analysis.precision import ACCURACIES, CURVE_POINTS, curves, judged, pareto, swept
 from report.analysis.standings import geometric_mean
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
@@ -21,19 +20,15 @@ from report.figures import style
 from report.figures.lines import styles_of
 from report.results.labels import in_order, named
 from report.results.reader import Results
-from report.results.rows import CELL
 
 REACHED, LATE, MISSED, UNJUDGED, NOT_RUN = "reached", "not in time", "missed", "cannot be judged", "not run"
 #: The state of a size is the first of these that occurs among its scenes.
 WORST_FIRST = (NOT_RUN, UNJUDGED, MISSED, LATE, REACHED)
 DIGITS = 2  # the fewest that a Pareto front spans for a factor to be fitted
 LARGEST_ERROR_MM = 1.0  # larger errors are drawn there
-RESIDUALS = {"primal_residual": "mm", "dual_residual": "N", "duality_gap": "N·mm"}
 PANEL = 2.7  # inches
 DOTTED: dict[str, Any] = {"color": "black", "linewidth": 1.1, "linestyle": (0, (1, 1.5))}
 STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, "drawstyle": "steps-post"}
-SPREAD = 0.2  # (largest − least) / median: a time that varies by more is called unstable
-SHORT = 0.05  # seconds: shorter times are dominated by the clock and the start of threads
 
 
 def costs(results: Results) -> Section | None:
@@ -178,8 +173,8 @@ def tolerances(results: Results) -> Section | None:
         "diagonal, or level."
     )
     sizes, styles = sorted(cells["n"].unique()), styles_of(cells)
-    drawing = style.figure(PANEL * len(sizes) + 0.4)
-    panels = drawing.subplots(len(sizes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    handles = style.legend_entries(styles)
+    drawing, panels = style.panels(len(sizes), PANEL, handles, sharex=True, sharey=True)
     panels[0].set(xscale="log", yscale="log")
     panels[0].xaxis.set_major_locator(LogLocator(numticks=20))
     for axes, n in zip(panels, sizes, strict=True):
@@ -190,7 +185,6 @@ def tolerances(results: Results) -> Section | None:
         axes.axline((1e-6, 1e-6), (1e-5, 1e-5), **DOTTED)
         axes.set(title=f"n = {n:.0f}", ylabel="displacement error, mm")
     panels[-1].set_xlabel("requested tolerance")
-    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     table = Table("asked-achieved", caption, trust(results), columns)
     return Section(
         "Requested tolerance and achieved error", [Figure("asked-achieved", words, drawing), table]
@@ -218,7 +212,7 @@ def trust(results: Results) -> pd.DataFrame:
 
 def residuals(results: Results) -> Section | None:
     """A small residual does not prove a small error."""
-    cells = swept(results).dropna(subset=["error", *RESIDUALS])
+    cells = swept(results).dropna(subset=["error", "primal_residual"])
     if cells.empty:
         return None
     small = cells[cells["primal_residual"] <= cells["limit_mm"]]
@@ -235,76 +229,5 @@ def residuals(results: Results) -> Section | None:
         number("their largest error, mm", "worst_error_mm", power),
     ]
     caption = "*What a primal residual within the limit implies*: how often the error was outside it."
-    styles = {name: look | {"linestyle": "", "markersize": 4.0} for name, look in styles_of(cells).items()}
-    drawing = style.figure(PANEL * len(RESIDUALS) + 0.4)
-    panels = drawing.subplots(len(RESIDUALS), 1, sharey=True)
-    for axes, (name, unit) in zip(panels, RESIDUALS.items(), strict=True):
-        for method, look in styles.items():
-            line = cells[cells["method"] == method]
-            axes.plot(line[name].abs().clip(lower=ZERO_ERROR_MM), line["error"], **look)
-        axes.set(
-            xscale="log",
-            yscale="log",
-            xlabel=f"{name.replace('_', ' ')}, {unit}",
-            ylabel="displacement error, mm",
-        )
-        axes.axhline(cells["limit_mm"].max(), **DOTTED)
-    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper")
-    words = (
-        "*Displacement error against the residuals* of every answer. If a small residual implied a small "
-        f"error, the upper left would be empty. Dotted: {results.limit}. Zero is drawn at "
-        f"{tidy_power(ZERO_ERROR_MM)}."
-    )
     table = Table("residual-error", caption, lines, columns)
-    return Section("Residuals and displacement error", [Figure("residual-error", words, drawing), table])
-
-
-def repeats(results: Results) -> Section | None:
-    """Times that vary by more than SPREAD between repeats, and why."""
-    rows = named(results.rows[results.rows["case"].isna()])  # the cases of a series are no repeats
-    rows = rows[rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()]
-    rows = rows.assign(seconds=rows[["setup_s", "solve_s", "form_s"]].sum(axis=1))
-    lines = []
-    for _, runs in rows.groupby(CELL, dropna=False, sort=False):
-        if len(runs) > 1:
-            seconds = runs["seconds"]
-            line: dict[str, Any] = {
-                "label": runs["label"].iloc[0],
-                "scene": runs["scene"].iloc[0],
-                "repeats": len(runs),
-            }
-            line |= {"median_s": seconds.median(), "least_s": seconds.min(), "most_s": seconds.max()}
-            lines.append(
-                line | {"percent": 100 * (seconds.max() - seconds.min()) / seconds.median(), "why": why(runs)}
-            )
-    if not lines:
-        return None
-    table = pd.DataFrame(lines)
-    unstable = table[table["percent"] > 100 * SPREAD].sort_values("percent", ascending=False)
-    columns = [
-        word("solver (form)", "label"),
-        word("scene", "scene"),
-        number("repeats", "repeats", whole),
-        number("median, s", "median_s"),
-        number("least, s", "least_s"),
-        number("largest, s", "most_s"),
-        number("spread, %", "percent", whole),
-        word("why", "why"),
-    ]
-    caption = (
-        f"*Unreliable times*: {len(unstable)} of {len(table)} measured repeatedly vary by more than "
-        f"{SPREAD:.0%} of the median; half of them by at most {table['percent'].median():.1f} %."
-    )
-    return Section("Repeatability of the times", [Table("unstable-times", caption, unstable, columns)])
-
-
-def why(runs: pd.DataFrame) -> str:
-    """What differs between the repeats of one measurement, the likeliest cause first."""
-    for name, words in (("iterations", "iterations"), ("inner_iterations", "inner iterations")):
-        least, most = runs[name].min(), runs[name].max()
-        if most > least:
-            return f"{whole(least)} to {whole(most)} {words}: the solver is not deterministic"
-    if runs["seconds"].median() < SHORT:
-        return f"shorter than {SHORT:g} s: dominated by the start of threads and the clock"
-    slowest = runs.sort_values("seconds")["recorded_at"].iloc[-1]
-    return f"the same iterations each time, so the machine; slowest at {slowest}"
+    return Section("Residuals and displacement error", [table])

@@ -37,13 +37,11 @@ def section(results: Results) -> Section | None:
 def _figure(cells: pd.DataFrame) -> Figure:
     dots = {"markersize": 4.0, "linestyle": ""}
     styles = {name: look | dots for name, look in styles_of(cells).items()}
-    panels = [*cells.groupby("n")]
-    drawing = style.figure(PANEL * len(panels) + 0.3)
-    for axes, (n, of_size) in zip(drawing.subplots(len(panels), 1, squeeze=False)[:, 0], panels, strict=True):
+    drawing, panels = style.panels(cells["n"].nunique(), PANEL, entries(cells, styles))
+    for axes, (n, of_size) in zip(panels, cells.groupby("n"), strict=True):
         against_contacts(axes, of_size, styles)
         axes.set_title(f"n = {n:.0f}, {of_size['scene'].nunique()} scenes", pad=5)
     axes.set_xlabel("closed contacts")
-    drawing.legend(handles=entries(cells, styles), loc="outside right upper")
     return Figure("drawn", "*Seconds of every solve* (set-up + solve) against the closed contacts.", drawing)
 
 
@@ -81,15 +79,7 @@ def _failures(cells: pd.DataFrame) -> Table:
         number("error, mm", "displacement_error_mm", power),
         number("s", "load_case_s"),
     ]
-    names = [
-        "scene",
-        "method",
-        "tolerance",
-        "status",
-        "verdict",
-        "active",
-        "displacement_error_mm",
-        "load_case_s",
-    ]
+    names = ["scene", "method", "tolerance", "status", "verdict"]
+    names += ["active", "displacement_error_mm", "load_case_s"]
     caption = "*Not solved, or not within the limit.*"
     return Table("drawn-failures", caption, cells.sort_values(["n", "scene", "method"])[names], columns)

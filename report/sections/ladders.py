@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
 import pandas as pd
 
 from harness.results.schema import LADDERS
@@ -18,7 +15,7 @@ from report.analysis.outcomes import (
     is_correct,
     with_outcomes,
 )
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.blocks import Block, Figure, Section, Table, Text, number, word
 from report.document.numbers import MISSING, as_number, counted, power, whole
 from report.figures.ladder_map import ladder_map
 from report.results.labels import in_order
@@ -63,34 +60,36 @@ def claims(cells: pd.DataFrame) -> str:
     """How often a wrong answer is reported as solved."""
     wrong = cells["outcome"] == WRONG_CLAIMED
     counts = [
-        f"{int(wrong[ours].sum())} of {counted(int(ours.sum()), 'row')} of {whose}"
+        f"{wrong[ours].sum()} of {counted(len(wrong[ours]), 'row')} of the {whose}"
         for whose, ours in (
-            ("the in-house solvers", cells["in_house"]),
-            ("the libraries", ~cells["in_house"]),
+            ("in-house solvers", cells["in_house"]),
+            ("libraries", ~cells["in_house"]),
         )
     ]
     return f"Wrong answers reported as solved: {' and '.join(counts)}."
 
 
 def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
-    lines = []
-    for label in order:
-        mine = cells[cells["label"] == label]
-        line: dict[str, Any] = {"label": label, "rungs": len(mine)}
-        line |= {name: int((mine["outcome"] == name).sum()) for name in OUTCOMES}
-        solved = mine[mine["status"] == "solved"]
-        line["worst_share"] = (solved["displacement_error_mm"] / solved["limit_mm"]).max()
-        line["backward_error"] = solved["backward_error"].median()
-        wrong = mine.loc[mine["outcome"] == WRONG_CLAIMED, "scene"]
-        lines.append(line | {"where": ", ".join(scene.split("/", 1)[1] for scene in wrong)})
+    counts = pd.crosstab(cells["label"], cells["outcome"]).reindex(
+        index=order, columns=[*OUTCOMES], fill_value=0
+    )
+    solved = cells[cells["status"] == "solved"]
+    solved = solved.assign(share=solved["displacement_error_mm"] / solved["limit_mm"]).groupby("label")
+    wrong = cells[cells["outcome"] == WRONG_CLAIMED].groupby("label")["scene"]
+    table = counts.assign(
+        rungs=counts.sum(axis=1),
+        worst_share=solved["share"].max(),
+        backward_error=solved["backward_error"].median(),
+        where=wrong.agg(lambda scenes: ", ".join(scene.split("/", 1)[1] for scene in scenes)),
+    )
     columns = [word("solver (form)", "label"), number("rungs", "rungs", whole)]
     columns += [
         number(name, name, whole) for name in (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, NO_ANSWER)
     ]
-    columns.append(Column("**wrong, reported solved**", _bold(WRONG_CLAIMED)))
+    columns.append(number(f"**{WRONG_CLAIMED}**", WRONG_CLAIMED, _bold))
     columns.append(number("largest error / limit, reported solved", "worst_share", power))
     caption = "*Wrong answers reported as solved* are the worst outcome."
-    return Table("honesty", caption, pd.DataFrame(lines), columns)
+    return Table("honesty", caption, table.reset_index(), columns)
 
 
 def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Table:
@@ -117,8 +116,8 @@ def _first_broken(line: pd.DataFrame, rungs: list[str]) -> str:
     return f"{first} ×" if broken.get(first) == WRONG_CLAIMED else first
 
 
-def _bold(name: str) -> Callable[[Mapping[str, Any]], str]:
-    return lambda row: f"**{row[name]}**" if row[name] else "0"
+def _bold(count: object) -> str:
+    return f"**{count}**" if count else "0"
 
 
 def rungs(results: Results) -> Section | None:
@@ -145,17 +144,8 @@ def rungs(results: Results) -> Section | None:
     broken = with_outcomes(results.cells).query("verdict != 'within'").sort_values(["scene", "label"])
     if len(broken):
         figures = ("displacement_error_mm", "limit_mm", "backward_error")
-        kept = [
-            "label",
-            "scene",
-            "status",
-            "verdict",
-            "outcome",
-            *figures,
-            "iterations",
-            "solve_s",
-            "message",
-        ]
+        kept = ["label", "scene", "status", "verdict", "outcome"]
+        kept += [*figures, "iterations", "solve_s", "message"]
         columns = [word("rung", "scene"), word("solver (form)", "label"), word("status", "status")]
         columns += [
             number(name, key, power)

@@ -13,27 +13,19 @@ from report.results.labels import in_order
 from report.results.reader import Results
 
 MEANING = """\
-### What the columns mean
+Each measurement runs in its own process; the clock starts after the imports.
 
 - **form**: *primal*, min ½xᵀKx − fᵀx, Aᵀx ≤ g; *dual*, min ½λᵀQλ − pᵀλ, λ ≥ 0, with Q = AᵀK⁻¹A, p = AᵀK⁻¹f −
-g, x = K⁻¹(f − Aλ); *sparse*, the primal in all unknowns of the finite-element model.
-- **error**: max |x − x*| in mm, x* the reference answer, computed from the saved answer.
-- **verdict**: the judge's, from the error alone; *cannot be judged* if the reference error bound is too
-large.
-- **status**: what the solver reported, or what ended the run; *not run*: predicted to exceed the time limit.
-- **iterations (inner)**: outer iterations, for an active-set method changes of the active set; inner ones in
-brackets. - **convert**, **prepare**: once per assembly. **set-up**, **solve**, **form** (p and x of the
-dual): once per load case. - **time per load case**: set-up + solve + form. **Total**: that, convert and
-prepare.
+  g, x = K⁻¹(f − Aλ); *sparse*, the primal in all unknowns of the finite-element model.
+- **error**: max |x − x*| in mm, x* the reference answer.
+- **verdict**: the judge's, from the error alone; *cannot be judged* if the reference's error bound is large.
+- **status**: what the solver reported, or what ended the run.
+- **iterations (inner)**: for an active-set method changes of the active set.
+- **convert**, **prepare**: once per assembly. **Set-up**, **solve**, **form** (p and x of the dual): once per
+  load case, its time their sum. **Total**: that, convert and prepare.
 - **peak**: the largest resident memory of the measuring process, including mapped data.
 
-### Reproduce this run
-
-From the directory that holds `measurements.jsonl`:
-
-```
-python -m harness run suite.toml --out again
-```"""
+To reproduce: `python -m harness run suite.toml --out again`, in the directory of `measurements.jsonl`."""
 
 
 def section(results: Results) -> Section | None:
@@ -56,15 +48,10 @@ def section(results: Results) -> Section | None:
     found = rows.groupby("solver")[["solver_version", "solver_code"]].agg(_values)
     found = found.reindex(in_order(rows, "solver")).reset_index()
     columns = [word("solver", "solver"), word("version", "solver_version"), word("code", "solver_code")]
-    method = (
-        "Each measurement runs in its own process; thread counts are set before numpy is loaded, and the "
-        f"clock starts after the imports. An answer counts if it is within {results.limit} of the reference, "
-        "whatever the solver reports."
-    )
     blocks: list[Block] = [
         Table("machine", "*The machine.*", known, [word("what", "what"), word("value", "value")]),
         Table("versions", "*The solvers*, with a fingerprint of the code that calls them.", found, columns),
-        Text(f"{method}\n\n{MEANING}"),
+        Text(MEANING),
     ]
     return Section("Machine and method", blocks)
 

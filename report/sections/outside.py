@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import Any
-
+import numpy as np
 import pandas as pd
 
 from report.analysis.seconds import seconds_text
@@ -53,14 +50,19 @@ def _printed(best: pd.DataFrame, problems: pd.DataFrame) -> Table | None:
 
 def _refined(best: pd.DataFrame) -> Table | None:
     parts = best["scene"].str.split("/", expand=True)
-    sizes = pd.to_numeric(parts[2], errors="coerce")
-    lines: list[dict[str, Any]] = []
-    for problem, cells in (
-        best.assign(problem=parts[1], cells=sizes).dropna(subset="cells").groupby("problem")
-    ):
-        lines += _line_of_each(str(problem), records(cells.sort_values("cells")))
-    if not lines:
+    lines = best.assign(problem=parts[1], cells=pd.to_numeric(parts[2], errors="coerce"))
+    lines = lines.dropna(subset="cells").sort_values(["problem", "cells"], ignore_index=True)
+    if lines.empty:
         return None
+    before = lines.groupby("problem")[["cells", "objective"]].shift()
+    change, halved = lines["objective"] - before["objective"], lines["cells"] == 2 * before["cells"]
+    ratio = change.shift() / change.where(change != 0)
+    known = halved & halved.shift(fill_value=False) & (ratio > 0)
+    lines = lines[["problem", "cells", "n", "active", "objective"]].assign(
+        change=change,
+        order=np.log2(ratio.where(known)),
+        seconds=[seconds_text(cell) for cell in records(lines)],
+    )
     columns = [
         word("problem", "problem"),
         number("cells a side", "cells", whole),
@@ -75,24 +77,4 @@ def _refined(best: pd.DataFrame) -> Table | None:
         "*Refinement*: the change of the objective from the grid before; order: p with changes as hᵖ, from "
         "three grids each of half the spacing. Seconds per load case of that answer."
     )
-    return Table("outside-refinement", caption, pd.DataFrame(lines), columns)
-
-
-def _line_of_each(problem: str, cells: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    lines: list[dict[str, Any]] = []
-    for cell in cells:
-        line = {name: cell[name] for name in ("cells", "n", "active", "objective")}
-        line |= {"problem": problem, "seconds": seconds_text(cell), "change": math.nan, "order": math.nan}
-        if lines:
-            line["change"] = line["objective"] - lines[-1]["objective"]
-            line["order"] = _order(line, lines[-1], lines[-2] if len(lines) > 1 else None)
-        lines.append(line)
-    return lines
-
-
-def _order(fine: Mapping[str, Any], middle: Mapping[str, Any], coarse: Mapping[str, Any] | None) -> float:
-    """log₂ of the ratio of two changes of one sign, of grids that are halved each time; else NaN."""
-    if coarse is None or fine["cells"] != 2 * middle["cells"] or middle["cells"] != 2 * coarse["cells"]:
-        return math.nan
-    ratio = middle["change"] / fine["change"] if fine["change"] else math.nan
-    return math.log2(ratio) if ratio > 0 else math.nan
+    return Table("outside-refinement", caption, lines, columns)

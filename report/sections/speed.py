@@ -14,7 +14,6 @@ from matplotlib.figure import Figure as Drawing
 
 from report.analysis.fit import exponent
 from report.analysis.precision import judged, with_errors
-from report.analysis.relative import load_cases
 from report.analysis.roads import LOAD_CASES, STAGES, roads
 from report.analysis.seconds import seconds_text
 from report.analysis.standings import best_tolerances, shown
@@ -74,6 +73,29 @@ def _ends(cells: pd.DataFrame) -> list[str]:
     return [
         scene for _, of_size in scenes.groupby("n")["scene"] for scene in {of_size.iloc[0], of_size.iloc[-1]}
     ]
+
+
+def load_cases(results: Results) -> pd.DataFrame:
+    """The rows within the limit, with `method`, the seconds per load case and their ratios.
+
+    load_case_s : set-up + solve + form
+    total_s : the same with the solver's own preparation, paid once per assembly
+    to_cholesky : load_case_s over one Cholesky factorisation of Q in the same process
+    to_library, total_to_library : over the fastest library on the same scene, in any form, by its median
+    """
+    rows = results.rows
+    keys = ["scene", "solver", "form", "variant", "tolerance", "threads"]
+    names = results.cells_by_threads()[[*keys, "method"]]
+    cases = rows[rows["verdict"] == "within"].merge(names, on=keys)
+    cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
+    cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
+    cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
+    libraries = cases[~cases["in_house"]].groupby(["scene", "threads", "method", "tolerance"])
+    library = libraries[["load_case_s", "total_s"]].median().groupby(["scene", "threads"]).min()
+    cases = cases.join(library.add_prefix("library_"), on=["scene", "threads"])
+    cases["to_library"] = cases["load_case_s"] / cases["library_load_case_s"]
+    cases["total_to_library"] = cases["total_s"] / cases["library_total_s"]
+    return cases
 
 
 def relative(results: Results) -> Section | None:
@@ -142,17 +164,14 @@ def contacts(results: Results) -> Section | None:
     cells = cells[sizes["active"].transform("nunique") >= FEWEST]
     if cells.empty or cells["load_case_s"].isna().all():
         return None
-    panels, styles = [*cells.groupby(["n", "m"], dropna=False)], styles_of(cells)
-    drawing = style.figure(PANEL * len(panels) + 0.3)
-    for axes, ((n, m), of_size) in zip(
-        drawing.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True
-    ):
+    sizes, styles = cells.groupby(["n", "m"], dropna=False), styles_of(cells)
+    drawing, panels = style.panels(sizes.ngroups, PANEL, entries(cells, styles))
+    for axes, ((n, m), of_size) in zip(panels, sizes, strict=True):
         against_contacts(axes, of_size, styles)
         axes.set_title(f"n = {n:.0f}" + (f", m = {m:.0f}" if m > 0 else ""), pad=5)
         if of_size["cholesky_s"].notna().any():
             yardstick(axes, of_size.groupby("active")["cholesky_s"].median().dropna(), "one Cholesky of Q")
     axes.set_xlabel("active contacts")
-    drawing.legend(handles=entries(cells, styles), loc="outside right upper", handlelength=3.2)
     caption = (
         "*Seconds per load case against the active contacts*, with the best tolerance on each scene; "
         f"methods run on at least half of the scenes.{style.forms_text(cells)} "
@@ -169,26 +188,9 @@ def from_scene(results: Results) -> Section | None:
     order = in_order(lines)
     table = lines.assign(place=lines["label"].map(order.index), made_s=lines[[*MADE]].sum(axis=1))
     table = table.sort_values(["n", "active", "scene", "total_1_s", "place"])
-    kept = [
-        "scene",
-        "n",
-        "m",
-        "active",
-        "label",
-        "threads",
-        "tolerance",
-        "status",
-        "verdict",
-        *STAGES,
-        "made_s",
-    ]
-    kept += [
-        *(f"total_{k}_s" for k in LOAD_CASES),
-        "stored_mib",
-        "peak_rss_mib",
-        "load_case_s",
-        "time_limit_s",
-    ]
+    kept = ["scene", "n", "m", "active", "label", "threads", "tolerance", "status", "verdict"]
+    kept += [*STAGES, "made_s", *(f"total_{k}_s" for k in LOAD_CASES)]
+    kept += ["stored_mib", "peak_rss_mib", "load_case_s", "time_limit_s"]
     columns = [word("scene", "scene"), word("solver (form)", "label"), number("matrices, s", "made_s")]
     columns += [Column(f"{counted(k, 'load case')}, s", partial(_total, load_cases=k)) for k in LOAD_CASES]
     columns += [
@@ -245,15 +247,9 @@ def variants(results: Results) -> Section | None:
     both["ratio"] = (both["load_case_s"] / both["load_case_s_plain"]).where(both["verdict"] == "within")
 
     def line(mine: pd.DataFrame) -> dict[str, Any]:
-        within = int((mine["verdict"] == "within").sum())
-        medians = mine[["iterations", "iterations_plain"]].median().to_dict()
-        worst = mine["displacement_error_mm"].max()
-        return (
-            {"scenes": len(mine), "within": within}
-            | _spread(mine["ratio"], "ratio")
-            | medians
-            | {"error_mm": worst}
-        )
+        found = {"scenes": len(mine), "within": int((mine["verdict"] == "within").sum())}
+        found |= _spread(mine["ratio"], "ratio") | {"error_mm": mine["displacement_error_mm"].max()}
+        return found | mine[["iterations", "iterations_plain"]].median().to_dict()
 
     columns = [
         word("solver (form), variant", "method"),
@@ -317,13 +313,14 @@ def _exponent(line: Mapping[str, Any], name: str) -> str:
 
 
 def _growth(within: pd.DataFrame) -> Drawing:
-    drawing, styles = style.figure(7.0), styles_of(within)
+    styles = styles_of(within)
+    drawing, panels = style.panels(2, 3.3, style.legend_entries(styles), sharex=True)
     known = within.groupby("n")[["cholesky_s", "m"]].median().dropna()
     limits = {
         "load_case_s": (known["cholesky_s"], "one Cholesky of Q"),
         "working_mib": (8 * known["m"] ** 2 / 2**20, "Q itself"),
     }
-    for axes, (name, limit) in zip(drawing.subplots(2, 1, sharex=True), limits.items(), strict=True):
+    for axes, (name, limit) in zip(panels, limits.items(), strict=True):
         for method, look in styles.items():
             line = within[within["method"] == method]
             axes.plot(line["n"], line[name].where(line[name] >= GROWING[name][1]), **look)
@@ -334,7 +331,6 @@ def _growth(within: pd.DataFrame) -> Drawing:
     axes.set_xticks(ticks, [f"{n:.0f}" for n in ticks])
     axes.minorticks_off()
     axes.set_xlabel("n")
-    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     return drawing
 
 
@@ -381,8 +377,7 @@ def ratios(cells: pd.DataFrame) -> pd.DataFrame:
 
 def _profiles(times: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> Drawing:
     right = max(2.0, 1.3 * float(times.where(np.isfinite(times)).max().max()))
-    drawing = style.figure(3.6)
-    axes = drawing.subplots()
+    drawing, (axes,) = style.panels(1, 3.2, style.legend_entries(styles))
     for method, look in styles.items():
         met, counts = np.unique(times[method][np.isfinite(times[method])], return_counts=True)
         shares = counts.cumsum() / len(times)
@@ -392,5 +387,4 @@ def _profiles(times: pd.DataFrame, styles: dict[str, dict[str, Any]]) -> Drawing
     axes.set(xscale="log", xlim=(0.97, right), ylim=(-0.04, 1.06))
     axes.set(xlabel="τ: time over that of the fastest", ylabel="share of the load cases")
     style.plain_log(axes.xaxis)
-    drawing.legend(handles=style.legend_entries(styles), loc="outside right upper", handlelength=3.2)
     return drawing

@@ -9,9 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.comparison import ADDED, BETTER, CHANGED, SAME, WORSE, by_solver
+from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
 from report.document.blocks import Block, Column, Section, Table, Text, number, word
-from report.document.escape import csv_frame
+from report.document.escape import csv_frame, file_name
 from report.document.numbers import MISSING, as_number, counted, power, significant, whole
 from report.page.comparison import comparison_data
 from report.page.write import write as write_page
@@ -31,20 +31,15 @@ class Comparison:
     untimed: str
     rows: pd.DataFrame
 
-    def count(self, *kinds: int) -> int:
-        return int(self.table["kind"].isin(kinds).sum())
+    @property
+    def worse(self) -> bool:
+        return bool((self.table["group"] == WORSE).any())
 
     @property
     def summary(self) -> str:
-        """'238 measurements: 3 worse, 5 better, 1 of another status, 229 alike.'"""
-        kinds = {
-            "worse": WORSE,
-            "better": (BETTER,),
-            "of another status": (CHANGED,),
-            "new": (ADDED,),
-            "alike": (SAME,),
-        }
-        counts = [f"{count} {words}" for words, some in kinds.items() if (count := self.count(*some))]
+        """'238 measurements: 3 worse, 5 better, 1 another status, 229 alike.'"""
+        found = self.table["group"].value_counts()
+        counts = [f"{found[group]} {group}" for group in dict.fromkeys(GROUPS) if group in found]
         return f"{counted(len(self.table), 'measurement')}: {', '.join(counts)}. {self.untimed}".strip()
 
 
@@ -86,11 +81,6 @@ SOLVERS = [
     number("most", "most_digits_lost"),
     number("ratio of times, geometric mean", "ratio"),
 ]
-GROUPS = (
-    ("worse", "*Worse.*", WORSE),
-    ("changed", "*Another status.*", (CHANGED,)),
-    ("better", "*Better.*", (BETTER,)),
-)
 NOTE = (
     "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
     "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
@@ -106,7 +96,7 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
         blocks = _blocks(each.table, each.summary, f"{place}-" if len(comparisons) > 1 else "")
         sections.append(Section(f"{each.old} → {each.new}", blocks))
     every = pd.concat([each.table.assign(old=each.old, new=each.new) for each in comparisons])
-    csv_frame(every.drop(columns="kind")).to_csv(out / "comparison.csv", index=False)
+    csv_frame(every).to_csv(out / "comparison.csv", index=False)
     title = f"Compared with {comparisons[0].old}"
     pairs = [(each.old, each.new, each.summary, each.table) for each in comparisons]
     rows = pd.concat([each.rows for each in comparisons])
@@ -116,10 +106,9 @@ def write(out: Path, comparisons: list[Comparison]) -> Path:
 
 def _blocks(table: pd.DataFrame, summary: str, prefix: str) -> list[Block]:
     blocks: list[Block] = [Text(f"{summary} Every measurement: [comparison.csv](comparison.csv).")]
-    for name, caption, kinds in GROUPS:
-        lines = table[table["kind"].isin(kinds)].drop(columns="kind")
-        if len(lines):
-            blocks.append(Table(prefix + name, caption, lines, COLUMNS))
+    for group in (WORSE, CHANGED, BETTER):
+        if len(lines := table[table["group"] == group]):
+            blocks.append(Table(f"{prefix}{file_name(group)}", f"*{group.capitalize()}.*", lines, COLUMNS))
     solvers = by_solver(table)
     if len(solvers):
         blocks.append(Table(f"{prefix}solvers", "*Solver by solver.*", solvers, SOLVERS))

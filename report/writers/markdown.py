@@ -8,7 +8,6 @@ from pathlib import Path
 from report.analysis.checks import warnings
 from report.document.blocks import Block, Section, Text
 from report.document.contents import contents
-from report.document.escape import wrapped
 from report.figures import style
 from report.page.run import run_data
 from report.page.write import write as write_page
@@ -33,7 +32,7 @@ def write(directory: Path) -> Path:
         sections = [
             section for k, part in enumerate(machines) for section in _made(part, k if machines[1:] else None)
         ]
-    intro = [wrapped(str(results.suite.get("description", "")))]
+    intro = [str(results.suite.get("description", ""))]
     intro += [f"> **Warning.** {warning}" for warning in warnings(results)]
     if results.rows.empty:
         intro.append("Nothing was measured: `measurements.jsonl` holds no row.")

@@ -262,7 +262,6 @@ def test_charts_show_methods_run_on_half_of_the_scenes_and_name_the_others(tmp_p
     assert set(shown(cells)["method"]) == {"a (dual)", "b (dual)"}
     caption = explained(shown(cells), standings(cells), "1e-7 mm")
     assert "Run on fewer than half of the scenes: c (dual)." in caption
-    assert "Hatched" not in caption
     alone = read(write_rows(tmp_path / "alone", [r for r in rows if r["solver"] != "b"])).cells
     assert shown(alone).empty
 

@@ -49,9 +49,7 @@ def advised(found: Results) -> Any:
     return lines[lines["seconds of"] == summary.EACH].set_index("accuracy_mm")
 
 
-@pytest.mark.parametrize(
-    "section", [accuracy.costs, accuracy.tolerances, accuracy.residuals, accuracy.repeats]
-)
+@pytest.mark.parametrize("section", [accuracy.costs, accuracy.tolerances, accuracy.residuals])
 def test_without_a_sweep_there_is_no_section(tmp_path: Path, section: Any) -> None:
     rows = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
     assert section(results(tmp_path / "two", rows)) is None
@@ -71,7 +69,7 @@ def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> No
     written = write(write_rows(tmp_path, rows)).read_text("utf-8")
     for title in (
         *("Which solver to use", "The cost of accuracy", "Requested tolerance and achieved error"),
-        *("Residuals and displacement error", "Performance profiles", "Repeatability of the times"),
+        *("Residuals and displacement error", "Performance profiles"),
     ):
         assert f"## {title}\n" in written
     for picture in (tmp_path / "report").glob("*.png"):
@@ -236,27 +234,6 @@ def test_the_recommendation_follows_the_times(tmp_path: Path) -> None:
     found = advised(results(tmp_path / "c", coarse))
     assert found.loc[1e-3, "use"] == "late (dual) 1e-4"
     assert found.loc[1e-9, "use"] == "none on every scene"
-
-
-def test_unstable_times_are_warned_of_with_the_reason(tmp_path: Path) -> None:
-    def repeats(digits: int, seconds: tuple[float, ...], **figures: list[Any]) -> list[dict[str, Any]]:
-        return [
-            answer(LOW, "a", digits, s, 1e-9, repeat=i) | {name: v[i] for name, v in figures.items()}
-            for i, s in enumerate(seconds)
-        ]
-
-    rows = repeats(7, (1.0, 1.1, 1.05)) + repeats(8, (1.0, 2.0, 1.6), recorded_at=["x", "noon", "z"])
-    rows += repeats(9, (1.0, 3.0), iterations=[20, 31]) + repeats(6, (0.01, 0.03))
-    rows.append(answer(LOW, "b", 9, 1.0, 1e-9))
-    section = accuracy.repeats(results(tmp_path, rows))
-    assert "3 of 4 measured repeatedly vary by more than 20%" in table(section, "unstable-times").caption
-    found = table(section, "unstable-times").data.set_index("label")
-    line = found.loc["a (dual) 1e-8"]
-    assert line[["median_s", "least_s", "most_s"]].tolist() == [1.6, 1.0, 2.0]
-    assert line["percent"] == pytest.approx(100 / 1.6)
-    assert line["why"] == "the same iterations each time, so the machine; slowest at noon"
-    assert found.loc["a (dual) 1e-9", "why"] == "20 to 31 iterations: the solver is not deterministic"
-    assert found.loc["a (dual) 1e-6", "why"].startswith("shorter than 0.05 s")
 
 
 def test_the_best_of_several_tolerances_stands_for_a_solver(tmp_path: Path) -> None:

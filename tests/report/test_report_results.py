@@ -1,4 +1,4 @@
-"""How the report reads rows: those of older versions, of several forms and of different code."""
+"""How the report reads rows: those of several forms and of different code."""
 
 import re
 from pathlib import Path
@@ -41,21 +41,7 @@ def test_a_section_is_a_function_in_the_list(tmp_path: Path, monkeypatch: pytest
     assert re.findall("^## (.*)", text, re.M)[:2] == ["Hello to 1 row", "Summary"]
 
 
-# Rows of older versions.
-
-
-def test_older_rows_are_read_as_todays(tmp_path: Path) -> None:
-    late = no_answer("time_limit")
-    rows = [row(LOW, "newton"), row(LOW, "piqp"), row(HIGH, "newton", together=16)]
-    rows += [row(HIGH, "piqp", **late, message="not run: too slow already on 4386/0100")]
-    found = read(write_rows(tmp_path, rows)).rows
-    assert found["in_house"].tolist() == [True, False, True, False]
-    assert found["status"].tolist() == ["solved", "solved", "solved", "not_run"]
-    assert found["batched"].tolist()[2] == 16
-    assert "together" not in found
-
-
-def test_todays_rows_are_taken_at_their_word(tmp_path: Path) -> None:
+def test_rows_are_taken_at_their_word(tmp_path: Path) -> None:
     rows = [row(LOW, "mine", in_house=True, batched=8), row(LOW, "newton", in_house=False)]
     rows += [row(HIGH, "mine", in_house=True, **no_answer("not_run"))]
     rows += [row(HIGH, "newton", in_house=False, **no_answer("crashed"), message="not run: no reason")]

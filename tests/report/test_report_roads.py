@@ -67,29 +67,6 @@ def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
     assert line_of(lines, "newton (sparse)")["stored_mib"] == 0
 
 
-@pytest.mark.parametrize(
-    ("solver", "form", "first"),
-    [
-        ("newton", "dual", 11.9),
-        ("gi", "primal", 11.9),
-        ("clarabel", "primal", 8.9),
-        ("newton", "sparse", 1.1),
-    ],
-)
-def test_older_rows_are_read(tmp_path: Path, solver: str, form: str, first: float) -> None:
-    """They do not say which stages were used, nor the seconds of the model alone."""
-    rows = [sparse(solver="other"), dense(solver="another")]
-    old = {"stages": None, "model_s": None, "in_house": solver != "clarabel"}
-    rows.append(sparse(**old) if form == "sparse" else dense(solver=solver, form=form, **old))
-    assert totals(line_of(roads(results(tmp_path, rows)), f"{solver} ({form})"))[0] == pytest.approx(first)
-
-
-def test_the_seconds_of_an_older_sparse_model_are_those_of_the_driver(tmp_path: Path) -> None:
-    own = {"sparse": {"build_s": {"model": 0.7}}}
-    lines = roads(results(tmp_path, [sparse(model_s=None), dense()], **own))
-    assert line_of(lines, "newton (sparse)")["model_s"] == 0.7
-
-
 def test_only_answers_within_the_limit_have_a_total(tmp_path: Path) -> None:
     rows = [sparse(), dense(), dense(solver="piqp", verdict="outside"), dense(solver="osqp")]
     rows[-1] |= no_answer("time_limit")

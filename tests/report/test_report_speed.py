@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from synthetic_results import no_answer, row, write_rows
 
-from report.analysis.relative import load_cases
 from report.figures import style
 from report.results.reader import read
 from report.sections import speed
+from report.sections.speed import load_cases
 
 LOW, HIGH = "4386/0052", "4386/1074"
 TIMES = {"setup_s": 0.0, "form_s": 0.0}

@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from problems.errors import InputError
-from report.results import older
 from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
 from solvers.registry import in_house, make_solver, modules, solver_names, solver_version
@@ -23,10 +22,6 @@ def test_solvers_are_found_by_their_files() -> None:
     assert {"quadprog", "daqp", "qpalm"} <= set(NAMES)
     assert len(NAMES) == len(set(NAMES))
     assert [name for name in NAMES if in_house(name)] == IN_HOUSE
-
-
-def test_what_the_report_takes_for_in_house_in_older_rows_still_is() -> None:
-    assert all(map(in_house, older.IN_HOUSE))
 
 
 @pytest.mark.parametrize("name", LIBRARIES)
