@@ -19,7 +19,8 @@ import numpy as np
 import pandas as pd
 
 from harness.results.digits import digits_lost, floor_mm
-from harness.results.schema import ANSWERED, VERDICTS
+from harness.results.schema import VERDICTS
+from report.results.cells import cells_of
 
 from .standings import TIE
 
@@ -61,21 +62,16 @@ def compared(
 
 def merged(rows: pd.DataFrame) -> pd.DataFrame:
     """One line per measurement, its repeats merged."""
-    timed = rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()
-    seconds = rows[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(timed)
-    rows = rows.assign(seconds=seconds, rank=rows["verdict"].map(_rank))
-    groups = rows.groupby("measurement")
-    worst = rows.sort_values("rank", kind="stable").drop_duplicates("measurement", keep="last")
-    made = worst.set_index("measurement")[["scene", "solver", "verdict", "status", "limit_mm"]].copy()
-    made["error_mm"] = groups["displacement_error_mm"].max()
-    made["bound_mm"] = groups["reference_bound_mm"].max()
-    made["iterations"] = groups["iterations"].median()
-    made["seconds"] = groups["seconds"].median()
-    made["repeats"] = groups["seconds"].count()
-    vary = np.where(made["repeats"] < ENOUGH, TIE, 1.0)
-    made["least_s"] = np.minimum(groups["seconds"].min(), made["seconds"] / vary)
-    made["most_s"] = np.maximum(groups["seconds"].max(), made["seconds"] * vary)
-    return made
+    cells = cells_of(rows, ["measurement"]).set_index("measurement")
+    vary = np.where(cells["repeats"] < ENOUGH, TIE, 1.0)
+    cells["least_s"] = np.minimum(cells["least_s"], cells["load_case_s"] / vary)
+    cells["most_s"] = np.maximum(cells["most_s"], cells["load_case_s"] * vary)
+    shown = ["scene", "solver", "verdict", "status", "limit_mm", "iterations", "repeats", "least_s", "most_s"]
+    return cells[shown].assign(
+        error_mm=cells["displacement_error_mm"],
+        bound_mm=cells["reference_bound_mm"],
+        seconds=cells["load_case_s"],
+    )
 
 
 def _rank(verdict: str) -> int:

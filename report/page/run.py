@@ -63,8 +63,7 @@ def run_data(results: Results) -> Data:
 def _cells(results: Results) -> pd.DataFrame:
     """The cells without the forms that a solver does not take, with the limits and seconds from the scene."""
     cells = results.cells[results.cells["status"] != "unsupported"]
-    bounds = results.rows.groupby(CELL, dropna=False, sort=False)["reference_bound_mm"].max()
-    cells = cells.merge(bounds.rename("bound_mm").reset_index(), on=CELL, how="left")
+    cells = cells.rename(columns={"reference_bound_mm": "bound_mm"})
     lines = roads(results)
     if len(lines):
         lines = lines.assign(scene_s=lines[list(STAGES)].sum(axis=1, skipna=False))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pandas as pd
 
 from harness.results.schema import ANSWERED, STEPS, VERDICTS
@@ -11,11 +13,11 @@ from .rows import CELL
 
 MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
 MEDIANS += ["solver_reported_s", "cholesky_s", "product_s"]
-LARGEST = ["displacement_error_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
+LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 
-def cells_of(rows: pd.DataFrame) -> pd.DataFrame:
-    """One line per scene, solver, form, variant, tolerance and number of threads.
+def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:
+    """One line per scene, solver, form, variant, tolerance and number of threads, or of what else is given.
 
     Of the repeats: the worst verdict with its status, the largest error and memory, and the median of each
     time over those that have it. Adds, in seconds,
@@ -30,7 +32,7 @@ def cells_of(rows: pd.DataFrame) -> pd.DataFrame:
     """
     timed = rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()
     rows = rows.assign(load_case_s=rows[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(timed))
-    cell = rows.groupby(CELL, dropna=False, sort=False).ngroup()
+    cell = rows.groupby([*by], dropna=False, sort=False).ngroup()
     severity = rows["verdict"].map({verdict: i for i, verdict in enumerate(VERDICTS)}).fillna(len(VERDICTS))
     ranked = rows.assign(cell=cell, severity=severity).sort_values("severity", ascending=False, kind="stable")
     cells = ranked.drop_duplicates("cell").set_index("cell").sort_index().drop(columns="severity")

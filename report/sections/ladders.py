@@ -74,12 +74,12 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
         index=order, columns=[*OUTCOMES], fill_value=0
     )
     solved = cells[cells["status"] == "solved"]
-    solved = solved.assign(share=solved["displacement_error_mm"] / solved["limit_mm"]).groupby("label")
+    share = solved["displacement_error_mm"] / solved["limit_mm"]
     wrong = cells[cells["outcome"] == WRONG_CLAIMED].groupby("label")["scene"]
     table = counts.assign(
         rungs=counts.sum(axis=1),
-        worst_share=solved["share"].max(),
-        backward_error=solved["backward_error"].median(),
+        worst_share=share.groupby(solved["label"]).max(),
+        backward_error=solved.groupby("label")["backward_error"].median(),
         where=wrong.agg(lambda scenes: ", ".join(scene.split("/", 1)[1] for scene in scenes)),
     )
     columns = [word("solver (form)", "label"), number("rungs", "rungs", whole)]

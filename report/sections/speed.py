@@ -164,9 +164,9 @@ def contacts(results: Results) -> Section | None:
     cells = cells[sizes["active"].transform("nunique") >= FEWEST]
     if cells.empty or cells["load_case_s"].isna().all():
         return None
-    sizes, styles = cells.groupby(["n", "m"], dropna=False), styles_of(cells)
-    drawing, panels = style.panels(sizes.ngroups, PANEL, entries(cells, styles))
-    for axes, ((n, m), of_size) in zip(panels, sizes, strict=True):
+    groups, styles = [*cells.groupby(["n", "m"], dropna=False)], styles_of(cells)
+    drawing, panels = style.panels(len(groups), PANEL, entries(cells, styles))
+    for axes, ((n, m), of_size) in zip(panels, groups, strict=True):
         against_contacts(axes, of_size, styles)
         axes.set_title(f"n = {n:.0f}" + (f", m = {m:.0f}" if m > 0 else ""), pad=5)
         if of_size["cholesky_s"].notna().any():
@@ -249,7 +249,7 @@ def variants(results: Results) -> Section | None:
     def line(mine: pd.DataFrame) -> dict[str, Any]:
         found = {"scenes": len(mine), "within": int((mine["verdict"] == "within").sum())}
         found |= _spread(mine["ratio"], "ratio") | {"error_mm": mine["displacement_error_mm"].max()}
-        return found | mine[["iterations", "iterations_plain"]].median().to_dict()
+        return found | {name: mine[name].median() for name in ("iterations", "iterations_plain")}
 
     columns = [
         word("solver (form), variant", "method"),

@@ -67,7 +67,7 @@ def _summary(series: Series) -> Table:
             "largest gap left": f"{significant(largest.max())} mm, in case {worst}",
             "median of the largest gaps": f"{significant(largest.median())} mm",
             "proven error bound": f"{significant(bounds.max())} mm, {len(cases) - len(bounds)} unproven",
-            "error beside the reference": f"{significant(checked.max())} mm in {len(checked)} cases",
+            "error beside the reference": f"{significant(checked.max())} mm, {len(checked)} cases compared",
             "speed": f"{rate} cases per second of work",
         }
         for name, text in STEPS.items():

@@ -67,6 +67,18 @@ def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
     assert line_of(lines, "newton (sparse)")["stored_mib"] == 0
 
 
+@pytest.mark.parametrize(
+    ("solver", "form", "first"),
+    [("newton", "dual", 11.9), ("gi", "primal", 11.9), ("clarabel", "primal", 8.9)],
+)
+def test_of_a_run_that_does_not_say_its_form_tells_the_stages(
+    tmp_path: Path, solver: str, form: str, first: float
+) -> None:
+    """One that was stopped does not."""
+    rows = [sparse(solver="other"), dense(solver="another"), dense(solver=solver, form=form, stages=None)]
+    assert totals(line_of(roads(results(tmp_path, rows)), f"{solver} ({form})"))[0] == pytest.approx(first)
+
+
 def test_only_answers_within_the_limit_have_a_total(tmp_path: Path) -> None:
     rows = [sparse(), dense(), dense(solver="piqp", verdict="outside"), dense(solver="osqp")]
     rows[-1] |= no_answer("time_limit")
