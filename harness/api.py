@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from harness.conformance.check import run as check_solver
-from harness.planning.road import chosen_form
+from harness.planning.form_choice import chosen_form
 from harness.scene.solution import Solution, Source, load_scene, solve, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.answer import forces_of, form_of

@@ -23,10 +23,11 @@ from typing import Any
 import pandas as pd
 
 from harness.planning.suite import read_suite
-from harness.results import records
+from harness.results import records, series_file
 from harness.results.answer_files import pack
 from harness.results.provenance import ROOT, commit
-from harness.results.schema import CASES, GAPS, VERDICTS
+from harness.results.schema import SERIES as SERIES_FILE
+from harness.results.schema import VERDICTS
 from harness.terminal.exit_codes import INTERRUPTED
 from studies.paper.__main__ import write as write_study
 
@@ -106,7 +107,7 @@ def ended(command: Sequence[str]) -> int:
 
 def rows_of(directory: Path) -> Rows:
     """The rows of a suite or a series; none if there is no such directory."""
-    return records.read(directory / CASES) or records.read(directory / records.MEASUREMENTS)
+    return list(series_file.rows(directory)) or records.read(directory / records.MEASUREMENTS)
 
 
 def is_of(rows: Rows, digits: str) -> bool:
@@ -125,6 +126,8 @@ def publish(name: str, directory: Path) -> None:
     """Let a whole directory take the place of what is published under that name; both on one disk."""
     for unwanted in _unwanted(directory):
         shutil.rmtree(unwanted) if unwanted.is_dir() else unwanted.unlink()
+    if (directory / SERIES_FILE).exists():
+        series_file.drop_gaps(directory)
     pack(directory)
     target, old = PUBLISHED / name, directory.with_name(f"{name}.old")
     PUBLISHED.mkdir(parents=True, exist_ok=True)
@@ -136,9 +139,8 @@ def publish(name: str, directory: Path) -> None:
 
 
 def _unwanted(directory: Path) -> Iterator[Path]:
-    """What is not published: locks, gaps of a series, the scenes' arrays, and answers that are large."""
+    """What is not published: locks, the scenes' arrays, and answers that are large."""
     yield from directory.glob("**/*.lock")
-    yield from directory.glob(GAPS)
     yield from directory.glob("scenes")
     if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_MIB * 2**20:
         yield directory / "answers"

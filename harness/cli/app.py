@@ -90,7 +90,8 @@ def run(
     ] = None,
     repeat: Annotated[int | None, option("N", "Number of repeats.", min=1)] = None,
     threads: Annotated[
-        list[int] | None, option("N", "Threads for linear algebra. Repeatable.", min=1)
+        list[int] | None,
+        option("N", "Threads for linear algebra. Repeatable.  [with local:N: cores / N]", min=1),
     ] = None,
     time_limit: Annotated[
         float | None,
@@ -127,6 +128,7 @@ def run(
     """
     with error_reporting() as console:
         from harness.measurement.run import run as run_suite
+        from harness.measurement.scheduler import threads_per_worker
         from harness.planning.overrides import Overrides, overridden, tolerances_of
         from harness.planning.suite import read_suite, read_written
         from harness.results.records import MEASUREMENTS
@@ -146,7 +148,12 @@ def run(
             plugin=plugin,
         )
         written = Path(suite) / "suite.toml"
-        chosen = overridden(read_written(written) if written.is_file() else read_suite(suite), change)
+        read = read_written(written) if written.is_file() else read_suite(suite)
+        chosen = overridden(read, change)
+        if not threads and "threads" not in read.model_fields_set:
+            chosen = chosen.model_copy(
+                update={"threads": [threads_per_worker(scheduler) or chosen.threads[0]]}
+            )
         directory = out or Path("results") / chosen.name
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         code = run_suite(chosen, directory, console, scheduler, key)
@@ -171,7 +178,8 @@ def report(
         from harness.planning.suite import read_written
         from harness.results import records
         from harness.results.kinds import refuse_unreadable
-        from harness.series.store import SERIES, refuse_damaged
+        from harness.results.schema import SERIES
+        from harness.results.series_file import refuse_damaged
         from problems.errors import InputError
 
         if (directory / SERIES).is_file():

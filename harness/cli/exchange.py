@@ -70,7 +70,8 @@ def export(
 @app.command("import")
 def import_(
     files: Annotated[
-        list[str], typer.Argument(metavar="[NAME=]FILE...", help="Files with K, A, f, g; see below.")
+        list[str],
+        typer.Argument(metavar="[NAME=]FILE...", help="K, A, f, g: .mtx, .npz, .op4, .pch or .bdf."),
     ],
     out: Annotated[Path, option("FILE.npz", "Output file.")],
 ) -> None:

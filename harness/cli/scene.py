@@ -28,7 +28,10 @@ def solve(
     tolerance: Annotated[float, option("TOL", "Tolerance passed to a named solver.")] = 1e-9,
     form: Annotated[
         FormName | None,
-        option("FORM", "primal, dual or sparse: without condensation.  [default: the cheaper one]"),
+        option(
+            "FORM",
+            "primal, dual or sparse: without condensation.  [default: by size]",
+        ),
     ] = None,
     reference_limit: ReferenceLimit = None,
     allow_gap: AllowGap = None,
@@ -71,7 +74,7 @@ def solve(
 
 @app.command()
 def validate(scene: SceneName) -> None:
-    """Check a scene without solving it; show what would be built, its size, and the approximate time.
+    """Check a scene without solving it; show what would be built, its size and memory.
 
     \b
     Examples:

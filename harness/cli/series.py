@@ -60,7 +60,12 @@ def series(
         int, option("N", "Compare every N-th case with the certified reference; 0: none.", min=0)
     ] = 100,
     threads: Annotated[
-        int | None, option("N", "Threads for linear algebra.  [default: 2; 1 in the sparse form]", min=1)
+        int | None,
+        option(
+            "N",
+            "Threads for linear algebra.  [default: 2; 1 in the sparse form; with local:N: cores / N]",
+            min=1,
+        ),
     ] = None,
     plugin: Plugin = None,
     time_limit: Annotated[
@@ -93,13 +98,13 @@ def series(
     """
     with error_reporting() as console:
         from harness.measurement.describe import described
-        from harness.planning.road import chosen_form
-        from harness.results.schema import CASES
+        from harness.measurement.scheduler import threads_per_worker
+        from harness.planning.form_choice import chosen_form
+        from harness.results.series_file import read_facts
         from harness.scene.allowed_gap import refuse_unusable
         from harness.series.allowed_gap import check as check_allowed_gap
         from harness.series.run import run
         from harness.series.session import Job
-        from harness.series.store import SERIES, read_series
         from harness.terminal.exit_codes import DONE
         from harness.terminal.waiting import waiting
         from problems.errors import Fault, InputError
@@ -128,10 +133,10 @@ def series(
         if faults:
             raise InputError(faults)
         read = read_scene(scene)
-        before = read_series(out)["identity"]["form"] if (out / SERIES).is_file() else None
+        before = (read_facts(out) or {}).get("identity", {}).get("form")
         asked: Any = form.value if form else before if before in made.forms else None
         count = swept(read, sweep).count if sweep else cases or 100
-        road = chosen_form(read, made.forms, asked, count, made.in_house)
+        road = chosen_form(read, made.forms, asked, count)
         if road.why:
             console.print(f"In the sparse form, without condensation: {road.why}.", style="dim")
         taken: Any = road.form
@@ -145,11 +150,12 @@ def series(
             from problems.load_cases.random_gaps import random_gaps
 
             chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length, taken)
-        limits, threads = (time_limit, memory_limit), threads or (1 if taken == "sparse" else 2)
+        limits, threads = (time_limit, memory_limit), threads or threads_per_worker(scheduler)
+        threads = threads or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
         facts = {"solver_version": made.version, "solver_code": made.code}
         code = run(job, facts, out, console, scheduler)
-        if (out / CASES).is_file():
+        if read_facts(out):
             from report.writers.series import write  # slow to import: not before the first row
 
             console.print(f"Report: {write(out)}")

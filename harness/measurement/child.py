@@ -1,19 +1,22 @@
-"""The child's side of a process under limits (limited.py): its job, its events and its end.
+"""The child's side of a monitored call (monitored.py): its job, its events and its end.
 
-The job is the first line of stdin; events go back as JSON lines on the file descriptor that the job names.
+The call comes pickled through stdin; events go back as JSON lines on the file descriptor that it names.
 """
 
 from __future__ import annotations
 
 import ctypes
 import faulthandler
-import json
 import os
+import pickle
 import signal
 import sys
+from dataclasses import asdict
 from typing import Any
 
-from harness.results.records import Row, to_line
+from harness.results.records import to_line
+from harness.solving.answers import Refused, error_text
+from problems.errors import InputError
 
 
 class Events:
@@ -33,16 +36,26 @@ class Events:
         os.write(self.descriptor, to_line(event).encode(errors="backslashreplace") + b"\n")
 
 
-def receive() -> tuple[Row, Events]:
-    """The job, and where its events go. Call it before any code of a user is imported."""
-    job = json.loads(sys.stdin.readline())
+def main() -> None:
+    """Call the function; report what it returns, or its exception with a status; then wait to be killed, so
+    that what is registered for the exit never runs.
+    """
     die_with_driver()
     faulthandler.enable()
-    return job, Events(job["events"])
-
-
-def await_end() -> None:
-    """Wait to be killed; what is registered for the exit never runs."""
+    function, job, descriptor = pickle.load(sys.stdin.buffer)
+    events = Events(descriptor)
+    try:
+        end = function(job, events) or {}
+    except InputError as error:
+        faults = [asdict(fault) for fault in error.faults]
+        end = {"status": "failed", "message": error_text(error), "faults": faults}
+    except MemoryError as error:
+        end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
+    except Refused as error:
+        end = {"status": error.status, "message": str(error)}
+    except BaseException as error:
+        end = {"status": "failed", "message": f"raised {error_text(error)}"}
+    events.report(**end, ended=True)
     sys.stdin.read()
     os._exit(0)
 
@@ -54,3 +67,7 @@ def die_with_driver() -> None:
         prctl = ctypes.CDLL(None).prctl
         prctl(set_death_signal, signal.SIGKILL)
         prctl(set_child_subreaper, 1)
+
+
+if __name__ == "__main__":
+    main()

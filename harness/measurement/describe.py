@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from harness.planning.suite import Suite
+from harness.results.records import Row
 from harness.solving.answers import shown
 from problems.errors import Fault, InputError
 from problems.forms.names import FORMS, default_form
 from solvers.base import Form
 
-from .child import await_end, receive
-from .limited import POLL_S, Limited
+from .child import Events
+from .monitored import Monitored
 from .solver_code import code_of
 
 IMPORT_S = 60.0  # for the imports of all the solvers
@@ -58,29 +59,32 @@ def described(
 
     where : what names them. doing : called with what is being imported, again and again.
     """
-    job = {"solvers": list(solvers), "plugin": str(plugin) if plugin else None}
-    phases = {"importing the solvers": IMPORT_S}
-    with Limited("harness.measurement.describe", job, 1, phases, IMPORT_MIB) as child:
-        while not child.over():
-            child.listen(POLL_S)
-            doing(f"importing {child.row.get('name', 'the solvers')}")
-        reply = child.outcome()
-    if reply["status"] != "described":
-        last = (reply["stderr"] or "").splitlines()[-1:]
-        why = " ".join([f"importing it: {reply['message']}", *last])
-        raise InputError.one(plugin or where, "solver", reply.get("name"), why)
-    if reply["faults"]:
-        raise InputError([Fault(**fault) for fault in reply["faults"]])
-    return [Description(**found) for found in reply["found"]]
+    name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None)
+    with Monitored(describe_here, job, 1, {"importing the solvers": IMPORT_S}, IMPORT_MIB) as process:
+        for event in process:
+            name = event.get("name", name)
+            doing(f"importing {name}")
+        refuse_unimportable(event, process, plugin or where, name)
+    return [Description(**found) for found in event["found"]]
 
 
-def main() -> None:
-    job, events = receive()
+def refuse_unimportable(end: Row, process: Monitored, where: str | Path, name: str) -> None:
+    """Raise InputError unless the process came to its end."""
+    if faults := end.get("faults"):
+        raise InputError([Fault(**fault) for fault in faults])
+    if "status" in end:
+        last = (process.stderr_text or "").splitlines()[-1:]
+        raise InputError.one(where, "solver", name, " ".join([f"importing it: {end['message']}", *last]))
+
+
+def describe_here(job: tuple[list[tuple[str, dict[str, Any]]], Path | None], events: Events) -> Row:
+    """The descriptions; in the process of its own. Raises InputError, all faults at once."""
     from solvers.registry import in_house, make_solver, solver_version
 
-    plugin = Path(job["plugin"]) if job["plugin"] else None
-    found, faults = [], []
-    for name, options in job["solvers"]:
+    solvers, plugin = job
+    found: list[Description] = []
+    faults: list[Fault] = []
+    for name, options in solvers:
         events.report(name=name)
         try:
             solver = make_solver(name, options, plugin)
@@ -89,13 +93,10 @@ def main() -> None:
                 raise InputError.one(
                     f"solver {name}", "forms", shown(forms), f"a tuple of {', '.join(FORMS)}"
                 )
-            code = code_of(solver)
-            found.append(asdict(Description(list(forms), solver_version(name, plugin), code, in_house(name))))
+            version, code = solver_version(name, plugin), code_of(solver)
+            found.append(Description(list(forms), version, code, in_house(name)))
         except InputError as error:
-            faults += [asdict(fault) for fault in error.faults]
-    events.report(status="described", found=found, faults=faults)
-    await_end()
-
-
-if __name__ == "__main__":
-    main()
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    return {"found": [asdict(each) for each in found]}

@@ -21,7 +21,7 @@ from problems.forms.problem import in_form
 from problems.scene import read_scene
 
 from .describe import Description
-from .process import measure
+from .worker import measure
 
 
 @dataclass(frozen=True)

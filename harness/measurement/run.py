@@ -13,14 +13,13 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.planning.estimate import refuse_limits_too_low
+from harness.planning.memory import refuse_limits_too_low
 from harness.planning.one_row import of_key, with_key
 from harness.planning.plan import Measurement, expand
 from harness.planning.search import superfluous
 from harness.planning.suite import Suite, to_toml
 from harness.planning.timeouts import predicted_timeout
 from harness.results import records
-from harness.results.checksums import parsed, with_header
 from harness.results.machine import machine
 from harness.results.provenance import provenance
 from harness.results.records import Row
@@ -62,7 +61,7 @@ def run(
     refuse_limits_too_low(plan)
     with records.locked(directory):
         rows = resumed(directory, plan, solvers, console)
-        records.replace_text(directory / "suite.toml", with_header(to_toml(suite)))
+        records.replace_text(directory / "suite.toml", to_toml(suite))
         for scene in map(read_scene, suite.scenes):
             if scene.refused:
                 record_refusal(scene, directory)
@@ -186,7 +185,7 @@ def record_machine(directory: Path, found: dict[str, Any]) -> str:
     new = directory / "machine.json"
     for path in sorted(directory.glob("machine*.json")):
         with suppress(OSError, ValueError):
-            if parsed(path.read_bytes()).get("machine") == found["machine"]:
+            if records.parsed(path.read_bytes()).get("machine") == found["machine"]:
                 new = path
                 break
             if path == new:

@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from harness.results.machine import PACKAGES, installed_version
+from harness.results.machine import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
 from problems.storage.fingerprint import ROOT, fingerprint
 
@@ -38,12 +38,9 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
     except ImportError as error:
         allowed = "needs Dask: pip install 'rivetbench[distributed]'"
         raise InputError.one("--scheduler", "scheduler", scheduler, f"{allowed} ({error})") from error
-    kind, _, count = scheduler.partition(":")
-    if kind == "local":
-        if not (count.isdecimal() and int(count) > 0):
-            raise InputError.one("--scheduler", "scheduler", scheduler, "local:N with N ≥ 1, or an address")
+    if count := local_workers(scheduler):
         cluster = LocalCluster(
-            n_workers=int(count), threads_per_worker=1, memory_limit=None, dashboard_address=":0"
+            n_workers=count, threads_per_worker=1, memory_limit=None, dashboard_address=":0"
         )
         with cluster, Client(cluster) as client:
             yield _connected(client, scheduler)
@@ -54,6 +51,22 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
         raise InputError.one("--scheduler", "scheduler", scheduler, f"does not answer: {error}") from error
     with client:
         yield _connected(client, scheduler)
+
+
+def local_workers(scheduler: str | None) -> int | None:
+    """N of `local:N`, else None. Raises InputError if N is no positive number."""
+    kind, _, count = (scheduler or "").partition(":")
+    if kind != "local":
+        return None
+    if not (count.isdecimal() and int(count) > 0):
+        raise InputError.one("--scheduler", "scheduler", scheduler, "local:N with N ≥ 1, or an address")
+    return int(count)
+
+
+def threads_per_worker(scheduler: str | None) -> int | None:
+    """The threads for linear algebra of each of N local workers: cores / N, at least one."""
+    count = local_workers(scheduler)
+    return None if count is None else max(usable_cores() // count, 1)
 
 
 def _connected(client: Any, scheduler: str) -> tuple[Executor, int]:

@@ -1,9 +1,8 @@
 """The measuring process: one solver on one load case, or on those of a series, and nothing else.
 
-`python -m harness.measurement.worker`, started by process.py. Each event is part of the row: the driver
-merges them, so that what a killed worker has reported is kept. An event with `phase` (start, solve, save)
-starts the clock of another limit; one with `status` ends the measurement, or the current case of a series,
-and with `ended` all cases after it too. Then the worker waits to be killed.
+Each event is part of the row: the driver merges them, so that what a killed process has reported is kept. An
+event with `phase` (start, solve, save) starts the clock of another limit; one with `status` ends the
+measurement, or the current case of a series.
 """
 
 from __future__ import annotations
@@ -15,9 +14,10 @@ from pathlib import Path
 
 import threadpoolctl
 
+from harness.planning.plan import Measurement
 from harness.results.machine import blas_kernels, resident_mib
 from harness.results.records import Row
-from harness.solving.answers import Refused, error_text, figures, save
+from harness.solving.answers import Refused, figures, save
 from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -27,41 +27,60 @@ from problems.scene import read_scene
 from solvers.base import Answer
 from solvers.registry import make_solver
 
-from .child import Events, await_end, receive
+from .child import Events
+from .monitored import Monitored
 from .stored_files import StoredFiles
 from .yardstick import yardstick
 
+START_S = 300.0  # for the imports and opening the data
+SAVE_S = 60.0  # for saving the answer
 PAGE = 4096
+#: What is reported once for all the load cases of a series.
+SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib")
 
 
-class Unsupported(Exception):
+class Unsupported(Refused):
     """The solver does not take this form or way of solving; the text says what it takes."""
 
+    status = "unsupported"
 
-def main() -> None:
-    job, events = receive()
-    try:
-        for outcome in Run(job, events).outcomes():
-            events.report(**outcome)
-        end = {}
-    except MemoryError as error:
-        end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
-    except Refused as error:
-        end = {"status": "failed", "message": str(error)}
-    except Unsupported as error:
-        end = {"status": "unsupported", "message": str(error)}
-    except BaseException as error:
-        end = {"status": "failed", "message": error_text(error)}
-    if end:
-        events.report(**end, answer=None, ended=True)
-    await_end()
+
+def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> list[Row]:
+    """Run measurements in one process: one, or load cases of a series. Each answer is saved.
+
+    Returns the process's part of each row: status, message, times, peak memory, … If a case ends the process,
+    those that follow have its status.
+    """
+    first, finished, row = measurements[0], list[Row](), Row()
+    phases = {"start": START_S, "solve": first.time_limit_s * (first.batched or 1), "save": SAVE_S}
+    job = measurements, answers
+    with Monitored(measure_here, job, first.threads, phases, first.memory_limit_mib) as process:
+        for event in process:
+            row |= event
+            if "status" in event:
+                finished.append(row)
+                row = {name: row[name] for name in SHARED if name in row}
+            if len(finished) == len(measurements):
+                break
+        last = finished[-1]
+        last["peak_rss_mib"] = max(last.get("peak_rss_mib") or 0.0, process.peak_mib) or None
+        last["stderr"] = process.stderr_text
+    ended = measurements[len(finished) - 1].key
+    lost = {"status": last["status"], "message": f"not run: {ended} ended the process"}
+    return finished + [lost] * (len(measurements) - len(finished))
+
+
+def measure_here(job: tuple[Sequence[Measurement], Sequence[Path]], events: Events) -> None:
+    """The same, in the process of its own."""
+    for outcome in Run(*job, events).outcomes():
+        events.report(**outcome)
 
 
 class Run:
-    """The measurements of one job."""
+    """The measurements of one process."""
 
-    def __init__(self, job: Row, events: Events) -> None:
-        self.job = job
+    def __init__(self, measurements: Sequence[Measurement], answers: Sequence[Path], events: Events) -> None:
+        self.measurements, self.answers, self.first = measurements, answers, measurements[0]
         self.report = events.report
 
     @contextmanager
@@ -71,30 +90,29 @@ class Run:
         self.report(**{name: before + time.perf_counter() - start})
 
     def outcomes(self) -> Iterator[Row]:
-        """Solve the job's load cases: the last event of each."""
-        job = self.job
-        solver = make_solver(job["solver"], job["options"], Path(job["plugin"]) if job["plugin"] else None)
-        if job["form"] not in solver.forms:
+        """Solve the load cases: the last event of each."""
+        m, files = self.first, self.answers
+        solver = make_solver(m.solver, m.options, Path(m.plugin) if m.plugin else None)
+        if m.form not in solver.forms:
             raise Unsupported(f"takes {' and '.join(solver.forms)} only")
         with self.lap("load_s"):
-            scene = read_scene(job["source"])
-            problem = in_form(prepared(scene, form=job["form"]), job["form"])
+            scene = read_scene(m.source)
+            problem = in_form(prepared(scene, form=m.form), m.form)
             start = time.perf_counter()
-            cases = list(load_cases(scene, job))
+            cases = list(load_cases(scene, self.measurements))
             if problem.model_s is not None:
                 self.report(model_s=problem.model_s + time.perf_counter() - start)
             read_all_pages(problem.arrays)
             stored = StoredFiles(problem.arrays)
-        session = SolverSession(solver, problem, job["tolerance"], self.lap)
-        files, size = list(map(Path, job["answers"])), job["batched"]
-        if size is None:
+        session = SolverSession(solver, problem, m.tolerance, self.lap)
+        if m.batched is None:
             for case, file in zip(cases, files, strict=True):
                 outcome = self.solved(session, case, file)
                 stored.check()
                 yield outcome
             return
-        for start in range(0, len(cases), size):
-            some = slice(start, start + size)
+        for start in range(0, len(cases), m.batched):
+            some = slice(start, start + m.batched)
             for outcome in self.solved_batch(session, cases[some], files[some]):
                 stored.check()
                 yield outcome
@@ -145,14 +163,14 @@ class Run:
             self.report(phase="solve")
             return
         self.report(phase="solve", data_mib=resident_mib("VmRSS"))
-        session.open(batched=self.job["batched"] is not None)
+        session.open(batched=self.first.batched is not None)
 
     def saved(self, answer: Answer, x: Vector | None, file: Path, problem: Problem, solved: Row) -> Row:
         """Report what the solver returned, and save its answer: the last event."""
         stages = " ".join(problem.prepared.opened)
         peak = resident_mib("VmHWM")
         self.report(phase="save", **solved, **threads_in_effect(), peak_rss_mib=peak, stages=stages)
-        if self.job["yardstick"] and problem.yardstick is not None:
+        if self.first.yardstick and problem.yardstick is not None:
             self.report(**yardstick(problem.yardstick))
         if x is None:
             return {"status": answer.status, "answer": None}
@@ -163,16 +181,18 @@ class Run:
         return {"status": answer.status, "answer": f"answers/{file.name}"}
 
 
-def load_cases(scene: Scene, job: Row) -> Iterator[LoadCase]:
+def load_cases(scene: Scene, measurements: Sequence[Measurement]) -> Iterator[LoadCase]:
     """The scene's own load case, or those of a series."""
-    if job["series"] is None:
-        yield load_case(scene, job["form"])
+    first = measurements[0]
+    if first.series is None:
+        yield load_case(scene, first.form)
         return
     from problems.load_cases.random_gaps import random_gaps
 
-    cases = random_gaps(scene, **job["series"], form=job["form"])
-    for case in job["cases"]:
-        yield cases.load(case)
+    cases = random_gaps(scene, **first.series.model_dump(), form=first.form)
+    for each in measurements:
+        assert each.case is not None
+        yield cases.load(each.case)
 
 
 def read_all_pages(arrays: Sequence[Matrix]) -> None:
@@ -189,7 +209,3 @@ def threads_in_effect() -> Row:
         "kernels": ", ".join(blas_kernels(pools)) or None,
         "threads": max((pool["num_threads"] for pool in blas or pools), default=None),
     }
-
-
-if __name__ == "__main__":
-    main()

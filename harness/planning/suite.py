@@ -18,7 +18,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, JsonValue, PositiveInt, Tag, ValidationError
 
-from harness.results.checksums import Damaged, refuse_changed
 from problems.drawn import EXAMPLES, drawn_names
 from problems.errors import Fault, InputError
 from problems.input.bounded import Finite, Positive, Seed, resolved
@@ -159,10 +158,6 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
 def read_written(path: Path) -> Suite:
     """The suite.toml of a results directory, perhaps of an older version. Raises InputError."""
     data = read_toml(path)
-    try:
-        refuse_changed(path.read_bytes())
-    except Damaged as error:
-        raise InputError.one(path, "content", "changed", f"{error}; run the suite again") from error
     if isinstance(entries := data.get("solver"), list) and all(isinstance(entry, dict) for entry in entries):
         data["solver"] = [{OLDER.get(key, key): entry[key] for key in entry} for entry in entries]
     return validated(data, path)

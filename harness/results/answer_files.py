@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import zipfile
 import zlib
@@ -10,12 +11,17 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from problems.input.bounded import MIB, regular_file
+from problems.input.bounded import MIB
 
-from .checksums import arrays_in
+from . import records
 
 ARCHIVE = "answers.zip"
 ANSWER_MIB = 1024  # the largest file of an answer that is read
+
+
+def is_kept(path: Path) -> bool:
+    """Whether there is DIR/answers/NAME.npz, or an archive that may have it."""
+    return path.exists() or path.parent.with_name(ARCHIVE).is_file()
 
 
 def read_answer(path: Path) -> dict[str, NDArray[Any]]:
@@ -25,13 +31,13 @@ def read_answer(path: Path) -> dict[str, NDArray[Any]]:
     """
     archive = path.parent.with_name(ARCHIVE)
     if path.exists() or not archive.is_file():
-        return arrays_in(regular_file(path, "answer", ANSWER_MIB).read_bytes())
+        return records.read_arrays(path, ANSWER_MIB)
     try:
         with zipfile.ZipFile(archive) as file:
             member = file.getinfo(path.name)
             if member.file_size > ANSWER_MIB * MIB:
                 raise ValueError(f"{path.name}: larger than {ANSWER_MIB} MiB")
-            return arrays_in(file.read(member))
+            return records.read_arrays(io.BytesIO(file.read(member)))
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError) as error:
         raise ValueError(f"{archive}: {error}") from error
 

@@ -1,59 +1,59 @@
-"""Whether the fields of rows are of the schema's kinds: a file may hold anything."""
+"""The rows of a file checked on reading: a file may hold anything."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from problems.errors import Fault, InputError
 from problems.input.bounded import regular_file
 
 from . import records
-from .checksums import arrays_in, parsed
 from .records import Row
 from .schema import FIELDS, PROBLEM_FIELDS, Kind
 
 MAX_MIB = 1024  # of a file beside the rows
 MAX_FAULTS = 20  # named at once
-LARGEST = sys.float_info.max  # of an integer: what is larger is no number of ours
-TYPES: dict[Kind, tuple[type, ...]] = {
-    "number": (int, float),
-    "text": (str,),
-    "flag": (bool,),
-    "object": (dict,),
-}
+TYPES: dict[Kind, Any] = {"number": float, "text": str, "flag": bool, "object": dict[str, Any]}
+
+
+def model_of(name: str, fields: Mapping[str, Kind]) -> type[BaseModel]:
+    """A model of rows with these fields, each of its kind or null; others are ignored."""
+    types: dict[str, Any] = {field: (TYPES[kind] | None, None) for field, kind in fields.items()}
+    return create_model(name, __config__=ConfigDict(strict=True, extra="ignore"), **types)
+
+
+MEASUREMENT = model_of("Measurement", FIELDS)
+PROBLEM = model_of("Problem", PROBLEM_FIELDS)
 
 
 def refuse_wrong_kinds(
     path: Path,
     rows: Sequence[Row],
-    fields: Mapping[str, Kind] = FIELDS,
+    model: type[BaseModel] = MEASUREMENT,
     needed: Sequence[str] = ("scene",),
 ) -> None:
-    """Raise InputError naming file, line and field if a field is of another kind, or a needed one is null.
-
-    Any other field may be null.
-    """
-    faults = [
-        Fault(str(path), f"line {number}: {name}", value, f"must be a {fields[name]} or null")
-        for number, row in enumerate(rows, start=1)
-        for name, value in row.items()
-        if name in fields and value is not None and not _is_of_kind(value, fields[name])
-    ]
-    faults += [
-        Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
-        for number, row in enumerate(rows, start=1)
-        for name in needed
-        if row.get(name) is None
-    ]
+    """Raise InputError naming file, line and field if a field is of another kind, or a needed one is null."""
+    faults: list[Fault] = []
+    for number, row in enumerate(rows, start=1):
+        try:
+            model.model_validate(row)
+        except ValidationError as error:
+            for each in error.errors(include_url=False):
+                name = str(each["loc"][0])
+                faults.append(
+                    Fault(str(path), f"line {number}: {name}", row[name], f"{each['msg']}, or null")
+                )
+        faults += [
+            Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
+            for name in needed
+            if row.get(name) is None
+        ]
     if faults:
         raise InputError(faults[:MAX_FAULTS])
-
-
-def _is_of_kind(value: object, kind: Kind) -> bool:
-    too_large = isinstance(value, int) and abs(value) > LARGEST
-    return type(value) in TYPES[kind] and not too_large
 
 
 def refuse_unreadable(directory: Path) -> None:
@@ -64,17 +64,20 @@ def refuse_unreadable(directory: Path) -> None:
         raise InputError.one("DIR", "directory", str(directory), f"{path.name} has no row yet")
     refuse_wrong_kinds(path, rows)
     problems = directory / "problems.jsonl"
-    refuse_wrong_kinds(problems, records.read(problems), PROBLEM_FIELDS)
-    refuse_damaged(directory.glob("machine*.json"), parsed)
-    refuse_damaged(directory.glob("scenes/*.npz"), arrays_in)
+    refuse_wrong_kinds(problems, records.read(problems), PROBLEM)
+    _refuse_damaged(
+        directory.glob("machine*.json"),
+        lambda path: records.parsed(regular_file(path, "content", MAX_MIB).read_bytes()),
+    )
+    _refuse_damaged(directory.glob("scenes/*.npz"), records.read_arrays)
 
 
-def refuse_damaged(paths: Iterable[Path], read: Callable[[bytes], object]) -> None:
+def _refuse_damaged(paths: Iterable[Path], read: Callable[[Path], object]) -> None:
     """Raise InputError naming each file that `read` refuses by a ValueError."""
     faults = []
     for path in sorted(paths):
         try:
-            read(regular_file(path, "content", MAX_MIB).read_bytes())
+            read(path)
         except ValueError as error:
             faults.append(Fault(str(path), "content", str(error)[:80], "delete it, and run again"))
     if faults:

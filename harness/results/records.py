@@ -16,18 +16,19 @@ from typing import Any, BinaryIO
 
 import filelock
 import numpy as np
+from numpy.typing import NDArray
 
 from problems.errors import InputError
 from problems.input.bounded import regular_file
 
-from .checksums import DAMAGED, Damaged, parsed, sealed, with_arrays
+from .schema import CRC, SERIES
 
 Row = dict[str, Any]
 
 MEASUREMENTS = "measurements.jsonl"
 TORN = "measurements.torn"
 OUTDATED = "measurements.outdated.jsonl"
-ROWS_MIB = 4096
+ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read
 
 
 def to_line(row: Row) -> str:
@@ -35,11 +36,6 @@ def to_line(row: Row) -> str:
     not UTF-8, their JSON escapes.
     """
     return _json(_plain(row))
-
-
-def to_sealed_line(row: Row) -> str:
-    """The same with the row's checksum."""
-    return _json(sealed(_plain(row)))
 
 
 def _json(content: Row, indent: int | None = None) -> str:
@@ -66,7 +62,7 @@ def _plain(value: Any) -> Any:
 
 def append(path: Path, *rows: Row) -> None:
     """Append one line per row and force them to disk; on failure (a full disk) restore the file."""
-    rest = memoryview("".join(to_sealed_line(row) + "\n" for row in rows).encode())
+    rest = memoryview("".join(to_line(row) + "\n" for row in rows).encode())
     with path.open("ab", buffering=0) as file:  # a buffer would write its remainder on closing
         size = file.seek(0, os.SEEK_END)
         try:
@@ -113,11 +109,9 @@ def _split(path: Path) -> tuple[list[Row], bytes]:
     rows: list[Row] = []
     for number, line in enumerate(lines, start=1):
         try:
-            row = _parse(line)
-        except Damaged:
-            what = line[:80].decode(errors="replace")
-            again = "delete the line, and run again"
-            raise InputError.one(path, f"line {number}", what, f"{DAMAGED}; {again}") from None
+            row = parsed(line)
+        except ValueError:
+            row = None
         if row is None and number == len(lines) and not last:
             return rows, line + b"\n"
         if row is None:
@@ -126,24 +120,26 @@ def _split(path: Path) -> tuple[list[Row], bytes]:
     return rows, last
 
 
-def _parse(line: bytes) -> Row | None:
-    """The row; None if the line is none. Raises Damaged."""
+def parsed(text: str | bytes) -> Row:
+    """A JSON object, without the checksum that older versions wrote. Raises ValueError if it is none."""
     try:
-        return parsed(line)
-    except Damaged:
-        raise
-    except ValueError:
-        return None
+        content = json.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deep") from error
+    if not isinstance(content, dict):
+        raise ValueError("not a JSON object")
+    content.pop(CRC, None)
+    return content
 
 
 def rewrite(path: Path, rows: list[Row]) -> None:
     """Replace the rows of the file, atomically."""
-    replace_text(path, "".join(to_sealed_line(row) + "\n" for row in rows))
+    replace_text(path, "".join(to_line(row) + "\n" for row in rows))
 
 
 def replace_object(path: Path, content: Row) -> None:
-    """Write a JSON object with its checksum, atomically."""
-    replace_text(path, _json(sealed(_plain(content)), indent=1) + "\n")
+    """Write a JSON object, atomically."""
+    replace_text(path, _json(_plain(content), indent=1) + "\n")
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -153,9 +149,24 @@ def replace_text(path: Path, text: str) -> None:
 
 
 def replace_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write a .npz file with its checksum, atomically."""
+    """Write a .npz file, atomically."""
     with _replacing(path) as file:
-        file.write(with_arrays(arrays))
+        np.savez(file, **arrays)
+
+
+def read_arrays(source: Path | BinaryIO, mib: float = ARRAYS_MIB) -> dict[str, NDArray[Any]]:
+    """The arrays of a .npz file, whose CRC is checked. Raises ValueError if it is none."""
+    try:
+        opened = regular_file(source, "content", mib) if isinstance(source, Path) else source
+        with np.load(opened) as file:
+            arrays = dict(file)
+    except InputError:
+        raise
+    except Exception as error:  # numpy, zipfile and zlib raise kinds of their own
+        raise ValueError(f"not a .npz file: {error}") from error
+    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise ValueError("not a .npz file: a member is no array")
+    return arrays
 
 
 @contextmanager
@@ -173,8 +184,15 @@ def _replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def locked(directory: Path, folders: Sequence[str] = ("answers", "scenes")) -> Iterator[None]:
-    """Create the directory and lock it against a second run. Raises InputError if that fails."""
+def locked(
+    directory: Path, folders: Sequence[str] = ("answers", "scenes"), other: str = SERIES
+) -> Iterator[None]:
+    """Create the directory and lock it against a second run. Raises InputError if that fails, or if results
+    of the other kind are there: the file `other`.
+    """
+    if (directory / other).exists():
+        allowed = f"has the {other} of another command: name another directory"
+        raise InputError.one("--out", "directory", str(directory), allowed)
     try:
         for folder in ("", *folders):
             (directory / folder).mkdir(parents=True, exist_ok=True)

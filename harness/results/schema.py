@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-#: The files of a series, see harness/series/store.py.
-CASES, GAPS = "cases.jsonl", "gaps.f4"
+#: The file of a series, see series_file.py.
+SERIES = "series.sqlite"
 
 #: An object is a JSON object whose names depend on the solver or the series.
 Kind = Literal["number", "text", "flag", "object"]
@@ -81,7 +81,7 @@ JUDGED: dict[str, Kind] = {
     **_fields("number", "reference_bound_mm displacement_error_mm contact_mismatch min_gap_mm"),
     **_fields("number", "primal_residual dual_residual duality_gap backward_error objective"),
 }
-#: The checksum of a row (checksums.py).
+#: The checksum of a row, of older versions.
 CRC = "crc32"
 
 #: Where, when and by which code: `commit` is the project's, or the installed version's text.

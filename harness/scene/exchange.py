@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
 
-from harness.planning.road import cheaper
+from harness.planning.form_choice import chosen_form
 from harness.verification.reference_problem import ReferenceProblem, opened
 from problems import formats
 from problems.errors import Fault, InputError
@@ -122,7 +122,7 @@ def _refuse_unusable(path: Path, origin: dict[str, Path]) -> ReferenceProblem:
     """The problem in its cheaper form. Raises InputError, naming K's own file, if K is indefinite."""
     try:
         scene = read_scene(str(path))
-        problem = opened(scene, cheaper(scene, FORMS).form)
+        problem = opened(scene, chosen_form(scene, FORMS, None).form)
         _ = problem.prepared.assembly.K.factors
         return problem
     except InputError as error:

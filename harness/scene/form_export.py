@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
 
-from harness.planning.road import chosen_form
+from harness.planning.form_choice import chosen_form
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import opened, reference_problem
 from problems.errors import InputError

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import threadpoolctl
 
-from harness.planning.road import Choice, chosen_form
+from harness.planning.form_choice import Choice, chosen_form
 from harness.solving.answer import answer_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, opened
@@ -114,7 +114,7 @@ def solve(
     with step("choosing the form"):
         forms = FORMS if named is None else named[1].forms
         asked = form_of(named[0], forms, form) if form and named else form
-        choice = chosen_form(scene, forms, asked, in_house=solver is None or _in_house(solver))
+        choice = chosen_form(scene, forms, asked)
     if choice.why:
         said(f"In the sparse form, without condensation: {choice.why}")
     # A second thread gains nothing on narrow bands, and spins.
@@ -174,11 +174,3 @@ def solver_named(solver: str | Solver, options: Mapping[str, Any] | None) -> tup
     if options:
         raise InputError.one("solver", "options", dict(options), "an object has its options already")
     return type(solver).__name__, solver
-
-
-def _in_house(solver: str | Solver) -> bool:
-    if not isinstance(solver, str):
-        return False
-    from solvers.registry import in_house
-
-    return in_house(solver)

@@ -50,7 +50,7 @@ def solve(
 ) -> int:
     """Solve a scene, write DIR, show the outcome. Returns 0 if the answer is within 1e-7 mm, else 1.
 
-    form : by default the cheaper one, see `harness.planning.road`. allow_gap_mm : returns 4 if a remaining
+    form : by default see `harness.planning.form_choice`. allow_gap_mm : returns 4 if a remaining
     gap is larger, 3 if that cannot be told. Raises InputError.
     """
     started = time.perf_counter()

@@ -36,7 +36,8 @@ def solve_both(
     refuse_other_contacts(*sources)
     codes = []
     for source, folder in zip(sources, FOLDERS, strict=True):
-        console.print(f"\n{source}", style="bold")
+        console.print()
+        console.print(source, style="bold")
         codes.append(solve(source, out / folder))
     from report.document.escape import plain
     from report.writers.two_answers import write

@@ -1,23 +1,14 @@
-"""Checks a scene without solving it: what will be built, its size, memory and expected time."""
+"""Checks a scene without solving it: what will be built, its size and memory."""
 
 from __future__ import annotations
 
 import inspect
-import time
 
-import numpy as np
-import scipy.linalg as sla
 from rich.console import Console
 from rich.table import Table
 
-from harness.planning.estimate import (
-    Estimate,
-    SparseEstimate,
-    estimated,
-    estimated_sparse,
-    refuse_what_cannot_fit,
-)
-from harness.planning.road import cheaper
+from harness.planning.form_choice import chosen_form
+from harness.planning.memory import size_of
 from harness.results.machine import physical_memory_mib
 from problems.build import model_of, prepared
 from problems.forms.names import FORMS
@@ -28,32 +19,30 @@ from problems.scene import read_scene
 
 from .few_digits import digits_of
 
-SAMPLE_SIZE = 700  # unknowns of the Cholesky factorisation that measures the machine's speed
-
 
 def validate(source: str, console: Console) -> None:
-    """Read and check a scene, print what it is made of and an estimate. Raises InputError."""
+    """Read and check a scene, print what it is made of and the memory it needs. Raises InputError."""
     scene = read_scene(source)
     if not isinstance(scene, JointScene):
         _matrices(scene, console)
         return
-    flops_per_s, physical = speed(), physical_memory_mib()
-    dense, sparse = estimated(scene, flops_per_s), estimated_sparse(scene, flops_per_s)
-    dense_fits, sparse_fits = dense.peak_mib <= physical, sparse.peak_mib <= physical
-    refuse_what_cannot_fit(scene, source, "dual" if dense_fits else "sparse")
+    size, physical = size_of(scene), physical_memory_mib()
+    assert size is not None
+    form = chosen_form(scene, FORMS, None).form
     console.print(f"{scene.name}: {scene.title}. Fine.")
     console.print(_contents(scene))
-    console.print(f"n = {dense.n} unknowns, m = {dense.m} contacts; this machine has {physical} MiB.")
-    if dense_fits:
-        console.print(_dense(dense, model_of(scene).built))
-    else:
-        console.print(
-            f"No dense form can hold it: the process would take up to {dense.peak_mib:.0f} MiB. The sparse "
-            f"form can (--form sparse)."
-        )
-    if sparse_fits:
-        console.print(_sparse(sparse))
-    if dense.m == 0:
+    console.print(f"n = {size.n} unknowns, m = {size.m} contacts; this machine has {physical} MiB.")
+    cached = "; the assembly is in the cache" if model_of(scene).built else ""
+    console.print(
+        f"Dense forms: K, its factors and Q take {size.dense_mib:.0f} MiB{cached}, the process up to "
+        f"{size.dense_peak_mib:.0f} MiB."
+    )
+    console.print(
+        f"Sparse form: {size.unknowns} unknowns, half-bandwidth {size.half_bandwidth}; the factors take "
+        f"{size.sparse_mib:.0f} MiB, the process up to {size.sparse_peak_mib:.0f} MiB."
+    )
+    console.print(f"One load case is solved in the {form} form, unless another is asked for.")
+    if size.m == 0:
         console.print("No contact: a linear solve, without a quadratic program.")
     if any(scene.effects_of(TieEffect)):
         console.print("Springs join parts into larger blocks of K.")
@@ -62,49 +51,20 @@ def validate(source: str, console: Console) -> None:
         console.print(f"Loads beyond the junction are condensed once: {', '.join(beyond)}.")
 
 
-def _dense(estimate: Estimate, cached: bool) -> str:
-    build = "is in the cache" if cached else f"has to be built, about {_time(estimate.build_s)}"
-    return (
-        f"Dense forms: the assembly {build}; K, its factors and Q take {estimate.stored_mib:.0f} MiB in the "
-        f"cache, the process up to {estimate.peak_mib:.0f} MiB; an answer with its bound takes about "
-        f"{_time(estimate.answer_s)} more."
-    )
-
-
-def _sparse(estimate: SparseEstimate) -> str:
-    return (
-        f"Sparse form: {estimate.unknowns} unknowns, half-bandwidth {estimate.half_bandwidth}; the model and "
-        f"its factors take about {_time(estimate.build_s)}, the factors {estimate.stored_mib:.0f} MiB, the "
-        f"process up to {estimate.peak_mib:.0f} MiB; an answer with its bound takes about "
-        f"{_time(estimate.answer_s)} more."
-    )
-
-
 def _matrices(scene: Scene, console: Console) -> None:
     """Print the sizes and digits of given matrices. Raises InputError if K is not positive definite."""
-    road = cheaper(scene, FORMS)
-    data = prepared(scene, form=road.form)
+    choice = chosen_form(scene, FORMS, None)
+    data = prepared(scene, form=choice.form)
     _ = data.assembly.K.factors
     assembly = data.assembly
     blocks = ", ".join(str(K.shape[0]) for K in assembly.K.matrices)
-    if road.form == "sparse":
-        console.print(f"Sparse form by default: {road.why}.")
+    if choice.form == "sparse":
+        console.print(f"Sparse form by default: {choice.why}.")
     console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
     for note in assembly.notes:
         console.print(f"{note}.", style="yellow")
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
-
-
-def speed() -> float:
-    """Operations per second of a small Cholesky factorisation on this machine."""
-    A = np.eye(SAMPLE_SIZE) * 2 + 1.0 / SAMPLE_SIZE
-    best = np.inf
-    for _ in range(3):
-        start = time.perf_counter()
-        sla.cholesky(A, check_finite=False)
-        best = min(best, time.perf_counter() - start)
-    return SAMPLE_SIZE**3 / 3 / best
 
 
 def _contents(scene: JointScene) -> Table:
@@ -119,9 +79,3 @@ def _contents(scene: JointScene) -> Table:
     for effect in scene.effects:
         table.add_row(f"effect {effect.kind}", (inspect.getdoc(effect) or "").partition("\n")[0])
     return table
-
-
-def _time(seconds: float) -> str:
-    if seconds < 1:
-        return "a second"
-    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"

@@ -6,21 +6,18 @@ it are left for another run.
 
 from __future__ import annotations
 
-import pickle
-from base64 import b64decode, b64encode
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
-from harness.measurement.child import Events, await_end, receive
-from harness.measurement.limited import POLL_S, Limited
-from harness.measurement.process import START_S
+from harness.measurement.child import Events
+from harness.measurement.monitored import Monitored
 from harness.measurement.stored_files import StoredFiles
+from harness.measurement.worker import START_S
 from harness.results.provenance import provenance
 from harness.results.records import Row
-from harness.solving.answers import error_text
 from harness.verification.assess import Assessment
 from harness.verification.reference import proof_of
 from problems.build import prepared
@@ -30,54 +27,33 @@ from problems.forms.assembly import LoadCase
 from .session import Attempt, Job, Result, SeriesSession
 
 
-class Isolated(Limited):
-    """A running process. running : the cases that the plug-in is solving; before the first one, that one."""
-
-    def __init__(self, job: Job, numbers: Sequence[int]) -> None:
-        self.results: list[Result] = []
-        self.running = list(numbers[:1])
-        self.time_limit_s = job.time_limit_s
-        self.limits = {"opening the assembly": START_S, "solve": job.time_limit_s, "judging": START_S}
-        packed = pickle.dumps(replace(job, cases=job.cases.only(numbers)))
-        task = {"job": b64encode(packed).decode(), "numbers": list(numbers)}
-        module = "harness.series.isolated"
-        super().__init__(module, task, job.threads or 1, self.limits, job.memory_limit_mib)
-
-    def take(self, event: Row) -> None:
-        if result := event.pop("result", None):
-            gap = result["gap"]
-            self.results.append(Result(result["row"], None if gap is None else unpacked(gap)))
-        self.running = event.pop("cases", self.running)
-        self.limits["solve"] = self.time_limit_s * len(self.running)
-        super().take(event)
-
-    def taken(self) -> Iterator[list[Result]]:
-        """The results since the last call."""
-        some, self.results = self.results, []
-        if some:
-            yield some
-
-
-def unpacked(gap: str) -> np.ndarray:
-    return np.frombuffer(b64decode(gap), np.float32)
-
-
 def solve_isolated(job: Job, numbers: Sequence[int]) -> Generator[list[Result], None, None]:
     """The results as they come; the last ones say how the process ended, if that was before its time.
 
     Raises InputError if the plug-in cannot be imported or made.
     """
     proof_of(prepared(job.scene, form=job.form))  # builds what is not cached: without a limit
-    with Isolated(job, numbers) as child:
-        while not child.over():
-            child.listen(POLL_S)
-            yield from child.taken()
-        end = child.outcome()
-        yield from child.taken()
-    if end["status"] == "refused":
-        raise InputError([Fault(**fault) for fault in end["faults"]])
-    if end["status"] != "done":
-        yield [Result(ended(job, case, end), None) for case in child.running]
+    running = list(numbers[:1])  # the cases that the plug-in is solving; before the first one, that one
+    phases = {"opening the assembly": START_S, "solve": job.time_limit_s, "judging": START_S}
+    task = replace(job, cases=job.cases.only(numbers)), list(numbers)
+    with Monitored(solve_here, task, job.threads or 1, phases, job.memory_limit_mib) as process:
+        for event in process:
+            running = event.get("cases", running)
+            if "row" in event:
+                gap = event["gap"]
+                yield [Result(event["row"], None if gap is None else np.array(gap, np.float32))]
+    if faults := event.get("faults"):
+        raise InputError([Fault(**fault) for fault in faults])
+    if "status" in event:
+        yield [Result(ended(job, case, event), None) for case in running]
+
+
+def solve_here(task: tuple[Job, Sequence[int]], events: Events) -> None:
+    """The same, in the process of its own."""
+    job, numbers = task
+    for some in ReportingSession(job, events).solve(numbers):
+        for result in some:
+            events.report(row=result.row, gap=result.gap)
 
 
 def ended(job: Job, case: int, end: Row) -> Row:
@@ -118,32 +94,10 @@ class ReportingSession(SeriesSession):
         return super()._try(case, load)
 
     def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[Attempt]:
-        self.report(phase="solve", cases=[case for case, _ in loads])
+        self.report(phase="solve", times=len(loads), cases=[case for case, _ in loads])
         return super()._try_batch(loads)
 
     def _assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
         self.report(phase="judging")
         self.stored.check()
         return super()._assessed(attempts)
-
-
-def main() -> None:
-    task, events = receive()
-    try:
-        job = pickle.loads(b64decode(task["job"]))
-        for some in ReportingSession(job, events).solve(task["numbers"]):
-            for result in some:
-                gap = None if result.gap is None else b64encode(result.gap.tobytes()).decode()
-                events.report(result={"row": result.row, "gap": gap})
-        events.report(status="done")
-    except InputError as error:
-        events.report(status="refused", faults=[asdict(fault) for fault in error.faults])
-    except MemoryError as error:
-        events.report(status="memory_limit", message=f"the solver ran out of memory: {error}")
-    except BaseException as error:
-        events.report(status="failed", message=f"raised {error_text(error)}")
-    await_end()
-
-
-if __name__ == "__main__":
-    main()

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from harness.measurement.scheduler import done_as_completed, workers
-from harness.results import records
+from harness.results import records, series_file
 from harness.results.machine import installed_version, machine
 from harness.results.schema import VERDICTS
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
@@ -56,24 +56,18 @@ def run(
     Returns 0, 1 if an answer is outside the limit or missing, 3 if none could be judged. Raises InputError
     if DIRECTORY holds another series; after KeyboardInterrupt the same command resumes.
     """
-    with records.locked(directory, ()):
+    with records.locked(directory, (), other=records.MEASUREMENTS):
         store.open_series(directory, identity(job) | facts, metadata(job))
-        key = store.series_key(identity(job) | facts)
-        done, removed = store.solved(directory, job.cases, key, contact_count(job))
-        if removed:
-            again = "their gaps were missing or damaged, or they were there twice"
-            console.print(f"{removed} rows removed: {again}", style="yellow")
+        done = store.solved(directory, job.cases)
         remaining = np.flatnonzero(~done).tolist()
         console.print(
             f"{job.scene.name}: {len(done)} cases, {len(done) - len(remaining)} already in {directory}"
         )
         if remaining:
             with results_of(job, remaining, scheduler, console) as results:
-                solve_remaining(job, len(remaining), results, directory, key, console)
-        elif not store.contacts_in(directory):
-            record_contacts(job, directory)
+                solve_remaining(job, len(remaining), results, directory, console)
         tally = Tally(dict.fromkeys(VERDICTS, 0))
-        for row in store.rows(directory):
+        for row in series_file.rows(directory):
             if row["case"] < job.cases.count:
                 tally.add(row)
     return summary(tally, job.cases.count, console)
@@ -114,15 +108,15 @@ def on_workers(
 
 
 def solve_remaining(
-    job: Job, count: int, results: Iterator[list[Result]], directory: Path, key: str, console: Console
+    job: Job, count: int, results: Iterator[list[Result]], directory: Path, console: Console
 ) -> None:
-    """Write the results; only this process does. key : of the series."""
-    m = record_contacts(job, directory)
+    """Write the results; only this process does."""
+    record_contacts(job, directory)
     begun, made = time.monotonic(), 0
     with display(console) as progress:
         task = progress.add_task(job.scene.name, total=count, rate="")
         for some in results:
-            store.append(directory, some, m, key)
+            store.append(directory, some)
             made += len(some)
             rate = f"{made / (time.monotonic() - begun):.3g} cases/s"
             progress.update(task, completed=made, rate=rate)
@@ -180,22 +174,15 @@ def metadata(job: Job) -> dict[str, Any]:
     }
 
 
-def record_contacts(job: Job, directory: Path) -> int:
-    """DIRECTORY/contacts.npz: the positions of contacts and fasteners, for the figures. Returns m."""
+def record_contacts(job: Job, directory: Path) -> None:
+    """The positions of contacts and fasteners, for the figures."""
     assembly = prepared(job.scene, form=job.form).assembly
     arrays = {"m": np.array(assembly.m)}
     if assembly.contact_nodes is not None:
         arrays["contact_nodes"] = assembly.contact_nodes
     if isinstance(job.scene, JointScene):
         arrays["fasteners"] = job.scene.marks()
-    records.replace_arrays(directory / store.CONTACTS, arrays)
-    return assembly.m
-
-
-def contact_count(job: Job) -> int:
-    """m, without opening the assembly unless only its files say it."""
-    size = job.scene.expected_size
-    return prepared(job.scene, form=job.form).assembly.m if size is None else size[1]
+    series_file.write_contacts(directory, arrays)
 
 
 def summary(tally: Tally, asked: int, console: Console) -> int:

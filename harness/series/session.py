@@ -12,10 +12,10 @@ from uuid import uuid4
 
 import numpy as np
 import threadpoolctl
-from numpy.typing import NDArray
 
 from harness.results.provenance import provenance
 from harness.results.records import Row
+from harness.results.series_file import Gaps
 from harness.solving.session import SolverSession
 from harness.verification.assess import Assessment, assess
 from harness.verification.gap_error import GapError
@@ -29,8 +29,6 @@ from problems.load_cases.base import LoadCases
 from problems.model.scene import Scene
 from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver
-
-Gaps = NDArray[np.float32]
 
 ENOUGH = 1e-2  # of the limit: a nearby answer proven to within it needs no further refinement
 BLOCK = 64  # cases that share a pass over K and Q

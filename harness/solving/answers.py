@@ -23,7 +23,9 @@ LONGEST_ERROR = 2000  # characters of an exception's text
 
 
 class Refused(Exception):
-    """The answer is invalid; the text says why."""
+    """The answer is invalid; the text says why. status : what the row says of it."""
+
+    status = "failed"
 
 
 def checked(answer: object, problem: Problem) -> Answer:

@@ -17,6 +17,7 @@ from rich.table import Table
 from harness.planning.plan import expand
 from harness.planning.suite import RandomCases, read_written
 from harness.results import records
+from harness.results.answer_files import is_kept
 from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
@@ -33,6 +34,7 @@ from .reference_problem import ReferenceProblem, reference_problem
 #: What the gate reads of a row: which answer belongs to which scene.
 NEEDED = ("key", "source", "scene_key", "form", "status", "gated", "limit_mm")
 MAX_CASES = 10**9
+UNREADABLE = "is missing, damaged or not finite"
 
 
 def gate(
@@ -113,10 +115,16 @@ def gated_rows(path: Path) -> dict[str, Row]:
 def judged(
     rows: dict[str, Row], directory: Path, limit_s: float | None = None, baseline: Baseline | None = None
 ) -> Iterator[Finding]:
-    """The rows' answers, judged scene by scene, so that each scene is opened once per road."""
+    """The rows' answers, judged scene by scene, so that each scene is opened once per form choice; not for
+    answers that were not kept.
+    """
     problem: ReferenceProblem | None = None
     opened: tuple[str, str] | None = None
     for row in sorted(rows.values(), key=lambda row: (str(row["source"]), road_of(row["form"]))):
+        if row["answer"] and not is_kept(directory / row["answer"]):
+            missing, limit_mm = Judgement("no_answer"), min(row["limit_mm"], LIMIT_MM)
+            yield Finding(row["key"], missing, limit_mm, f"{row['answer']} {UNREADABLE}")
+            continue
         wanted = row["source"], road_of(row["form"])
         if problem is None or wanted != opened:
             problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
@@ -136,7 +144,7 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
     judgement = problem.judge_file(directory / row["answer"], limit)
     match judgement.verdict:
         case "no_answer":
-            why = f"{row['answer']} is missing, damaged or not finite"
+            why = f"{row['answer']} {UNREADABLE}"
         case "cannot_be_judged":
             why = f"the reference is known only to {bound:.0e} mm, not to {REFERENCE_SHARE * limit:.0e}"
         case "outside":

@@ -63,6 +63,7 @@ def random_gaps(
     form: Form = "dual",
 ) -> RandomGaps:
     """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) override its values.
+    Around a measured gap the mean is 0 by default.
     form : what will be solved; f has an entry per unknown of its K.
 
     Raises InputError if one of them is given by neither, or if the scene has no joint or more than one
@@ -77,7 +78,8 @@ def random_gaps(
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
     options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    own = {"mean": table.get("mean")} | (table.get("random") or {})
+    around = 0.0 if any(effect.kind == "measured_gap" for effect in scene.effects) else None
+    own = {"mean": table.get("mean", around)} | (table.get("random") or {})
     given = own | {key: value for key, value in options.items() if value is not None}
     if missing := [key for key in options if given.get(key) is None]:
         allowed = "is not in the scene: give --{}, in mm"

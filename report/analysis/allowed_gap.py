@@ -42,7 +42,7 @@ def exceeding(series: Series, allowed_mm: float) -> Exceeding:
     larger = told & (gaps - e > allowed_mm)
     undecided = ~told | (~larger & (gaps + e > allowed_mm))
     cases = series.cases.assign(e=e)[larger].sort_values("max_gap_mm", ascending=False, kind="stable")
-    m = series.gaps.shape[1]
+    m = series.gaps.m
     counts, largest = np.zeros(m), np.zeros(m)
     rows = max(AT_ONCE // m, 1)
     for start in range(0, len(cases), rows):

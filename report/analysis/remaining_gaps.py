@@ -19,7 +19,7 @@ CONFIDENCE = 0.95
 
 def quantile_maps(series: Series) -> Array:
     """(len(QUANTILES) + 1, m), mm: the quantiles over the cases for each contact, and the mean."""
-    numbers, m = series.cases["case"].to_numpy(), series.gaps.shape[1]
+    numbers, m = series.cases["case"].to_numpy(), series.gaps.m
     maps = np.empty((len(QUANTILES) + 1, m))
     width = max(AT_ONCE // max(len(numbers), 1), 1)
     for start in range(0, m, width):
@@ -33,7 +33,7 @@ def exceedance(series: Series) -> pd.DataFrame:
     """For gaps t in mm, the share of cases whose largest gap exceeds t, and the share of all contacts."""
     largest = np.sort(series.cases["max_gap_mm"].to_numpy())
     t = np.linspace(0.0, float(largest[-1]), LEVELS)
-    numbers, m = series.cases["case"].to_numpy(), series.gaps.shape[1]
+    numbers, m = series.cases["case"].to_numpy(), series.gaps.m
     above = np.zeros(LEVELS)
     rows = max(AT_ONCE // m, 1)
     for start in range(0, len(numbers), rows):

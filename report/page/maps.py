@@ -81,7 +81,7 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
 
     quantiles : (len(names), m), mm.
     """
-    if series.nodes is None or not len(series.cases) or not len(series.gaps):
+    if series.nodes is None or not len(series.cases):
         return _empty()
     step = _step(len(series.nodes))
     numbers = series.cases["case"].to_numpy()
@@ -112,7 +112,7 @@ def _chosen(series: Series) -> Iterator[int]:
 
 def _exceeded(series: Series, step: int) -> str:
     """(contacts, len(SHARES)), mm: the gap that this share of the cases exceeds."""
-    numbers, m = series.cases["case"].to_numpy(), series.gaps.shape[1]
+    numbers, m = series.cases["case"].to_numpy(), series.gaps.m
     found = []
     width = max(2**22 // len(numbers), 1) * step
     for start in range(0, m, width):

@@ -5,9 +5,7 @@ The gaps stay on disk, so that memory grows with the number of cases only by a f
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from harness.results.schema import CASES, GAPS
+from harness.results import series_file
 from report.document.escape import quoted
 
 Array = NDArray[np.float64]
@@ -36,7 +34,7 @@ class Series:
     facts: dict[str, Any]
     counts: dict[str, int]
     cases: pd.DataFrame
-    gaps: NDArray[np.float32]
+    gaps: series_file.StoredGaps
     nodes: Array | None
     fasteners: Array
     swept: list[str]
@@ -44,14 +42,14 @@ class Series:
 
 
 def read(directory: Path) -> Series:
-    """Raises FileNotFoundError if the directory has no series."""
-    facts = quoted(json.loads((directory / "series.json").read_text("utf-8")))
-    count = facts["cases"]  # of this series; an earlier, longer one may have left rows of others
+    """Raises InputError if the file is damaged."""
+    facts = quoted(series_file.read_facts(directory))
+    count = facts["cases"]  # an earlier, longer series may have left others
     rows: dict[int, tuple[Any, ...] | None] = {}
     verdicts: dict[int, str] = {}
     swept: list[str] = []
     code: dict[int, tuple[str, bool | None]] = {}
-    for row in _rows(directory / CASES):  # of equal cases the last
+    for row in series_file.rows(directory):
         case = row["case"]
         if case >= count:
             continue
@@ -64,21 +62,8 @@ def read(directory: Path) -> Series:
     swept = quoted(swept)
     cases = pd.DataFrame(kept, columns=["case", *FIGURES, *swept], dtype=float)
     cases = cases.astype({"case": int}).sort_values("case").reset_index(drop=True)
-    with np.load(directory / "contacts.npz") as arrays:
-        m = int(arrays["m"])
-        nodes = arrays.get("contact_nodes")
-        fasteners = arrays.get("fasteners", np.zeros((0, 2)))
-    path = directory / GAPS
-    stored = path.stat().st_size // (4 * m) if path.exists() else 0
-    gaps = np.memmap(path, np.float32, "r", shape=(stored, m)) if stored else np.zeros((0, m), np.float32)
+    contacts = series_file.read_contacts(directory)
+    nodes, fasteners = contacts.get("contact_nodes"), contacts.get("fasteners", np.zeros((0, 2)))
+    gaps = series_file.StoredGaps(directory, int(contacts["m"]))
     made = pd.DataFrame(quoted(list(map(list, code.values()))), columns=["commit", "clean"])
     return Series(facts, quoted(Counter(verdicts.values())), cases, gaps, nodes, fasteners, swept, made)
-
-
-def _rows(path: Path) -> Iterator[dict[str, Any]]:
-    if not path.exists():
-        return
-    with path.open("rb") as file:
-        for line in file:
-            if line.endswith(b"\n"):
-                yield json.loads(line)

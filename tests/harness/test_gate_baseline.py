@@ -53,6 +53,16 @@ def test_digits_lost_within_the_limit_are_news(
         assert "2 of them are in" in done.stdout
 
 
+def test_no_scene_is_opened_for_answers_that_were_not_kept(
+    copy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.rmtree(copy / "answers")
+    monkeypatch.setattr("harness.verification.gate.reference_problem", None)
+    done = gate(copy)
+    assert done.exit_code == 3, done.output
+    assert "Nothing could be judged" in done.output
+
+
 @pytest.mark.parametrize("errors", [(1e-9, 3e-9, 2e-9), (3e-9, 2e-9, 1e-9), (1e-9, 2e-9, 3e-9)])
 def test_the_standard_is_the_largest_error_of_the_repeats(
     finished: Path, copy: Path, errors: tuple[float, ...]

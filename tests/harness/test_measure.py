@@ -11,7 +11,7 @@ import psutil
 import pytest
 import tiny
 
-from harness.measurement.process import measure
+from harness.measurement.worker import measure
 from harness.planning.plan import Measurement
 
 pytestmark = pytest.mark.slow

@@ -1,16 +1,11 @@
 """`run DIR --key KEY`: a row of a run measured again."""
 
-from __future__ import annotations
-
-import shutil
 from pathlib import Path
 
 import pytest
 import tiny
-from finished import finished_run
-from typer.testing import CliRunner, Result
+from commands import harness
 
-from harness.cli.app import app
 from harness.planning.one_row import of_key
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
@@ -21,34 +16,25 @@ pytestmark = pytest.mark.slow
 KEY = "tiny exact dual tol=1e-06 threads=1 repeat=0"
 
 
-def invoke(*words: object) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
-@pytest.fixture
-def copy(tmp_path_factory: pytest.TempPathFactory, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished_run(tmp_path_factory), tmp_path / "copy"))
-
-
 def test_the_row_is_measured_again_and_compared(copy: Path, tmp_path: Path) -> None:
     again = tmp_path / "again"
-    done = invoke("run", copy, "--key", KEY, "--out", again)
+    done = harness("run", copy, "--key", KEY, "--out", again)
     assert done.exit_code == 0, done.output
     (then,) = (row for row in records.read(copy / records.MEASUREMENTS) if row["key"] == KEY)
     (now,) = records.read(again / records.MEASUREMENTS)
     same = ("key", "suite", "scene_key", "verdict", "displacement_error_mm", "iterations", "solver_code")
     assert {name: now[name] for name in same} == {name: then[name] for name in same}
-    assert invoke("compare", copy, again, "--max-slowdown", 1000).exit_code == 1  # the other row is missing
-    assert invoke("compare", copy, again, "--key", KEY, "--max-slowdown", 1000).exit_code == 0
+    assert harness("compare", copy, again, "--max-slowdown", 1000).exit_code == 1  # the other row is missing
+    assert harness("compare", copy, again, "--key", KEY, "--max-slowdown", 1000).exit_code == 0
 
 
 def test_another_answer_is_worse(copy: Path, tmp_path: Path) -> None:
     """The plug-in now multiplies the forces, so that digits are lost within the limit."""
     plugin = tmp_path / "exact.py"
     plugin.write_text(tiny.EXACT.replace("lam, iterations=1", "lam * (1 + 1e-9), iterations=1"))
-    done = invoke("run", copy, "--key", KEY, "--plugin", plugin, "--out", tmp_path / "again")
+    done = harness("run", copy, "--key", KEY, "--plugin", plugin, "--out", tmp_path / "again")
     assert done.exit_code == 0, done.output
-    done = invoke("compare", copy, tmp_path / "again", "--key", KEY, "--max-slowdown", 1000)
+    done = harness("compare", copy, tmp_path / "again", "--key", KEY, "--max-slowdown", 1000)
     assert done.exit_code == 1
     assert "digits lost" in done.stdout
 
@@ -57,7 +43,7 @@ def test_another_answer_is_worse(copy: Path, tmp_path: Path) -> None:
     "key", ["tiny exact", "tiny gi dual tol=1e-06 threads=1 repeat=0", "", KEY + " case=1"]
 )
 def test_a_key_that_is_not_planned_is_bad_input(copy: Path, tmp_path: Path, key: str) -> None:
-    done = invoke("run", copy, "--key", key, "--out", tmp_path / "again")
+    done = harness("run", copy, "--key", key, "--out", tmp_path / "again")
     assert done.exit_code == 2
     assert "--key" in done.stderr
     assert not (tmp_path / "again").exists()

@@ -15,9 +15,9 @@ from strip import write_strip
 
 from harness.measurement.run import run as run_suite
 from harness.planning.suite import read_suite
+from harness.results import series_file
 from harness.results.provenance import HOOK_VARIABLES, ROOT, commit
 from harness.results.records import MEASUREMENTS, read
-from harness.series import store
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from problems import __version__
@@ -167,7 +167,7 @@ def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> 
     cases = random_gaps(scene, 3, 0)
     job = Job(scene, cases, "newton", "dual", 1e-11, 1e-7, 0, 1)
     run_series(job, {}, tmp_path / "series", Console(file=StringIO()))
-    rows = [*read(tmp_path / "suite" / MEASUREMENTS), *store.rows(tmp_path / "series")]
+    rows = [*read(tmp_path / "suite" / MEASUREMENTS), *series_file.rows(tmp_path / "series")]
     assert len(rows) == 4
     for row in rows:
         assert {name: row[name] for name in here} == here

@@ -1,7 +1,6 @@
 """Work on other processes: through a plain executor, and through Dask where it is installed."""
 
 import importlib.util
-import json
 import os
 import re
 import signal
@@ -33,8 +32,8 @@ from harness.measurement.scheduler import (
     workers,
 )
 from harness.planning.suite import read_suite
+from harness.results import series_file
 from harness.results.records import MEASUREMENTS, read
-from harness.series import store
 from harness.series.on_worker import solve_on_worker
 from harness.series.run import run
 from harness.series.session import Job
@@ -142,6 +141,16 @@ def test_a_number_of_workers_that_cannot_be(wrong: str) -> None:
         pass
 
 
+@pytest.mark.parametrize(
+    ("where", "each"), [("local:2", 4), ("local:3", 2), ("local:9", 1), ("tcp://a:1", None), (None, None)]
+)
+def test_local_workers_share_the_cores(
+    where: str | None, each: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scheduler, "usable_cores", lambda: 8)
+    assert scheduler.threads_per_worker(where) == each
+
+
 @needs_dask
 def test_a_scheduler_that_does_not_answer_leaves_the_solved_cases(
     job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -151,11 +160,11 @@ def test_a_scheduler_that_does_not_answer_leaves_the_solved_cases(
     with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9.*does not answer"):
         run(job, {}, out, quiet(), "tcp://127.0.0.1:9")
     assert run(job, {}, out, quiet()) == 0
-    before = (out / store.CASES).read_text()
+    before = list(series_file.rows(out))
     more = replace(job, cases=replace(job.cases, count=CASES + 5))  # type: ignore[type-var]
     with pytest.raises(InputError, match="does not answer"):
         run(more, {}, out, quiet(), "tcp://127.0.0.1:9")
-    assert (out / store.CASES).read_text() == before
+    assert list(series_file.rows(out)) == before
 
 
 @needs_dask
@@ -190,6 +199,14 @@ def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
             pass
 
 
+def written(directory: Path) -> list[Any]:
+    """The rows, if the tables are there yet."""
+    try:
+        return list(series_file.rows(directory))
+    except InputError:
+        return []
+
+
 @needs_dask
 def test_a_worker_that_is_killed_costs_no_row(job: Job, tmp_path: Path, cluster: Any) -> None:
     """One of two workers dies in the middle: each case has one row, and gaps as if nothing had been."""
@@ -198,12 +215,11 @@ def test_a_worker_that_is_killed_costs_no_row(job: Job, tmp_path: Path, cluster:
     job = replace(job, solver="slow", plugin=slow)
     out = tmp_path / "out"
     victim = pids(cluster)[0]
-    with once((out / store.CASES).exists, lambda: os.kill(victim, signal.SIGKILL)):
+    with once(lambda: bool(written(out)), lambda: os.kill(victim, signal.SIGKILL)):
         assert run(job, {}, out, quiet(), cluster.scheduler_address) == 0
     assert victim not in pids(cluster)
-    rows = [json.loads(line) for line in (out / store.CASES).read_text().splitlines()]
-    assert sorted(row["case"] for row in rows) == list(range(CASES))
-    gaps = np.fromfile(out / store.GAPS, np.float32).reshape(CASES, 45)
+    assert [row["case"] for row in series_file.rows(out)] == list(range(CASES))
+    gaps = series_file.StoredGaps(out, 45)[range(CASES)]
     for result in solve_on_worker((job, range(0, CASES, 7))):
         np.testing.assert_allclose(gaps[result.row["case"]], result.gap, atol=1e-7)
 
@@ -218,11 +234,10 @@ def test_a_table_is_solved_on_workers_a_case_each_row(cluster: Any, tmp_path: Pa
     alone, out = tmp_path / "alone", tmp_path / "out"
     assert run(job, {}, alone, quiet()) == 0
     assert run(job, {}, out, quiet()) == 0
-    lines = (out / store.CASES).read_text().splitlines()
-    (out / store.CASES).write_text("\n".join(lines[1::3]) + "\n")
-    (out / store.GAPS).unlink()
+    with series_file.connected(out) as connection:
+        connection.execute("DELETE FROM cases WHERE number % 3 != 1")
     assert run(job, {}, out, quiet(), cluster.scheduler_address) == 0
-    gaps, wanted = (np.fromfile(each / store.GAPS, np.float32).reshape(30, 45) for each in (out, alone))
+    gaps, wanted = (series_file.StoredGaps(each, 45)[range(30)] for each in (out, alone))
     again = [k for k in range(30) if k % 3 != 1]
     np.testing.assert_allclose(gaps[again], wanted[again], atol=1e-7)
 

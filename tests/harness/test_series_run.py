@@ -1,7 +1,7 @@
 """A series from the command line to rows and gaps, against independent answers; ended, resumed, refused."""
 
-import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -17,10 +17,12 @@ from commands import harness
 from small import solve_by_nnls
 from strip import write_strip
 
+from harness.results import records, series_file
+from harness.results.schema import SERIES
 from harness.series import session as session_module
-from harness.series import store
 from harness.series.session import Job, SeriesSession
 from problems.build import load_case, prepared
+from problems.errors import InputError
 from problems.forms.problem import Dual
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
@@ -55,11 +57,11 @@ def series(*arguments: str, code: int = 0) -> Any:
 
 
 def rows_of(directory: str) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in (Path(directory) / store.CASES).read_text().splitlines()]
+    return list(series_file.rows(Path(directory)))
 
 
 def gaps_of(directory: str) -> np.ndarray:
-    return np.fromfile(Path(directory) / store.GAPS, np.float32).reshape(-1, 45)
+    return series_file.StoredGaps(Path(directory), 45)[[row["case"] for row in rows_of(directory)]]
 
 
 def test_rows_and_gaps_against_nnls_on_scenes_of_their_own(
@@ -90,11 +92,11 @@ def test_rows_and_gaps_against_nnls_on_scenes_of_their_own(
 
 def test_again_solves_nothing_and_more_cases_extend() -> None:
     series("--cases", "20", "--out", "grown")
-    before = (Path("grown") / store.CASES).read_text()
+    before = rows_of("grown")
     assert "20 cases, 20 already" in series("--cases", "20", "--out", "grown").output
-    assert (Path("grown") / store.CASES).read_text() == before
+    assert rows_of("grown") == before
     assert "45 cases, 20 already" in series("--cases", "45", "--out", "grown").output
-    assert (Path("grown") / store.CASES).read_text().startswith(before)
+    assert rows_of("grown")[:20] == before
     series("--cases", "45", "--out", "at-once")
     np.testing.assert_allclose(gaps_of("grown"), gaps_of("at-once"), atol=1e-9)
 
@@ -105,6 +107,50 @@ def test_another_series_is_refused(change: tuple[str, str]) -> None:
     ended = series("--cases", "3", "--out", "mine", *change, code=2)
     assert "name another directory" in ended.output
     assert len(rows_of("mine")) == 3
+
+
+@pytest.mark.parametrize("kept", [0.3, 0.9, 0.999])
+def test_a_file_that_was_cut_off_is_refused(kept: float) -> None:
+    out = f"cut-{kept}"
+    series("--cases", "30", "--out", out)
+    path = Path(out) / SERIES
+    os.truncate(path, int(kept * path.stat().st_size))
+    for ended in (series("--cases", "40", "--out", out, code=2), report(out)):
+        assert ended.exit_code == 2
+        assert SERIES in ended.output.replace("\n", "")
+
+
+def test_a_full_disk_leaves_whole_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    command = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1", "--cases", "900"]
+    command += ["--solver", "gi", "--check", "0", "--out", "full"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+
+    def small() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2**17, 2**17))
+
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, preexec_fn=small)
+    assert done.returncode == 2
+    assert SERIES in done.stderr
+    assert "Traceback" not in done.stderr
+    kept = rows_of("full")
+    assert 0 < len(kept) == len(gaps_of("full")) < 900
+
+
+def report(directory: str) -> Any:
+    return harness("report", directory)
+
+
+def test_a_directory_holds_one_kind_of_result(tmp_path: Path) -> None:
+    suite = tiny.write_suite(tmp_path)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / records.MEASUREMENTS).touch()
+    assert "another command" in series("--cases", "3", "--out", str(tmp_path / "run"), code=2).output
+    series("--cases", "3", "--out", str(tmp_path / "series"))
+    ended = harness("run", suite, "--out", tmp_path / "series")
+    assert ended.exit_code == 2
+    assert "another command" in ended.output
+    assert len(rows_of(str(tmp_path / "series"))) == 3
 
 
 def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,15 +171,24 @@ def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row["case"] for row in rows_of("stopped")] == list(range(60))
 
 
+def written(directory: str) -> list[dict[str, Any]]:
+    """The rows, if the tables are there yet."""
+    try:
+        return rows_of(directory)
+    except InputError:
+        return []
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_a_kill_loses_and_doubles_no_row() -> None:
     command = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1", "--cases", "80"]
     command += ["--solver", "slow", "--plugin", "slow.py", "--out", "killed"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
-    path = Path("killed") / store.CASES
-    while not path.exists() or not path.stat().st_size:
+    deadline = time.monotonic() + 60
+    while not written("killed"):
         assert process.poll() is None
+        assert time.monotonic() < deadline
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
     process.wait()
@@ -264,9 +319,9 @@ def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault:
     assert [("setup_s" in row) for row in rows] == [False] * session_module.BLOCK + [True] * 5
 
 
-@pytest.mark.parametrize(("name", "kind"), [(store.CASES, "pipe"), (store.GAPS, "device")])
-def test_a_file_that_never_ends_is_refused(name: str, kind: str) -> None:
-    directory = Path(f"{kind}-{name}")
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_a_file_that_never_ends_is_refused(kind: str) -> None:
+    directory, name = Path(kind), SERIES
     series("--cases", "3", "--check", "0", "--out", str(directory))
     (directory / name).unlink()
     if kind == "pipe":

@@ -17,6 +17,7 @@ from matplotlib.image import imread
 from rich.console import Console
 from small import solve_by_nnls
 
+from harness.planning.memory import size_of
 from harness.scene.ledger import ledger
 from harness.scene.solve import solve
 from problems.build import load_case, model_of, prepared
@@ -331,11 +332,23 @@ def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
     path.write_text(SCENE.replace("PRELOAD", "80").replace("I = 500.0", "I = 777.0"))
     first = harness("validate", path)
     assert first.exit_code == 0
-    for said in ("n = 110", "m = 110", "contact b – tool", "has to be built", "self_weight"):
+    for said in ("n = 110", "m = 110", "contact b – tool", "Dense forms", "self_weight"):
         assert said in first.output
     assert not model_of(read_scene(str(path))).built
     _ = prepared(read_scene(str(path))).Q
     assert "is in the cache" in harness("validate", path).output
+
+
+def test_the_estimate_of_the_stored_matrices_is_their_size(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(APART)
+    scene = read_scene(str(path))
+    made = prepared(scene)
+    stored = sum(a.nbytes for a in (*made.assembly.K.matrices, *made.assembly.K.factors, made.Q))
+    size = size_of(scene)
+    assert size is not None
+    assert size.dense_mib == pytest.approx(stored / 2**20)
+    assert (size.n, size.m) == (made.assembly.n, made.assembly.m)
 
 
 def test_validate_looks_at_given_matrices(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import tiny
 
-from harness.planning.estimate import refuse_limits_too_low
+from harness.planning.memory import refuse_limits_too_low
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, read_suite, suite_from, suite_names, to_toml, validated

@@ -8,7 +8,7 @@ import pytest
 import scipy.sparse as sp
 
 from harness.api import own_matrices, solve
-from harness.planning.road import cheaper
+from harness.planning.form_choice import chosen_form
 from problems.build import load_case, prepared
 from problems.forms.names import FORMS
 from problems.input import sparse_npz
@@ -37,7 +37,7 @@ def scene_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 def test_ten_thousand_bodies_take_a_fixed_number_of_files(scene_file: str) -> None:
     scene = read_scene(scene_file)
-    assert cheaper(scene, FORMS).form == "sparse"
+    assert chosen_form(scene, FORMS, None).form == "sparse"
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
     assert len(data.assembly.K.blocks) == 1
     assert data.assembly.K.numbers == 10_002  # half-bandwidth 0

@@ -42,13 +42,6 @@ def test_the_answer_is_exact(name: str) -> None:
     assert is_exact(SMALL[name], 2**60)
 
 
-@pytest.mark.parametrize("percent", [25, 50, 75, 100])
-def test_the_share_without_a_force_is_as_named(percent: int) -> None:
-    made = SMALL[f"{percent} % weak"]
-    y = made.load.g - made.assembly.A.T @ made.x
-    assert np.count_nonzero((made.lam == 0) & (y == 0)) == round(percent / 100 * N)
-
-
 def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_of_two() -> None:
     for n in (1, 22, 64):
         d = spectrum(n, 1e4)

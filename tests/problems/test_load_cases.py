@@ -50,6 +50,18 @@ def test_a_random_case_is_a_scene_with_the_seed_of_its_row(
         np.testing.assert_array_equal(cases.load(k).f, wanted.f)
 
 
+def test_around_a_measured_gap_the_mean_is_zero(tmp_path: Path) -> None:
+    old = f'kind = "initial_gap"\nmean = 0.4\n{RANDOM}'
+    measured = 'kind = "measured_gap"\npoints = [[0.0, 0.0, 0.4], [400.0, 0.0, 0.4], [0.0, 120.0, 0.4]]'
+    scene = read_scene(str(write_strip(tmp_path, (old, measured))))
+    drawn = random_gaps(scene, 2, 3, sd=1e-3, correlation_length=50.0).load(0).g
+    assert 0 < abs(drawn - load_case(scene).g).max() < 1e-2
+    with pytest.raises(InputError) as error:
+        random_gaps(scene, 2, 3)
+    assert "--sd" in said(error)
+    assert "--mean" not in said(error)
+
+
 def test_a_random_case_depends_on_seed_and_number_alone(scene: Scene, data: Prepared) -> None:
     few, many = random_gaps(scene, 3, seed=3), random_gaps(scene, 300, seed=3)
     many.load(250)

@@ -5,6 +5,7 @@ import pytest
 from solving import solve
 
 from problems.build import load_case, prepared
+from problems.forms.prepared import Prepared
 from problems.scene import read_scene, scene_names
 
 TABLE_2 = (52, 107, 418, 795, 863, 1074, 1128, 1347, 1471, 1592)
@@ -46,11 +47,16 @@ def test_condition_of_the_smallest_problem() -> None:
     assert smallest.facts["cond_K"] == pytest.approx(condition, rel=1e-6)
 
 
+@pytest.fixture(scope="module")
+def data() -> Prepared:
+    """What all scenes of the smallest size share."""
+    return prepared(read_scene("4386/0052"), form="sparse")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("count", TABLE_2)
-def test_active_constraints_of_the_paper(count: int) -> None:
-    scene = read_scene(f"4386/{count:04}")
-    data, case = prepared(scene, form="sparse"), load_case(scene, "sparse")
+def test_active_constraints_of_the_paper(data: Prepared, count: int) -> None:
+    case = load_case(read_scene(f"4386/{count:04}"), "sparse")
     lam = solve("newton", "sparse", data, case)[0].lam
     assert abs(int((lam > 0).sum()) - count) <= 22  # 1 % of m
     assert lam.min() >= 0

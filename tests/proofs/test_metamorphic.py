@@ -125,7 +125,9 @@ CHANGED = [
 ]
 
 
-@pytest.mark.parametrize(("change", "kind", "name", "form"), CHANGED, ids=str)
+@pytest.mark.parametrize(
+    ("change", "kind", "name", "form"), CHANGED, ids=lambda value: getattr(value, "__name__", str(value))
+)
 def test_the_answer_changes_as_the_problem_does(
     change: Callable[[Prepared, LoadCase], Changed], kind: str, name: str, form: Form
 ) -> None:
@@ -140,7 +142,9 @@ def test_the_answer_changes_as_the_problem_does(
     assert abs(made.lam(other_lam) - lam).max() <= force
 
 
-@pytest.mark.parametrize(("kind", "name", "form"), TRIED, ids=str)
+@pytest.mark.parametrize(
+    ("kind", "name", "form"), TRIED, ids=lambda value: getattr(value, "__name__", str(value))
+)
 def test_a_load_in_two_steps_leads_to_the_same_place(kind: str, name: str, form: Form) -> None:
     """The second step starts from the first one's displacements, under the forces that they call up."""
     prepared, case = problem(kind)

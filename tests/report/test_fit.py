@@ -1,7 +1,5 @@
 """Exponents of growth against SciPy's regression."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

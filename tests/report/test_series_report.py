@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.results import series_file
 from report.analysis import remaining_gaps as statistics
 from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
 from report.results.series import Series, read
@@ -22,10 +23,10 @@ def made(directory: Path, swept: bool = False) -> np.ndarray:
     rng = np.random.default_rng(0)
     gaps = rng.gamma(1.0, 0.1, (CASES, M)).astype(np.float32)
     gaps[:, 0] = 0.0
-    gaps.tofile(directory / "gaps.f4")
     facts = {"scene": "made", "title": "Made", "cases": CASES, "threads": 1, "machine": "a machine"}
-    (directory / "series.json").write_text(json.dumps({"identity": IDENTITY, **facts}))
-    lines = []
+    series_file.create(directory)
+    series_file.write_fact(directory, "series", json.dumps({"identity": IDENTITY, **facts}))
+    cases = []
     for case in rng.permutation(CASES):
         row = {"case": int(case), "verdict": "within", "setup_s": 0.001, "solve_s": 0.01, "form_s": 0.002}
         row |= {
@@ -37,10 +38,11 @@ def made(directory: Path, swept: bool = False) -> np.ndarray:
             row["initial_gap.mean"] = case // 4 / 10
         if case == UNANSWERED:
             row = {"case": int(case), "verdict": "no_answer"} | {k: row[k] for k in row if "." in k}
-        lines.append(json.dumps(row) + "\n")
-    (directory / "cases.jsonl").write_text("".join(lines) + '{"case": 3, "ver')  # being written
+        cases.append((row, None if case == UNANSWERED else gaps[case]))
+    series_file.append(directory, cases)
     nodes = np.column_stack([np.tile(np.arange(6.0), 2), np.repeat([0.0, 1.0], 6)])
-    np.savez(directory / "contacts.npz", m=M, contact_nodes=nodes, fasteners=nodes[:2])
+    arrays = {"m": np.array(M), "contact_nodes": nodes, "fasteners": nodes[:2]}
+    series_file.write_contacts(directory, arrays)
     return np.delete(gaps, UNANSWERED, axis=0).astype(float)
 
 

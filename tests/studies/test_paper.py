@@ -1,7 +1,5 @@
 """The paper's study on made-up rows: what its tables say, and that each claim turns with the rows."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

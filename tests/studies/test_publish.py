@@ -1,7 +1,5 @@
 """`publish`: what is measured, what counts as this code; nothing is lost before its time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -9,7 +7,6 @@ import pytest
 
 from harness.planning.suite import suite_names
 from harness.results.records import MEASUREMENTS, append
-from harness.results.schema import GAPS
 from studies import publish as published
 
 CODE = "c" * 40
@@ -116,9 +113,9 @@ def test_scenes_large_answers_gaps_and_locks_are_left_out(
     for name, size in (("small", 1000), ("large", published.KEPT_MIB * 2**20 + 1)):
         folder = tmp_path / name
         measured(folder, row())
-        for file in ("answers/a.npz", "answers/.lock", ".lock", GAPS, "scenes/a.npz"):
+        for file in ("answers/a.npz", "answers/.lock", ".lock", "scenes/a.npz"):
             (folder / file).parent.mkdir(exist_ok=True)
-            (folder / file).write_bytes(bytes(10 if file in (".lock", GAPS) else size))
+            (folder / file).write_bytes(bytes(10 if file == ".lock" else size))
         published.publish(name, folder)
     kept = {str(path.relative_to(tmp_path / "published")) for path in (tmp_path / "published").rglob("*.*")}
     assert kept == {f"small/{MEASUREMENTS}", f"large/{MEASUREMENTS}", "small/answers.zip"}

@@ -19,7 +19,7 @@ import pytest
 import tiny
 from rich.console import Console
 
-from harness.measurement import limited
+from harness.measurement import monitored
 from harness.measurement import row as rows_module
 from harness.measurement.run import run
 from harness.planning.suite import read_suite
@@ -128,7 +128,7 @@ def workers_of(driver: int) -> list[psutil.Process]:
     found = []
     for child in psutil.Process(driver).children():
         with contextlib.suppress(psutil.NoSuchProcess):
-            if "harness.measurement.worker" in child.cmdline():
+            if "measure_here" in child.cmdline():
                 found.append(child)
     return found
 
@@ -182,7 +182,7 @@ def test_a_clock_that_jumps_ends_no_run_and_loses_no_row(
 
     monkeypatch.setattr(time, "time", leaping)
     monkeypatch.setattr(rows_module, "datetime", Leaping)
-    assert limited.time is time
+    assert monitored.time is time
     suite = suite_of(folder / "clock", "hang", "gives_up", "hang")
     out = folder / "clock" / "out"
     start = time.monotonic()

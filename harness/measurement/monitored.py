@@ -1,7 +1,7 @@
-"""A Python module in a process of its own, watched from outside: its time, its memory, its end.
+"""A function called in a process of its own, watched from outside: its time, its memory, its end.
 
-Whatever the process does (hang, crash, exhaust memory, fork, print without end), the outcome is a dict
-with a `status`, and none of its processes survives.
+Whatever the process does (hang, crash, exhaust memory, fork, print without end), its end is an event, and
+none of its processes survives.
 """
 
 from __future__ import annotations
@@ -9,15 +9,16 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import pickle
 import selectors
 import signal
 import site
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import psutil
 
@@ -48,30 +49,36 @@ def environment(threads: int) -> dict[str, str]:
     return {**os.environ, **count, "OMP_DYNAMIC": "FALSE", "PYTHONPATH": os.pathsep.join(paths)}
 
 
-class Limited:
-    """A running module (its side: child.py), as a context: on leaving it, all its processes are dead.
+class Monitored:
+    """A running call, as a context: on leaving it, all its processes are dead. Iterate for its events.
 
     Parameters
     ----------
-    module : as after `python -m`. job : what it is given; JSON. threads : for linear algebra.
-    phases : the limit on each phase, s; an event with `phase` starts the next one.
+    function : of a module; called there (child.py) with `job` and an `Events` to report to.
+    job : anything that can be pickled. threads : for linear algebra.
+    phases : the limit on each phase, s; an event with `phase` starts the next one, of `times` that limit.
     """
 
     def __init__(
-        self, module: str, job: Row, threads: int, phases: Mapping[str, float], memory_limit_mib: float
+        self,
+        function: Callable[[Any, Any], Row | None],
+        job: Any,
+        threads: int,
+        phases: Mapping[str, float],
+        memory_limit_mib: float,
     ) -> None:
         self.phases, self.memory_limit_mib = phases, memory_limit_mib
-        self.row: Row = {}  # its events so far, merged
-        self.exceeded: Row = {}  # the status and message of a limit that was exceeded
+        self.arrived: list[Row] = []
+        self.pending = b""
         self.stderr = b""
         self.peak_mib = 0.0
         self.descendants: set[psutil.Process] = set()
-        self.phase = next(iter(phases))
+        self.phase, self.limit_s = next(iter(phases.items()))
         self.phase_started = self.checked_at = self.scanned_at = time.monotonic()
         events, events_of_child = os.pipe()
         try:
             self.process = subprocess.Popen(
-                [sys.executable, "-P", "-m", module],
+                [sys.executable, "-P", "-m", "harness.measurement.child", function.__qualname__],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,
@@ -85,13 +92,12 @@ class Limited:
         self.events = open(events, "rb", buffering=0)  # noqa: SIM115
         assert self.process.stdin is not None
         assert self.process.stderr is not None
-        self.pending = b""
         self.selector = selectors.DefaultSelector()
         for stream, take in ((self.events, self._take_events), (self.process.stderr, self._take_stderr)):
             os.set_blocking(stream.fileno(), False)
             self.selector.register(stream, selectors.EVENT_READ, take)
         with contextlib.suppress(BrokenPipeError):
-            self.process.stdin.write(json.dumps({**job, "events": events_of_child}).encode() + b"\n")
+            self.process.stdin.write(pickle.dumps((function, job, events_of_child)))
             self.process.stdin.flush()
 
     def __enter__(self) -> Self:
@@ -100,7 +106,25 @@ class Limited:
     def __exit__(self, *exc: object) -> None:
         self.end()
 
-    def listen(self, seconds: float) -> None:
+    def __iter__(self) -> Iterator[Row]:
+        """Its events, and an empty one where none comes for a while. The last one has `ended`: it is what the
+        function returned, or has a `status` and a `message` that say why it did not return.
+        """
+        while True:
+            dead = self.process.poll() is not None
+            for _ in range(FINAL_READS if dead else 1):
+                self._listen(0 if dead else POLL_S)
+            events, self.arrived = self.arrived, []
+            if dead:
+                events.append(self._exit())
+            elif exceeded := self._exceeded():
+                events.append(exceeded)
+            for event in events or [{}]:
+                yield event
+                if event.get("ended"):
+                    return
+
+    def _listen(self, seconds: float) -> None:
         """Receive what it reports, for at most `seconds`."""
         for key, _ in self.selector.select(seconds):
             chunk = os.read(key.fd, CHUNK)
@@ -120,47 +144,35 @@ class Limited:
             except ValueError:  # the solver wrote to this descriptor
                 continue
             if isinstance(event, dict):
-                self.take(event)
-
-    def take(self, event: Row) -> None:
-        """An event that arrived."""
-        if event.get("phase") in self.phases:
-            self.phase, self.phase_started = event.pop("phase"), time.monotonic()
-        self.row |= event
+                if event.get("phase") in self.phases:
+                    self.phase, self.phase_started = event.pop("phase"), time.monotonic()
+                    self.limit_s = self.phases[self.phase] * event.pop("times", 1)
+                self.arrived.append(event)
 
     def _take_stderr(self, chunk: bytes) -> None:
         self.stderr = (self.stderr + chunk)[-STDERR_TAIL:]
 
-    def over(self) -> bool:
-        """Whether it has reported its end, died, or exceeded a limit."""
-        if "status" in self.row:
-            return True
+    @property
+    def stderr_text(self) -> str | None:
+        return self.stderr.decode(errors="replace").strip() or None
+
+    def _exceeded(self) -> Row | None:
+        """The end of a process that exceeds a limit."""
         now = time.monotonic()
         if now - self.checked_at < POLL_S:
-            return False
+            return None
         self.checked_at = now
-        if self.process.poll() is not None:
-            for _ in range(FINAL_READS):
-                self.listen(0)
-            return True
-        self._check_memory()
-        self._check_time(now - self.phase_started)
-        return bool(self.exceeded)
-
-    def _check_memory(self) -> None:
-        used, limit = self.memory_mib(), self.memory_limit_mib
+        used, limit = self._memory_mib(), self.memory_limit_mib
         if self.phase != "save":  # then the solver is done
             self.peak_mib = max(self.peak_mib, used)
         if used > limit:
-            self.exceeded = {"status": "memory_limit", "message": f"{used:.0f} MiB, more than {limit} MiB"}
-
-    def _check_time(self, seconds: float) -> None:
-        limit = self.phases[self.phase]
-        if seconds > limit:
+            return _end("memory_limit", f"{used:.0f} MiB, more than {limit} MiB")
+        if now - self.phase_started > self.limit_s:
             status = "time_limit" if self.phase == "solve" else "failed"
-            self.exceeded = {"status": status, "message": f"{self.phase} took more than {limit:g} s"}
+            return _end(status, f"{self.phase} took more than {self.limit_s:g} s")
+        return None
 
-    def memory_mib(self) -> float:
+    def _memory_mib(self) -> float:
         """Resident memory of the process tree; pages that a fork shares are counted once."""
         if time.monotonic() - self.scanned_at > SCAN_S:
             self._find_descendants()
@@ -176,20 +188,12 @@ class Limited:
             self.descendants |= set(self.root.children(recursive=True))
         self.scanned_at = time.monotonic()
 
-    def outcome(self) -> Row:
-        """What is known: its events, or else why it did not reach its end."""
-        self.end()
-        peak = max(self.row.get("peak_rss_mib") or 0.0, self.peak_mib) or None
-        stderr = self.stderr.decode(errors="replace").strip() or None
-        end = {} if "status" in self.row else self.exceeded or self._exit()
-        return {**self.row, **end, "peak_rss_mib": peak, "stderr": stderr}
-
     def _exit(self) -> Row:
         code = self.process.returncode
         if code < 0:
             hint = ", perhaps by the system because memory ran out" if code == -signal.SIGKILL else ""
-            return {"status": "crashed", "message": f"killed by {signal.Signals(-code).name}{hint}"}
-        return {"status": "crashed", "message": f"ended with exit code {code} before its answer"}
+            return _end("crashed", f"killed by {signal.Signals(-code).name}{hint}")
+        return _end("crashed", f"ended with exit code {code} before its answer")
 
     def end(self) -> None:
         """Kill the process and all its descendants, those that left its process group too."""
@@ -210,3 +214,7 @@ class Limited:
             if stream is not None:
                 with contextlib.suppress(BrokenPipeError):  # it died before it read its job
                     stream.close()
+
+
+def _end(status: str, message: str) -> Row:
+    return {"status": status, "message": message, "ended": True}

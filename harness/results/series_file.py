@@ -1,0 +1,210 @@
+"""series.sqlite: the load cases of a series, each with its row and its gaps, in one file.
+
+    facts    name and value: `series`, JSON, the identity of the series and what a report says of it;
+             `contacts`, the bytes of an .npz with m, `contact_nodes` and `fasteners`, mm
+    cases    number; row, JSON; gap, (m,) little-endian float32 (relative rounding error at most 6e-8), mm,
+             NULL without an answer
+
+Cases are written in transactions: whatever ends the process, a case has its row and its gaps, or neither.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, InstanceOf, ValidationError
+
+from problems.errors import InputError
+from problems.input.bounded import Positive, regular_file
+from problems.input.validation import validation_faults
+
+from . import records
+from .records import Row, to_line
+from .schema import SERIES, VERDICTS
+
+Gaps = NDArray[np.float32]
+
+GAP = np.dtype("<f4")
+TABLES = """
+CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS cases (number INTEGER PRIMARY KEY, row TEXT NOT NULL, gap BLOB);
+"""
+WITHOUT_GAP = """
+SELECT number FROM cases
+WHERE coalesce(length(gap), 0) != ? AND json_extract(row, '$.verdict') != 'no_answer' LIMIT 1
+"""
+DISK = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+AGAIN = "delete it, and run the same `series` command again"
+
+
+class Identity(BaseModel):
+    """What must be the same for cases to belong to one series, as far as others read it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    solver: InstanceOf[str]
+    form: InstanceOf[str]
+    tolerance: Positive
+
+
+class Facts(BaseModel):
+    """The value of `series`."""
+
+    model_config = ConfigDict(extra="allow")
+
+    identity: Identity
+    scene: InstanceOf[str]  # perhaps with lone surrogates, as in a file name that is not UTF-8
+    title: InstanceOf[str]
+    machine: InstanceOf[str]
+    cases: int = Field(ge=0, le=10**9)
+    threads: int
+
+
+@contextmanager
+def connected(directory: Path) -> Iterator[sqlite3.Connection]:
+    """A connection; a block that ends without an error is committed.
+
+    Raises InputError if the file is damaged or none of ours, OSError if the disk refuses.
+    """
+    path = directory / SERIES
+    if path.exists():
+        regular_file(path, "content", inf)
+    try:
+        with closing(sqlite3.connect(path)) as connection, connection:
+            connection.execute("SELECT count(*) FROM sqlite_master")  # undoes what was not finished
+            if path.stat().st_size % connection.execute("PRAGMA page_size").fetchone()[0]:
+                raise InputError.one(path, "content", "cut off", AGAIN)
+            yield connection
+    except sqlite3.DatabaseError as error:
+        if error.sqlite_errorcode & 0xFF in DISK:
+            raise OSError(f"{path}: {error}") from error
+        raise InputError.one(path, "content", str(error), AGAIN) from error
+
+
+def _begun(path: Path) -> bool:
+    """Whether there is a file; SQLite makes an empty one before it writes."""
+    return path.exists() and (not path.is_file() or path.stat().st_size > 0)
+
+
+def create(directory: Path) -> None:
+    """Make the tables, unless they are there."""
+    with connected(directory) as connection:
+        connection.executescript(TABLES)
+
+
+def write_fact(directory: Path, name: str, value: str | bytes) -> None:
+    with connected(directory) as connection:
+        connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", (name, value))
+
+
+def append(directory: Path, cases: Iterable[tuple[Row, Gaps | None]]) -> None:
+    """Write rows with their gaps, all of them or none."""
+    with connected(directory) as connection:
+        connection.executemany(
+            "INSERT OR REPLACE INTO cases VALUES (?, ?, ?)",
+            ((row["case"], to_line(row), None if gap is None else gap.astype(GAP).tobytes())
+             for row, gap in cases),
+        )  # fmt: skip
+
+
+def read_facts(directory: Path) -> dict[str, Any] | None:
+    """The value of `series`; None if there is none yet. Raises InputError if it is not what was written."""
+    path = directory / SERIES
+    if not _begun(path):
+        return None
+    with connected(directory) as connection:
+        found = connection.execute("SELECT value FROM facts WHERE name = 'series'").fetchone()
+    if found is None:
+        return None
+    try:
+        content: dict[str, Any] = records.parsed(found[0])
+        Facts.model_validate(content)
+    except ValidationError as error:
+        raise InputError(list(validation_faults(path, Facts, error))) from error
+    except ValueError as error:
+        raise InputError.one(path, "series", str(error), AGAIN) from error
+    return content
+
+
+def rows(directory: Path) -> Iterator[Row]:
+    """The rows in the order of their numbers, one by one; none if there is no file."""
+    path = directory / SERIES
+    if not _begun(path):
+        return
+    with connected(directory) as connection:
+        for number, text in connection.execute("SELECT number, row FROM cases ORDER BY number"):
+            try:
+                row = json.loads(text)
+                whole = row["case"] == number and row["verdict"] in VERDICTS
+            except (ValueError, TypeError, KeyError):
+                whole = False
+            if not whole:
+                raise InputError.one(path, f"case {number}", text[:80], f"not what was written; {AGAIN}")
+            yield row
+
+
+def write_contacts(directory: Path, arrays: Mapping[str, Any]) -> None:
+    """m, contact_nodes (m, 2) if they are known, and fasteners (k, 2), mm, for the figures."""
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    write_fact(directory, "contacts", content.getvalue())
+
+
+def drop_gaps(directory: Path) -> None:
+    """Keep the rows alone, in a smaller file."""
+    with connected(directory) as connection:
+        connection.execute("UPDATE cases SET gap = NULL")
+        connection.commit()
+        connection.execute("VACUUM")
+
+
+def read_contacts(directory: Path) -> dict[str, NDArray[Any]]:
+    """The same."""
+    with connected(directory) as connection:
+        found = connection.execute("SELECT value FROM facts WHERE name = 'contacts'").fetchone()
+    if found is None:
+        raise InputError.one(directory / SERIES, "contacts", None, AGAIN)
+    with np.load(io.BytesIO(found[0])) as arrays:
+        return dict(arrays)
+
+
+class StoredGaps:
+    """(cases, m), mm, on disk: indexed by case numbers, or by these and a slice of the contacts."""
+
+    def __init__(self, directory: Path, m: int) -> None:
+        self.directory, self.m = directory, m
+
+    def __getitem__(self, key: Any) -> Gaps:
+        numbers, contacts = key if isinstance(key, tuple) else (key, slice(None))
+        start, stop, step = contacts.indices(self.m)
+        asked = np.atleast_1d(numbers).tolist()
+        found = np.empty((len(asked), len(range(start, stop, step))), np.float32)
+        part = "SELECT substr(gap, ?, ?) FROM cases WHERE number = ?"
+        where = 1 + GAP.itemsize * start, GAP.itemsize * (stop - start)
+        with connected(self.directory) as connection:
+            for k, number in enumerate(asked):
+                (blob,) = connection.execute(part, (*where, number)).fetchone()
+                found[k] = np.frombuffer(blob, GAP)[::step]
+        return found if np.ndim(numbers) else found[0]
+
+
+def refuse_damaged(directory: Path) -> None:
+    """Raise InputError unless the series can be reported on."""
+    path = directory / SERIES
+    facts, m = read_facts(directory), int(read_contacts(directory)["m"])
+    with connected(directory) as connection:
+        (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+        short = connection.execute(WITHOUT_GAP, (m * GAP.itemsize,)).fetchone()
+    if state != "ok" or short or facts is None:
+        raise InputError.one(path, "content", f"no gaps of case {short[0]}" if short else state, AGAIN)
+    for _ in rows(directory):
+        pass
