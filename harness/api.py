@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,8 +26,7 @@ from numpy.typing import ArrayLike
 
 from harness.conformance.check import run as check_solver
 from harness.planning.form_choice import chosen_form
-from harness.scene import solution
-from harness.scene.solution import Solution, solver_named
+from harness.scene.solution import Solution, Source, load_scene, solve, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.answer import forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
@@ -45,7 +43,6 @@ from problems.input.user_matrices import SYMMETRY, checked
 from problems.load_cases.base import Listed, LoadCases
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import MadeScene, Scene
-from problems.scene import read_scene, scene_of
 from solvers.base import Answer, Solver
 
 __all__ = [
@@ -67,18 +64,6 @@ __all__ = [
 ]
 
 NOT_FINITE = "NaN or infinity"
-Source = Scene | str | Path | Mapping[str, Any]
-
-
-def load_scene(source: Source) -> Scene:
-    """A checked scene by name, path or content; nothing is computed.
-
-    In a dict, `joint` and the entries of `effect` may be tables or objects (problems.model.joint.Joint,
-    problems.effects); paths are relative to the working directory.
-    """
-    if isinstance(source, Scene):
-        return source
-    return scene_of(source) if isinstance(source, Mapping) else read_scene(str(source))
 
 
 def own_matrices(
@@ -95,18 +80,6 @@ def own_matrices(
     sparse = sp.issparse(K) and K.shape[0] > SMALL
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
     return MadeScene(title, title, ManufacturedProblem(assembly, load))
-
-
-def solve(
-    scene: Source,
-    solver: str | Solver | None = None,
-    *,
-    options: Mapping[str, Any] | None = None,
-    form: Form | None = None,
-    tolerance: float = 1e-9,
-) -> Solution:
-    """Solve a scene, and judge the answer: see `harness.scene.solution.solve`."""
-    return solution.solve(load_scene(scene), solver, options=options, form=form, tolerance=tolerance)
 
 
 def judge(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
 from problems.stiffness.operator import Stiffness
 
 DOMINANT = 2e5  # N/mm, added to the diagonal of a banded K, which makes it positive definite
@@ -94,6 +95,5 @@ def known_problems(form: Form = "dual") -> list[KnownProblem]:
 
 def arrays_of(prepared: Prepared) -> list[NDArray[Any]]:
     """Those that a solver is given, but for the loads."""
-    K, A = prepared.assembly.K, prepared.assembly.A
-    stages = [*K.factors, prepared.Q] if K.dense else []
-    return [*K.arrays, *stages, A.data, A.indices]
+    A = prepared.assembly.A
+    return [*in_form(prepared, prepared.form).arrays, A.data, A.indices]

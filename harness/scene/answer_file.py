@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,8 @@ ALLOWED = "a .npy, .npz, .csv, .txt or .mtx file with numbers"
 def read_answer(path: Path) -> dict[str, Vector]:
     """What the file holds: "x" (displacements), "lam" (contact forces), or "" for a vector without a name.
 
-    An .npz has arrays x or lam, or one alone; a .csv has a header with a column x or displacement_mm, lam or
-    force_N (as in nodes.csv and contacts.csv of `solve`), never both of a pair, or one column of numbers.
+    An .npz has arrays x or displacement_mm, lam or force_N, never both of a pair, or one alone; a .csv has a
+    header with such columns (as in nodes.csv and contacts.csv of `solve`), or one column of numbers.
     Raises InputError.
     """
     regular_file(path, "file", MIB)
@@ -48,8 +49,7 @@ def _read(path: Path) -> dict[str, Vector]:
             return {"": _vector(np.load(path, allow_pickle=False))}
         case ".npz":
             with np.load(path, allow_pickle=False) as archive:
-                named = {name: _vector(archive[name]) for name in HEADINGS if name in archive.files}
-                return named or {"": _vector(archive[_only(path, archive.files)])}
+                return _named(path, archive.files, archive.__getitem__)
         case ".csv":
             return _columns(path)
         case ".txt":
@@ -68,22 +68,23 @@ def _columns(path: Path) -> dict[str, Vector]:
     heading = [cell.strip() for cell in first]
     if len(heading) == 1 and _is_number(heading[0]):
         return {"": np.array([float(row[0]) for row in (first, *rest)])}
-    named = {}
+    return _named(path, heading, lambda name: [float(row[heading.index(name)]) for row in rest])
+
+
+def _named(path: Path, names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:
+    """Those of HEADINGS, else the only one."""
+    found = {}
     for name, headings in HEADINGS.items():
-        known = [heading.index(each) for each in headings if each in heading]
+        known = [each for each in headings if each in names]
         if len(known) > 1:
-            both = ", ".join(heading[k] for k in known)
-            raise InputError.one(path, "columns", both, "one of them alone: the other is not what is judged")
+            allowed = "one of them alone: the other is not what is judged"
+            raise InputError.one(path, "columns", ", ".join(known), allowed)
         if known:
-            named[name] = np.array([float(row[known[0]]) for row in rest])
-    return named or {"": np.array([float(row[heading.index(_only(path, heading))]) for row in rest])}
-
-
-def _only(path: Path, names: list[str]) -> str:
-    if len(names) != 1:
+            found[name] = _vector(read(known[0]))
+    if not found and len(names) != 1:
         wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
         raise InputError.one(path, "names", names, f"{wanted}, or one alone")
-    return names[0]
+    return found or {"": _vector(read(names[0]))}
 
 
 def _vector(array: object) -> Vector:

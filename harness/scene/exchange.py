@@ -10,19 +10,17 @@ import scipy.sparse as sp
 from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
-from harness.verification.reference import reference
+from harness.verification.reference_problem import ReferenceProblem, opened
 from problems import formats
-from problems.build import load_case, prepared
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
-from problems.forms.names import FORMS, Form
+from problems.forms.names import FORMS
 from problems.forms.prepared import Prepared
-from problems.input.digits import DOUBLE
 from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import MatricesScene
 from problems.scene import read_scene
 
-from .few_digits import digits_of, digits_sentence
+from .few_digits import digits_sentence
 from .into_place import into_place
 
 
@@ -49,11 +47,10 @@ def export(source: str, format: str, out: Path, console: Console) -> None:
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
     with into_place(out, [Path(source), *own]) as new:
-        data = prepared(scene)
-        formats.FORMATS[format].write(new, matrices(data, load_case(scene)))
-    console.print(
-        f"n = {data.assembly.n}, m = {data.assembly.m}: {out}, {formats.FORMATS[format].description}."
-    )
+        problem = opened(scene)
+        formats.FORMATS[format].write(new, matrices(problem.prepared, problem.load))
+    size = f"n = {problem.prepared.assembly.n}, m = {problem.prepared.assembly.m}"
+    console.print(f"{size}: {out}, {formats.FORMATS[format].description}.")
 
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:
@@ -92,7 +89,8 @@ def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Pa
                 continue
             found = formats.read(path)
             if name:
-                found = {name: _named(found, name, path)}
+                matrix = _named(found, name, path)
+                found = {name: formats.vector(matrix) if name in ("f", "g") else matrix}
             for key in found:
                 if key not in NAMES:
                     allowed = "K, A, f, g or nodes; say K=FILE where the file has another name"
@@ -100,9 +98,7 @@ def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Pa
                 elif key in of_rank:
                     allowed = f"is in {of_rank[key]} too; say {key}=FILE for the one that counts"
                     faults.append(Fault(str(path), "matrix", key, allowed))
-            data |= {
-                key: formats.vector(values) if key in ("f", "g") else values for key, values in found.items()
-            }
+            data |= found
             of_rank |= dict.fromkeys(found, path)
         origin |= of_rank
     for name, matrix, axis in (("f", "K", 0), ("g", "A", 1)):
@@ -122,32 +118,26 @@ def _named(found: formats.Data, name: str, path: Path) -> object:
     return found.get(name, next(iter(found.values())))
 
 
-def _refuse_unusable(path: Path, origin: dict[str, Path]) -> tuple[Form, Prepared, LoadCase]:
+def _refuse_unusable(path: Path, origin: dict[str, Path]) -> ReferenceProblem:
     """The problem in its cheaper form. Raises InputError, naming K's own file, if K is indefinite."""
     try:
         scene = read_scene(str(path))
-        form = chosen_form(scene, FORMS, None).form
-        data = prepared(scene, form=form)
-        _ = data.assembly.K.factors
-        return form, data, load_case(scene, form)
+        problem = opened(scene, chosen_form(scene, FORMS, None).form)
+        _ = problem.prepared.assembly.K.factors
+        return problem
     except InputError as error:
         raise InputError([replace(fault, where=str(origin["K"])) for fault in error.faults]) from error
 
 
-def _print_facts(out: Path, used: tuple[Form, Prepared, LoadCase], console: Console) -> None:
+def _print_facts(out: Path, problem: ReferenceProblem, console: Console) -> None:
     """Print size, definiteness, condition and digits of what was read."""
-    form, data, load = used
-    blocks = " + ".join(str(K.shape[0]) for K in data.assembly.K.matrices)
-    console.print(f"{out}: n = {data.assembly.n} ({blocks}), m = {data.assembly.m}.")
-    about = ("about ", " in balanced units") if form == "sparse" else ("", "")
-    condition = f"{data.condition:.1e}".join(about)
+    assembly = problem.prepared.assembly
+    blocks = " + ".join(str(K.shape[0]) for K in assembly.K.matrices)
+    console.print(f"{out}: n = {assembly.n} ({blocks}), m = {assembly.m}.")
+    about = ("about ", " in balanced units") if problem.form == "sparse" else ("", "")
+    condition = f"{problem.prepared.condition:.1e}".join(about)
     console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
-    for note in data.assembly.notes:
+    for note in assembly.notes:
         console.print(f"{note}.", style="yellow")
-    if digits_of(data.assembly) == DOUBLE:
-        x, lam = np.zeros(data.assembly.n), np.zeros(data.assembly.m)  # which the sentence does not need
-    else:
-        known = reference(data, load)
-        x, lam = known.x, known.lam
-    sentence, few = digits_sentence(data, x, lam)
+    sentence, few = digits_sentence(problem)
     console.print(f"{sentence}.", style="yellow" if few else None)

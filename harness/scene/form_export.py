@@ -11,7 +11,6 @@ per array and with 17 digits, or as one .npz; about.json, or the texts in the .n
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +20,7 @@ from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
 from harness.verification.judge import LIMIT_MM
-from harness.verification.reference_problem import reference_problem
-from problems.build import load_case, prepared
+from harness.verification.reference_problem import opened, reference_problem
 from problems.errors import InputError
 from problems.formats import text
 from problems.forms.names import FORMS, Form
@@ -34,14 +32,7 @@ from problems.scene import read_scene
 from .into_place import into_place
 
 FORMATS = ("mtx", "npz")
-
-
-@dataclass(frozen=True)
-class Program:
-    """A quadratic program: arrays and matrices by name, and what it is of."""
-
-    arrays: dict[str, Any]
-    about: dict[str, Any]
+Arrays = dict[str, Any]
 
 
 def export_form(
@@ -64,46 +55,45 @@ def export_form(
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
     with into_place(out, [Path(source), *own]) as new:
-        program = in_one_form(source, scene, form, with_reference, reference_limit_s)
-        (_write_npz if format == "npz" else _write_mtx)(new, program)
-    z, about = len(program.arrays["q"]), program.about
-    console.print(f"{about['scene']}, {form} form, {z} unknowns, {about['m']} contacts: {out}")
+        arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
+        (_write_npz if format == "npz" else _write_mtx)(new, arrays, about)
+    size = f"{len(arrays['q'])} unknowns, {about['m']} contacts"
+    console.print(f"{scene.name}, {form} form, {size}: {out}")
 
 
-def in_one_form(
-    source: str, scene: Scene, form: Form, with_reference: bool, limit_s: float | None = None
-) -> Program:
-    """The program of a scene; refuses a dense one that this machine's memory cannot hold."""
+def _program(
+    source: str, scene: Scene, form: Form, with_reference: bool, limit_s: float | None
+) -> tuple[Arrays, Arrays]:
+    """Its arrays by name, and what it is of; refuses a dense one that this machine's memory cannot hold."""
     chosen_form(scene, FORMS, form)
-    reference = reference_problem(source, limit_s=limit_s, form=form) if with_reference else None
-    data = reference.prepared if reference else prepared(scene, form=form)
-    problem = in_form(data, form)
-    (load,) = problem.loads([reference.load if reference else load_case(scene, form)])
+    judged = reference_problem(source, limit_s=limit_s, form=form) if with_reference else opened(scene, form)
+    problem = in_form(judged.prepared, form)
+    (load,) = problem.loads([judged.load])
     blocks = problem.blocks
     P = blocks[0] if len(blocks) == 1 else sp.csc_array(sp.block_diag(blocks))
-    arrays: dict[str, Any] = {"P": P, "q": problem.q(load)}
+    arrays: Arrays = {"P": P, "q": problem.q(load)}
     if problem.G is None:
         arrays["lb"] = np.zeros(len(load.g))
     else:
         arrays |= {"G": problem.G, "h": problem.h(load)}
-    if reference:
-        known = reference.reference
+    if with_reference:
+        known = judged.reference
         arrays |= {"x": known.x, "lam": known.lam, "bound_mm": np.array([known.bound_mm])}
-        arrays["limit_mm"] = np.array([reference.limit_mm(LIMIT_MM)])
+        arrays["limit_mm"] = np.array([judged.limit_mm(LIMIT_MM)])
     about = {"scene": scene.name, "title": scene.title, "scene_key": scene.key, "form": form}
-    return Program(arrays, about | {"n": problem.assembly.n, "m": problem.assembly.m})
+    return arrays, about | {"n": problem.assembly.n, "m": problem.assembly.m}
 
 
-def _write_npz(path: Path, program: Program) -> None:
+def _write_npz(path: Path, arrays: Arrays, about: Arrays) -> None:
     """Matrices of the sparse form as compressed columns, all others whole."""
-    whole = program.about["form"] != "sparse"
-    arrays = {name: M.toarray() if whole and sp.issparse(M) else M for name, M in program.arrays.items()}
-    sparse_npz.write(path, {name: np.array(value) for name, value in program.about.items()} | arrays)
+    whole = about["form"] != "sparse"
+    arrays = {name: M.toarray() if whole and sp.issparse(M) else M for name, M in arrays.items()}
+    sparse_npz.write(path, {name: np.array(value) for name, value in about.items()} | arrays)
 
 
-def _write_mtx(path: Path, program: Program) -> None:
+def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
     path.mkdir()
-    for name, M in program.arrays.items():
+    for name, M in arrays.items():
         matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
         text.write_one(path / f"{name}.mtx", matrix, "general")
-    (path / "about.json").write_text(json.dumps(program.about, indent=1) + "\n", "utf-8")
+    (path / "about.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")

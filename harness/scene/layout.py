@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,40 +15,30 @@ from problems.model.scene import JointScene, Scene
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
     """The ranges of parts in x and of pairs in λ, and what a picture marks."""
     if not isinstance(scene, JointScene):
-        spans = zip(assembly.parts, assembly.K.slices, strict=True)
         nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
-        bare: dict[str, Any] = {"clamped": [], "supports": []}
-        parts = [
-            {"name": name, "start": s.start, "stop": s.stop, "outline": _extent(nodes[s]), **bare}
-            for name, s in spans
-        ]
-        return {
-            "parts": parts,
-            "pairs": [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else [],
-            "marks": {},
-        }
-    joint = scene.joint
-    size = joint.node_count
-    parts = []
+        spans = zip(assembly.parts, assembly.K.slices, strict=True)
+        parts = [_part(name, s.start, s.stop, _extent(nodes[s])) for name, s in spans]
+        pairs = [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else []
+        return {"parts": parts, "pairs": pairs, "marks": {}}
+    joint, size, parts = scene.joint, scene.joint.node_count, []
     for k, part in enumerate(joint.part):
-        plate = joint.plate(part)
-        held = [e.held_points for e in scene.stiffness_effects if e.part == part.name]
-        parts.append(
-            {
-                "name": part.name,
-                "start": k * size,
-                "stop": (k + 1) * size,
-                "outline": [0.0, joint.junction.length, plate.y[0], plate.y[-1]],
-                "clamped": part.clamped,
-                "supports": [point for points in held for point in points],
-            }
-        )
+        y = joint.plate(part).y
+        outline = [0.0, joint.junction.length, y[0], y[-1]]
+        held = [point for e in scene.stiffness_effects if e.part == part.name for point in e.held_points]
+        parts.append(_part(part.name, k * size, (k + 1) * size, outline, part.clamped, held))
     pairs = [{"pair": pair, "start": k * size, "stop": (k + 1) * size} for k, pair in enumerate(joint.pairs)]
     marks: dict[str, list[list[float]]] = {}
     for effect in scene.effects_of(ForceEffect):
         if len(points := effect.marks(joint)):
             marks.setdefault(effect.kind, []).extend(points.tolist())
     return {"parts": parts, "pairs": pairs, "marks": marks}
+
+
+def _part(
+    name: str, start: int, stop: int, outline: list[float], clamped: Sequence[str] = (), supports: Any = ()
+) -> dict[str, Any]:
+    ends = {"name": name, "start": start, "stop": stop, "outline": outline}
+    return ends | {"clamped": list(clamped), "supports": list(supports)}
 
 
 def _extent(nodes: Vector) -> list[float]:

@@ -48,36 +48,35 @@ def not_called_for(scene: JointScene) -> list[str]:
 def _entries(
     effect: Effect, scene: JointScene, built: bool, junction: NDArray[np.intp] | None
 ) -> Iterator[Entry]:
-    joint = scene.joint
     name = " ".join(filter(None, [effect.kind, getattr(effect, "part", None)]))
     for first, second in effect.contacts:
-        yield Entry(name, "constraints", f"{joint.node_count} contacts of {first} and {second}", None)
-    if isinstance(effect, StiffnessEffect):
-        if not built:
-            yield Entry(name, "stiffness", "in the assembly from the cache", None)
-            return
-        (part,) = (part for part in joint.part if part.name == effect.part)
+        yield Entry(name, "constraints", f"{scene.joint.node_count} contacts of {first} and {second}", None)
+    if isinstance(effect, StiffnessEffect) and not built:
+        yield Entry(name, "stiffness", "in the assembly from the cache", None)
+        return
+    start = time.perf_counter()
+    for adds, amount in _added(effect, scene, junction):
+        yield Entry(name, adds, amount, time.perf_counter() - start)
         start = time.perf_counter()
-        term = effect.stiffness(joint.plate(part))
-        yield Entry(name, "stiffness", f"{term.nnz} entries of the plate's K", time.perf_counter() - start)
+
+
+def _added(effect: Effect, scene: JointScene, junction: NDArray[np.intp] | None) -> Iterator[tuple[str, str]]:
+    """What an effect adds, and how much, computed when it is asked for."""
+    joint = scene.joint
+    if isinstance(effect, StiffnessEffect):
+        (part,) = (part for part in joint.part if part.name == effect.part)
+        yield "stiffness", f"{effect.stiffness(joint.plate(part)).nnz} entries of the plate's K"
         return
     if isinstance(effect, TieEffect):
-        start = time.perf_counter()
         T, k = effect.springs(joint)
-        yield Entry(
-            name, "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts", time.perf_counter() - start
-        )
-    start = time.perf_counter()
+        yield "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts"
     load = load_case(scene, "dual" if junction is None else "sparse", [effect])
-    seconds = time.perf_counter() - start
     if isinstance(effect, GapEffect):
-        yield Entry(name, "gap", _gap(load.g), seconds)
+        yield "gap", _gap(load.g)
     elif junction is not None and isinstance(effect, PartLoadEffect):
-        amount = f"on {np.count_nonzero(load.f)} unknowns of {effect.part}"
-        yield Entry(name, "load", amount, seconds)
+        yield "load", f"on {np.count_nonzero(load.f)} unknowns of {effect.part}"
     else:
-        f = load.f if junction is None else load.f[junction]
-        yield Entry(name, "load", _forces(f, joint), seconds)
+        yield "load", _forces(load.f if junction is None else load.f[junction], joint)
 
 
 def _gap(g: Vector) -> str:

@@ -10,11 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from harness.results.records import replace_text, to_line
-from harness.verification.judge import LIMIT_MM, Reference
+from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.forms.assembly import Assembly, LoadCase, Vector
-
-from .ledger import Entry
 
 
 def save(
@@ -37,27 +35,25 @@ def save(
     replace_text(out / "solution.json", to_line(record) + "\n")
 
 
-def show(record: dict[str, Any], entries: list[Entry], known: Reference, console: Console) -> None:
+def show(record: dict[str, Any], console: Console) -> None:
     """Print the ledger, what was skipped, and the answer with its bound."""
     table = Table("effect", "adds", "what", "s", title="What each effect added")
-    for entry in entries:
-        seconds = "–" if entry.seconds is None else f"{entry.seconds:.3f}"
-        table.add_row(entry.effect, entry.adds, entry.amount, seconds)
-    if entries:
+    for entry in record["ledger"]:
+        seconds = "–" if entry["seconds"] is None else f"{entry['seconds']:.3f}"
+        table.add_row(entry["effect"], entry["adds"], entry["amount"], seconds)
+    if record["ledger"]:
         console.print(table)
     if record["digits"]:
         console.print(f"{record['digits']}.")
     for line in record["skipped"]:
         console.print(f"Skipped: {line}.", style="dim")
-    error = record["judged_error_mm"]
-    style = "green" if record["verdict"] == "within" else "red"
-    proven = np.isfinite(known.bound_mm)
+    error, bound = record["judged_error_mm"], record["error_bound_mm"]
+    proven = np.isfinite(bound)
     if error is None:
-        bound = (
-            f"every displacement within {known.bound_mm:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
-        )
-        console.print(f"{record['method']}: {bound}.", style=style)
+        text = f"every displacement within {bound:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
     else:
-        bound = f"with a proven bound ({known.bound_mm:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
-        text = f"{record['method']}: {record['status']}, {error:.1e} mm from the answer {bound}"
-        console.print(f"{text}: {record['verdict']} {LIMIT_MM:g} mm.", style=style)
+        known = f"with a proven bound ({bound:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
+        text = (
+            f"{record['status']}, {error:.1e} mm from the answer {known}: {record['verdict']} {LIMIT_MM:g} mm"
+        )
+    console.print(f"{record['method']}: {text}.", style="green" if record["verdict"] == "within" else "red")

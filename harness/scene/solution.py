@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,11 @@ from problems.forms.assembly import Vector
 from problems.forms.names import FORMS, Form
 from problems.forms.problem import Progress
 from problems.model.scene import Scene
+from problems.scene import read_scene, scene_of
 from solvers.base import Answer, Solver
 
 LINEAR = "linear solve with the Cholesky factors of K"
+Source = Scene | str | Path | Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,19 @@ class Solution:
         return self.closest_mm is not None and self.closest_mm < 0
 
 
+def load_scene(source: Source) -> Scene:
+    """A checked scene by name, path or content; nothing is computed.
+
+    In a dict, `joint` and the entries of `effect` may be tables or objects (problems.model.joint.Joint,
+    problems.effects); paths are relative to the working directory.
+    """
+    if isinstance(source, Scene):
+        return source
+    return scene_of(source) if isinstance(source, Mapping) else read_scene(str(source))
+
+
 def solve(
-    scene: Scene,
+    scene: Source,
     solver: str | Solver | None = None,
     *,
     options: Mapping[str, Any] | None = None,
@@ -87,7 +101,7 @@ def solve(
 
     Raises InputError.
     """
-    seconds: dict[str, float] = {}
+    scene, seconds = load_scene(scene), {}
 
     @contextmanager
     def step(name: str) -> Iterator[None]:

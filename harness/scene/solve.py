@@ -33,7 +33,7 @@ from .fastener_forces import fastener_forces
 from .few_digits import digits_sentence
 from .into_place import into_place, list_files
 from .layout import layout
-from .ledger import Entry, ledger, not_called_for
+from .ledger import ledger, not_called_for
 from .outcome import save, show
 from .solution import Solution
 
@@ -70,13 +70,11 @@ def solve(
         said=lambda sentence: console.print(Text(f"{sentence}.", style="yellow")),
     )
     assembly, load, x = found.problem.prepared.assembly, found.problem.load, found.unknowns
-    condensed = any(text.startswith("condensing") for text in built)
-    entries = ledger(scene, condensed or found.problem.form == "sparse", assembly.junction)
-    record = _record(found, entries, list(_skipped(found, list(built), solver)))
+    record = _record(found, list(built), solver)
     if allow_gap_mm is not None:
         uncertainty = GapError.of(assembly)(load.g, x, found.error_bound_mm)
         record["allowed_gap"] = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
-    show(record, entries, found.problem.reference, console)
+    show(record, console)
     try:
         with console.status(Text("pictures and files")), into_place(out, [Path(source)]) as new:
             from report.writers.solution import write  # slow to import: not before the answer is shown
@@ -94,11 +92,13 @@ def solve(
     return code
 
 
-def _record(found: Solution, entries: list[Entry], skipped: list[str]) -> dict[str, Any]:
-    """DIR/solution.json."""
+def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, Any]:
+    """DIR/solution.json. built : what the cache did not hold."""
     problem, known, judged = found.problem, found.problem.reference, found.judgement
     scene, data = problem.scene, problem.prepared
     by_solver = found.unknowns is not known.x
+    condensed = any(text.startswith("condensing") for text in built)
+    entries = ledger(scene, condensed or problem.form == "sparse", data.assembly.junction)
     return {
         "method": found.method,
         "status": found.status,
@@ -120,8 +120,8 @@ def _record(found: Solution, entries: list[Entry], skipped: list[str]) -> dict[s
         **layout(scene, data.assembly),
         "fasteners": fastener_forces(scene, found.x),
         "ledger": [vars(entry) for entry in entries],
-        "digits": digits_sentence(data, known.x, known.lam)[0] if isinstance(scene, MatricesScene) else None,
-        "skipped": skipped,
+        "digits": digits_sentence(problem)[0] if isinstance(scene, MatricesScene) else None,
+        "skipped": list(_skipped(found, built, condensed, solver)),
         "steps": found.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
         "machine": machine()["machine"],
@@ -130,7 +130,7 @@ def _record(found: Solution, entries: list[Entry], skipped: list[str]) -> dict[s
     }
 
 
-def _skipped(found: Solution, built: list[str], solver: str | None) -> Iterator[str]:
+def _skipped(found: Solution, built: list[str], condensed: bool, solver: str | None) -> Iterator[str]:
     scene, sparse = found.problem.scene, found.problem.form == "sparse"
     if not found.has_contact:
         instead = f"; {solver} was not run" if solver else ""
@@ -143,7 +143,7 @@ def _skipped(found: Solution, built: list[str], solver: str | None) -> Iterator[
         yield "condensation, dense factors and Q: the sparse model was solved as it is"
     elif not built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
-    elif isinstance(scene, JointScene) and not any(text.startswith("condensing") for text in built):
+    elif isinstance(scene, JointScene) and not condensed:
         yield "condensation: the parts came from the cache"
     if isinstance(scene, JointScene):
         if not any(scene.effects_of(TieEffect)):

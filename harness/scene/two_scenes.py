@@ -16,6 +16,13 @@ from problems.model.scene import JointScene
 from problems.scene import read_scene
 
 FOLDERS = ["first", "second"]
+FIGURES = {
+    "largest gap left, mm": ("largest_first_mm", "largest_second_mm"),
+    "mean, mm": ("mean_first_mm", "mean_second_mm"),
+    "closed": ("closed_first", "closed_second"),
+    "closed further by up to, mm": (None, "most_closed_mm"),
+    "opened by up to, mm": (None, "most_opened_mm"),
+}
 
 
 def solve_both(
@@ -38,13 +45,9 @@ def solve_both(
     path, pairs = write(out, FOLDERS)
     table = Table("contact", "", "first", "second", title=f"{sources[0]} and {sources[1]}")
     for line in pairs.to_dict("records"):
-        figures = {"largest gap left, mm": "largest_{}_mm", "mean, mm": "mean_{}_mm", "closed": "closed_{}"}
-        for words, name in figures.items():
-            both = [f"{line[name.format(side)]:.4g}" for side in FOLDERS]
-            table.add_row(plain(str(line["contact"])), words, *both)
-        closed, opened = (f"{line[name]:.4g}" for name in ("most_closed_mm", "most_opened_mm"))
-        table.add_row(plain(str(line["contact"])), "closed further by up to, mm", "", closed)
-        table.add_row(plain(str(line["contact"])), "opened by up to, mm", "", opened)
+        for words, names in FIGURES.items():
+            shown = ["" if name is None else f"{line[name]:.4g}" for name in names]
+            table.add_row(plain(str(line["contact"])), words, *shown)
     console.print(table)
     console.print(f"Comparison: {path}")
     return FAILED if codes[0] == FAILED else codes[1]

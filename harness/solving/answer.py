@@ -1,12 +1,14 @@
-"""One load case by one solver, from its set-up to displacements."""
+"""One load case by one solver, from its set-up to displacements; and by the in-house methods in turn."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from problems.errors import InputError
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import Form, default_form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
@@ -16,6 +18,11 @@ from .answers import Refused
 from .session import SolverSession
 
 NO_ANSWER = "gave no answer; try another solver or form"
+NO_CONTACT = "no contact closes"
+#: The methods that a reference may be proven from.
+DENSE = ("newton", "ipm-fast", "ipm", "gi", "lemke")
+SPARSE = ("newton", "mprgp")
+TOLERANCE_MM = 1e-11  # of these
 
 
 def form_of(name: str, taken: Sequence[Form], form: Form | None = None) -> Form:
@@ -59,3 +66,23 @@ def no_answer(name: str, answer: Answer) -> InputError:
     """The error of a solver that gives neither forces nor displacements."""
     said = f"{answer.status}: {answer.details['cause']}" if "cause" in answer.details else answer.status
     return InputError.one(f"solver {name}", "status", said, NO_ANSWER)
+
+
+def candidates(prepared: Prepared, load: LoadCase) -> Iterator[tuple[str, Vector]]:
+    """Names and λ (m,) N of the in-house methods; each is run when its answer is asked for.
+
+    None is run where no contact overlaps.
+    """
+    if not (prepared.dual_load(load) > 0).any():
+        yield NO_CONTACT, np.zeros(prepared.assembly.m)
+        return
+    from solvers.registry import make_solver  # slow to import
+
+    problem = in_form(prepared, prepared.form)
+    for name in SPARSE if prepared.form == "sparse" else DENSE:
+        try:
+            answer = forces_of(name, make_solver(name, {}), problem, load, TOLERANCE_MM)
+        except (InputError, ArithmeticError, np.linalg.LinAlgError, RuntimeError):
+            continue  # it gave no answer
+        if answer.lam is not None:
+            yield f"{name}, refined", answer.lam

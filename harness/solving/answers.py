@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from math import inf
 from numbers import Integral, Real
 from pathlib import Path
@@ -44,9 +45,9 @@ def checked(answer: object, problem: Problem) -> Answer:
         answer.status,
         vector("lam", answer.lam, problem.assembly.m),
         vector("x", answer.x, problem.assembly.n),
-        _count("iterations", answer.iterations),
-        _count("inner_iterations", answer.inner_iterations),
-        _seconds(answer.reported_s),
+        _number(int, "iterations", answer.iterations),
+        _number(int, "inner_iterations", answer.inner_iterations),
+        _number(float, "reported_s", answer.reported_s),
         _plain(answer.details),
     )
 
@@ -103,16 +104,11 @@ def error_text(error: BaseException) -> str:
         return type(error).__name__
 
 
-def _count(name: str, value: Any) -> int | None:
-    if value is not None and not is_count(value):
-        raise Refused(f"{name} is {shown(value)}; wanted a whole number from 0 to 2⁵³")
-    return None if value is None else int(value)
-
-
-def _seconds(value: Any) -> float | None:
-    if value is not None and not is_seconds(value):
-        raise Refused(f"reported_s is {shown(value)}; wanted seconds")
-    return None if value is None else float(value)
+def _number(kind: Callable[[Any], Any], name: str, value: Any) -> Any:
+    fits, wanted = (is_count, "a whole number from 0 to 2⁵³") if kind is int else (is_seconds, "seconds")
+    if value is not None and not fits(value):
+        raise Refused(f"{name} is {shown(value)}; wanted {wanted}")
+    return None if value is None else kind(value)
 
 
 def _plain(details: object) -> dict[str, Any]:

@@ -10,14 +10,16 @@ those in its rows; its answers need not have been kept.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
 from harness.results.digits import floor_mm
 from harness.results.records import Row
 from harness.results.sides import Side, measurement, read_side, refuse_incomparable
+
+from .findings import Finding
 
 MARGIN = 10.0
 
@@ -33,18 +35,20 @@ class Baseline:
     margin: float
     errors: Mapping[str, tuple[float, float]]
 
-    def error_mm(self, row: Row) -> float | None:
-        """What the error of a row's measurement was; None if the baseline has none within the limit."""
-        found = self.errors.get(measurement(row))
-        return None if found is None else found[0]
-
-    def exceeded(self, row: Row, error_mm: float, bound_mm: float, limit_mm: float) -> bool:
-        """Whether the row's error is beyond the margin."""
-        found = self.errors.get(measurement(row))
-        if found is None:
-            return False
-        then_mm, then_bound_mm = found
-        return error_mm > self.margin * max(then_mm, floor_mm(max(bound_mm, then_bound_mm), limit_mm))
+    def held(self, row: Row, found: Finding) -> Finding:
+        """A row's finding with its error in the baseline, if that was within the limit, and whether it is
+        beyond the margin.
+        """
+        if (known := self.errors.get(measurement(row))) is None:
+            return found
+        then_mm, then_bound_mm = known
+        found = replace(found, baseline_mm=then_mm)
+        error_mm, bound_mm = found.judgement.displacement_error_mm, found.judgement.reference_bound_mm or 0.0
+        if found.judgement.verdict != "within" or error_mm is None:
+            return found
+        if error_mm <= self.margin * max(then_mm, floor_mm(max(bound_mm, then_bound_mm), found.limit_mm)):
+            return found
+        return replace(found, why=f"more than {self.margin:g} times the baseline's {then_mm:.1e} mm")
 
 
 def read_baseline(directory: Path, margin: float, name: str, rows: Iterable[Row]) -> Baseline:
@@ -54,15 +58,9 @@ def read_baseline(directory: Path, margin: float, name: str, rows: Iterable[Row]
     side = read_side(str(directory))
     refuse_incomparable(side, Side(name, list(rows)))
     errors: dict[str, tuple[float, float]] = {}
-    for key, error, bound in _within(side.rows):
-        largest = max(errors.get(key, (0.0, 0.0))[0], error)
-        errors[key] = largest, bound
-    return Baseline(str(directory), margin, errors)
-
-
-def _within(rows: Iterable[Row]) -> Iterator[tuple[str, float, float]]:
-    for row in rows:
-        error = row.get("displacement_error_mm")
-        bound = row.get("reference_bound_mm") or 0.0
+    for row in side.rows:
+        error, bound = row.get("displacement_error_mm"), row.get("reference_bound_mm") or 0.0
         if row["verdict"] == "within" and error is not None and isfinite(error + bound):
-            yield measurement(row), error, bound
+            key = measurement(row)
+            errors[key] = max(errors.get(key, (0.0, 0.0))[0], error), bound
+    return Baseline(str(directory), margin, errors)

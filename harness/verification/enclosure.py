@@ -46,6 +46,10 @@ class DoubleDouble:
         hi, error = two_sum(self.hi, correction)
         return DoubleDouble(*two_sum(hi, error + self.lo))
 
+    def scaled(self, units: Vector) -> DoubleDouble:
+        """By powers of two (n,)."""
+        return DoubleDouble(units * self.hi, units * self.lo)
+
     def __getitem__(self, place: Any) -> DoubleDouble:
         return DoubleDouble(self.hi[place], self.lo[place])
 

@@ -19,11 +19,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, Vector
-from problems.stiffness.rounding import gamma
+from problems.stiffness.rounding import SAFE, gamma
 
 from .enclosure import ETA
-
-SAFE = 1.01
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ data and the reference are made from the scene.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -28,14 +27,12 @@ from problems.forms.names import road_of
 from problems.input.validation import validation_faults
 
 from .baseline import MARGIN, Baseline, read_baseline
-from .finding import Finding
-from .gate_files import write_json, write_junit
+from .findings import Finding, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
 from .reference_problem import ReferenceProblem, reference_problem
 
 #: What the gate reads of a row: which answer belongs to which scene.
-NEEDED = ("key", "source", "scene_key", "form", "answer", "status", "message", "gated", "limit_mm")
-NULLABLE = ("answer", "message")
+NEEDED = ("key", "source", "scene_key", "form", "status", "gated", "limit_mm")
 MAX_CASES = 10**9
 UNREADABLE = "is missing, damaged or not finite"
 
@@ -93,28 +90,18 @@ def concluded(findings: list[Finding], baseline: Baseline | None, console: Conso
 
 
 def gated_rows(path: Path) -> dict[str, Row]:
-    """The gated rows by their keys. Raises InputError if a row lacks a field that is needed, or if a field is
-    of another kind or out of bounds.
-    """
+    """By their keys. Raises InputError if a field is missing, of another kind or out of bounds."""
     rows = records.read(path)
-    faults = [
-        Fault(str(path), f"line {number}: {name}", None, "is missing from the row")
-        for number, row in enumerate(rows, start=1)
-        for name in NEEDED
-        if name not in row or (row[name] is None and name not in NULLABLE)
-    ]
-    if faults:
-        raise InputError(faults)
-    refuse_wrong_kinds(path, rows)
+    refuse_wrong_kinds(path, rows, needed=NEEDED)
+    faults = []
     for number, row in enumerate(rows, start=1):
         if not 0 < row["limit_mm"] < inf:
             allowed = "must be positive and finite"
             faults.append(Fault(str(path), f"line {number}: limit_mm", row["limit_mm"], allowed))
         case = row.get("case")
         if case is not None and not (type(case) is int and 0 <= case < MAX_CASES):
-            faults.append(
-                Fault(str(path), f"line {number}: case", case, f"an integer from 0 to {MAX_CASES - 1}")
-            )
+            allowed = f"an integer from 0 to {MAX_CASES - 1}"
+            faults.append(Fault(str(path), f"line {number}: case", case, allowed))
         if row.get("series") is not None:
             try:
                 RandomCases.model_validate(row["series"])
@@ -142,14 +129,14 @@ def judged(
         if problem is None or wanted != opened:
             problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
         found = judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)
-        yield held_to(baseline, row, found) if baseline else found
+        yield baseline.held(row, found) if baseline else found
 
 
 def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
     limit = problem.limit_mm(min(row["limit_mm"], LIMIT_MM))
     bound = problem.reference.bound_mm
-    if not row["answer"]:
-        why = f"{row['status']}: {row['message'] or 'no answer'}".splitlines()[0]
+    if not row.get("answer"):
+        why = f"{row['status']}: {row.get('message') or 'no answer'}".splitlines()[0]
         return Finding(row["key"], Judgement("no_answer", bound), limit, why)
     if row["scene_key"] != problem.scene.key:
         why = "the scene has changed since it was measured: run again"
@@ -165,18 +152,6 @@ def judged_row(row: Row, problem: ReferenceProblem, directory: Path) -> Finding:
         case _:
             why = ""
     return Finding(row["key"], judgement, limit, why)
-
-
-def held_to(baseline: Baseline, row: Row, finding: Finding) -> Finding:
-    """A finding with its error in the baseline, and whether that is exceeded."""
-    judgement, then = finding.judgement, baseline.error_mm(row)
-    error, bound = judgement.displacement_error_mm, judgement.reference_bound_mm or 0.0
-    finding = replace(finding, baseline_mm=then)
-    if judgement.verdict != "within" or error is None or then is None:
-        return finding
-    if not baseline.exceeded(row, error, bound, finding.limit_mm):
-        return finding
-    return replace(finding, why=f"more than {baseline.margin:g} times the baseline's {then:.1e} mm")
 
 
 def never_measured(rows: dict[str, Row], directory: Path) -> Iterator[Finding]:

@@ -122,15 +122,19 @@ class Proof:
         x2, lam2 = DoubleDouble(x, np.zeros_like(x)), DoubleDouble(lam, np.zeros_like(lam))
         quick = enough_mm > 0 and np.isfinite(self.compliance)
         r, s = units.residuals(load, x2, lam2, sharp=not quick)
-        found = [_Found(x2, lam2, column) for column in range(len(loads))]
+        best = [Proven(x2[:, k], lam2[:, k], np.inf) for k in range(len(loads))]
+        worse = np.zeros(len(loads), dtype=int)  # passes since a bound was halved
         left = np.arange(len(loads))  # the load cases of the columns
         bounds, rounding = self.bounds(x2, lam2, r, s, translated=quick)
         for step in range(MAX_PASSES):
             enough = np.maximum(enough_mm, AT_ROUNDING * rounding)
             going = np.zeros(len(left), dtype=bool)
             for column, k in enumerate(left):
-                found[k].take(float(bounds[column]), x2, lam2, column)
-                going[column] = not (bounds[column] <= enough[column] or found[k].worse == MAX_WORSE)
+                bound = float(bounds[column])
+                worse[k] = 0 if bound <= best[k].bound_mm / 2 else worse[k] + 1
+                if bound < best[k].bound_mm:
+                    best[k] = Proven(x2[:, column], lam2[:, column], bound)
+                going[column] = not (bounds[column] <= enough[column] or worse[k] == MAX_WORSE)
             if not (going.any() and self.kappa > 0):
                 break
             if not going.all():
@@ -147,7 +151,8 @@ class Proof:
             if step or not (bounds <= enough_mm).all():
                 r, s = units.residuals(load, x2, lam2)
                 bounds, rounding = self.bounds(x2, lam2, r, s)
-        return [self._proven(each) for each in found]
+        D, R = units.D[:, 0], units.R[:, 0]
+        return [Proven(each.x.scaled(D), each.lam.scaled(R), each.bound_mm) for each in best]
 
     def bounds(
         self, x: DoubleDouble, lam: DoubleDouble, r: Enclosure, s: Enclosure, translated: bool = False
@@ -209,24 +214,3 @@ class Proof:
             dlam, dx, missed = dlam + step * direction, dx - step * w, missed - step * q
             before = np.where(product > 0, product, 1.0)
         return dx, dlam
-
-    def _proven(self, found: _Found) -> Proven:
-        D, R = self.balanced.D[:, 0], self.balanced.R[:, 0]
-        x, lam = found.x[:, found.column], found.lam[:, found.column]
-        return Proven(DoubleDouble(D * x.hi, D * x.lo), DoubleDouble(R * lam.hi, R * lam.lo), found.bound_mm)
-
-
-@dataclass
-class _Found:
-    """The least bound of a load case, and the column that has it. worse : passes since it was halved."""
-
-    x: DoubleDouble
-    lam: DoubleDouble
-    column: int
-    bound_mm: float = np.inf
-    worse: int = 0
-
-    def take(self, bound_mm: float, x: DoubleDouble, lam: DoubleDouble, column: int) -> None:
-        self.worse = 0 if bound_mm <= self.bound_mm / 2 else self.worse + 1
-        if bound_mm < self.bound_mm:
-            self.x, self.lam, self.column, self.bound_mm = x, lam, column, bound_mm

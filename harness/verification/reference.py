@@ -18,11 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.solving.candidates import candidates
+from harness.solving.answer import candidates
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import MadeScene, Scene
-from problems.stiffness.operator import Stiffness
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
@@ -104,7 +103,12 @@ def proof_of(prepared: Prepared) -> Proof:
 
 def proven_lambda_min(prepared: Prepared) -> float:
     """κ ≤ λmin(DKD) in balanced units, from the cache if it was proven before for this assembly."""
-    return _remembered(prepared, "lambda_min", lambda: _proven_lambda_min(prepared.assembly.K))
+    K = prepared.assembly.K
+
+    def proven() -> float:
+        return smallest_eigenvalue(K, K.units, [ESTIMATED * about for about in K.least_eigenvalues(K.units)])
+
+    return _remembered(prepared, "lambda_min", proven)
 
 
 def _remembered(prepared: Prepared, name: str, make: Callable[[], float]) -> float:
@@ -115,10 +119,6 @@ def _remembered(prepared: Prepared, name: str, make: Callable[[], float]) -> flo
         cache.digest(name, prepared.key, _code()), lambda: ({}, {"value": repr(make())})
     )
     return float(facts["value"])
-
-
-def _proven_lambda_min(K: Stiffness) -> float:
-    return smallest_eigenvalue(K, K.units, [ESTIMATED * about for about in K.least_eigenvalues(K.units)])
 
 
 def _code() -> str:

@@ -26,6 +26,8 @@ from problems.scene import read_scene
 from .judge import Judgement, Reference, conditioned_limit, judge
 from .reference import default_limit_s, reference, reference_of
 
+PROBLEMS = "problems.jsonl"
+
 
 @dataclass(frozen=True)
 class ReferenceProblem:
@@ -151,7 +153,8 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     if printed := scene.printed:
         row |= {"printed_objective": printed.value, "printed_digits": printed.digits}
         row["printed_source"] = printed.source
-    before = _recorded(directory, scene)
+    recorded = _recorded(directory).get(scene.name)
+    before = recorded if recorded and recorded.get("scene_key") == scene.key else None
     x = assembly.at_junction(known.x)
     sparse = before.get("sparse", {}) if before else {}
     if problem.form == "sparse":
@@ -175,14 +178,6 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     records.replace_arrays(contacts, arrays)
 
 
-def _recorded(directory: Path, scene: Scene) -> dict[str, Any] | None:
-    """The row of a scene, if it is unchanged."""
-    for row in records.read_complete_rows(directory / "problems.jsonl"):
-        if row["scene"] == scene.name and row.get("scene_key") == scene.key:
-            return row
-    return None
-
-
 def record_refusal(scene: Scene, directory: Path) -> None:
     """Put into DIRECTORY/problems.jsonl the message that refuses a rung; "" if the rung is accepted."""
     try:
@@ -194,7 +189,11 @@ def record_refusal(scene: Scene, directory: Path) -> None:
     _put({"scene": scene.name, "title": scene.title, "n": n, "m": m, "refused": message}, directory)
 
 
+def _recorded(directory: Path) -> dict[str, dict[str, Any]]:
+    return {row["scene"]: row for row in records.read_complete_rows(directory / PROBLEMS)}
+
+
 def _put(row: dict[str, Any], directory: Path) -> None:
-    path = directory / "problems.jsonl"
-    others = [other for other in records.read_complete_rows(path) if other["scene"] != row["scene"]]
-    records.rewrite(path, [*others, row])
+    others = _recorded(directory)
+    others.pop(row["scene"], None)
+    records.rewrite(directory / PROBLEMS, [*others.values(), row])

@@ -16,6 +16,7 @@ from problems.stiffness.scaled import ScaledStiffness
 from .approximate_inverse import ApproximateInverse, of_dense, of_products
 from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
 from .compliance import Compliance, ComplianceProducts, DenseCompliance
+from .names import Form
 
 MIB = 2**20
 EPS = float(np.finfo(float).eps)
@@ -43,6 +44,11 @@ class Prepared:
     ) -> None:
         self.assembly, self.coarser = assembly, coarser
         self._make_Q = Q or (lambda: assembly.K.compliance(assembly.A))
+
+    @property
+    def form(self) -> Form:
+        """The form in which the in-house methods solve it."""
+        return "dual" if self.assembly.K.dense else "sparse"
 
     @property
     def seconds(self) -> dict[str, float]:

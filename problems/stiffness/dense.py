@@ -126,6 +126,11 @@ class InverseBlock(DenseBlock):
     def __init__(self, Q: Matrix) -> None:
         self.Q = Q
 
+    @cached_property
+    def matrix(self) -> Matrix:
+        """K, by a Cholesky factor of Q, when it is first asked for. Raises NotPositiveDefinite."""
+        return np.asfortranarray(sla.cho_solve((cholesky(self.Q), False), np.eye(len(self.Q))))
+
     @property
     def size(self) -> int:
         return len(self.Q)

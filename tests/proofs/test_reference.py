@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from small import make_load, make_prepared, solve_by_nnls
 
 from harness.conformance.known_problems import contact_rows
-from harness.solving import candidates
+from harness.solving import answer
 from harness.verification import reference as module
 from harness.verification.proof import Proof
 from harness.verification.reference import STOPPED, best_of_candidates, reference
@@ -116,7 +116,7 @@ def test_the_methods_are_tried_in_turn_until_one_is_proven(
         made = Prepared(replace(made.assembly, K=made.assembly.K.as_sparse()))
     load, x, lam = chosen(made, 1, 0.4, 0.0)
     monkeypatch.setattr(Proof, "_corrections", lambda self, r, s, lam, enough: (0 * r, 0 * lam))
-    methods: tuple[str, ...] = getattr(candidates, kind.upper())
+    methods: tuple[str, ...] = getattr(answer, kind.upper())
     tried: list[str] = []
     right = methods[:3][-1]
 
@@ -126,7 +126,7 @@ def test_the_methods_are_tried_in_turn_until_one_is_proven(
             raise InputError.one("solver", "status", "failed", "gave no answer")
         return Answer("solved", lam if name == right else 0 * lam)
 
-    monkeypatch.setattr(candidates, "forces_of", answers)
+    monkeypatch.setattr(answer, "forces_of", answers)
     found = best_of_candidates(made, load)
     assert tried == list(methods[:3])
     assert found.route == f"{right}, refined"

@@ -1,18 +1,42 @@
-"""The gate's findings as files for a CI: JSON, and JUnit XML, which most of them show row by row."""
+"""What the gate finds, and its files for a CI: JSON, and JUnit XML, which most of them show row by row."""
 
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.results.records import replace_text, to_line
 from harness.terminal.plain_console import legible
 
-from .finding import Finding
+from .judge import Judgement
 
 SUITE = "rivetbench gate"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One gated measurement, judged again. why : the reason if it has not passed.
+
+    baseline_mm : its error in the baseline.
+    """
+
+    key: str
+    judgement: Judgement
+    limit_mm: float
+    why: str = ""
+    baseline_mm: float | None = None
+
+    @property
+    def passed(self) -> bool:
+        return self.judgement.verdict == "within" and not self.why
+
+    @property
+    def judged(self) -> bool:
+        return self.judgement.verdict in ("within", "outside")
 
 
 def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: int) -> None:
@@ -40,25 +64,19 @@ def write_json(path: Path, directory: Path, findings: Sequence[Finding], code: i
 
 def write_junit(path: Path, findings: Sequence[Finding]) -> None:
     """A test case per finding: a failure if accuracy was lost, an error if nothing could be said."""
-    lost = [finding for finding in findings if not finding.passed and _judged(finding)]
-    unknown = [finding for finding in findings if not finding.passed and not _judged(finding)]
-    counts = {"tests": str(len(findings)), "failures": str(len(lost)), "errors": str(len(unknown))}
+    kinds = ["" if each.passed else "failure" if each.judged else "error" for each in findings]
+    of = Counter(kinds)
+    counts = {"tests": str(len(findings)), "failures": str(of["failure"]), "errors": str(of["error"])}
     root = ElementTree.Element("testsuites", counts)
     suite = ElementTree.SubElement(root, "testsuite", {"name": SUITE} | counts)
-    for finding in findings:
+    for finding, kind in zip(findings, kinds, strict=True):
         scene, _, name = legible(finding.key).partition(" ")
         case = ElementTree.SubElement(suite, "testcase", {"classname": scene, "name": name or scene})
-        if not finding.passed:
-            kind = "failure" if _judged(finding) else "error"
-            ElementTree.SubElement(
-                case, kind, {"type": finding.judgement.verdict, "message": legible(finding.why)}
-            )
+        if kind:
+            said = {"type": finding.judgement.verdict, "message": legible(finding.why)}
+            ElementTree.SubElement(case, kind, said)
     ElementTree.indent(root)
     _write(path, ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n")
-
-
-def _judged(finding: Finding) -> bool:
-    return finding.judgement.verdict in ("within", "outside")
 
 
 def _write(path: Path, text: str) -> None:
