@@ -42,7 +42,7 @@ from problems.input.stored_matrices import SMALL
 from problems.input.user_matrices import SYMMETRY, checked
 from problems.load_cases.base import Listed, LoadCases
 from problems.load_cases.random_gaps import random_gaps
-from problems.model.scene import MadeScene, Scene
+from problems.model.scene import ManufacturedScene, Scene
 from solvers.base import Answer, Solver
 
 __all__ = [
@@ -79,7 +79,7 @@ def own_matrices(
     arrays |= {name: np.array(value) for name, value in given.items()}
     sparse = sp.issparse(K) and K.shape[0] > SMALL
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
-    return MadeScene(title, title, ManufacturedProblem(assembly, load))
+    return ManufacturedScene(title, title, ManufacturedProblem(assembly, load))
 
 
 def judge(

@@ -14,7 +14,7 @@ from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress, silent
 from problems.model.effect import Effect
-from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
+from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
 
 if TYPE_CHECKING:
     from problems.full_model.given_model import GivenModel
@@ -34,7 +34,7 @@ def model_of(scene: Scene) -> JointModel | GivenModel:
         else:
             from problems.full_model.given_model import GivenModel
 
-            assert isinstance(scene, MatricesScene | MadeScene)
+            assert isinstance(scene, MatricesScene | ManufacturedScene)
             _last = scene, GivenModel.of(scene)
     return _last[1]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from problems.model.effect import Effect, TieEffect
+from problems.model.effect import Effect, SpringEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
 
@@ -54,7 +54,7 @@ def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def untied(scene: JointScene) -> JointScene:
     """The scene without its springs between parts."""
-    return replace(scene, effects=tuple(e for e in scene.effects if not isinstance(e, TieEffect)))
+    return replace(scene, effects=tuple(e for e in scene.effects if not isinstance(e, SpringEffect)))
 
 
 def dof(nx: int, ix: int, iy: int, dx: int = 0, dy: int = 0) -> int:

@@ -136,10 +136,10 @@ def series(
         before = (read_facts(out) or {}).get("identity", {}).get("form")
         asked: Any = form.value if form else before if before in made.forms else None
         count = swept(read, sweep).count if sweep else cases or 100
-        road = chosen_form(read, made.forms, asked, count)
-        if road.why:
-            console.print(f"In the sparse form, without condensation: {road.why}.", style="dim")
-        taken: Any = road.form
+        choice = chosen_form(read, made.forms, asked, count)
+        if choice.why:
+            console.print(f"In the sparse form, without condensation: {choice.why}.", style="dim")
+        taken: Any = choice.form
         if gaps:
             from problems.load_cases.measured_gaps import measured_gaps
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 
-from harness.solving.answers import Refused, error_text, shown, vector
+from harness.solving.answers import InvalidAnswer, error_text, shown, vector
 from harness.solving.session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
@@ -176,7 +176,7 @@ def _lam(answer: object, known: KnownProblem) -> Vector | None:
     """λ if it can be compared; anything else has been reported already."""
     try:
         return vector("lam", getattr(answer, "lam", None), known.prepared.assembly.m)
-    except Refused:
+    except InvalidAnswer:
         return None
 
 

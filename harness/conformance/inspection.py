@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from harness.solving.answers import Refused, checked, is_count, is_seconds, shown
+from harness.solving.answers import InvalidAnswer, checked, is_count, is_seconds, shown
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
@@ -53,7 +53,7 @@ def inspect(answer: Answer, known: KnownProblem, case: KnownCase, form: Form) ->
         return
     try:
         checked(answer, in_form(known.prepared, form))
-    except Refused as error:
+    except InvalidAnswer as error:
         if not facts and answer.status in get_args(Status):
             yield finding(f"a measurement refuses it: {error}", "Return plain numbers")
     wrong = list(_wrong_values(answer, answer.lam, known, case, finding))

@@ -15,7 +15,7 @@ from dataclasses import asdict
 from typing import Any
 
 from harness.results.records import to_line
-from harness.solving.answers import Refused, error_text
+from harness.solving.answers import InvalidAnswer, error_text
 from problems.errors import InputError
 
 
@@ -51,7 +51,7 @@ def main() -> None:
         end = {"status": "failed", "message": error_text(error), "faults": faults}
     except MemoryError as error:
         end = {"status": "memory_limit", "message": f"the solver ran out of memory: {error}"}
-    except Refused as error:
+    except InvalidAnswer as error:
         end = {"status": error.status, "message": str(error)}
     except BaseException as error:
         end = {"status": "failed", "message": f"raised {error_text(error)}"}

@@ -32,7 +32,7 @@ from harness.verification.reference_problem import (
     record_refusal,
     reference_problem,
 )
-from problems.forms.names import road_of
+from problems.forms.names import form_family
 from problems.scene import read_scene
 
 from .describe import Description, Solvers, describe
@@ -150,7 +150,7 @@ def measure_remaining(
 def pending_tasks(
     remaining: list[Measurement], rows: list[Row], directory: Path, solvers: Solvers, display: Display
 ) -> Iterator[tuple[Pending, Task]]:
-    """One task after another; a scene is opened before its first in each road. `rows` grow meanwhile."""
+    """One task after another; a scene is opened before its first of a family. `rows` grow meanwhile."""
     opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
     for batch in batches(remaining):
         m = batch[0]
@@ -159,13 +159,13 @@ def pending_tasks(
             continue
         if any(problem.scene.name != m.scene for problem in opened.values()):
             opened = {}
-        road = road_of(m.form)
-        if road not in opened:
+        family = form_family(m.form)
+        if family not in opened:
             start, building = time.monotonic(), partial(display.building, m.scene)
-            opened[road] = reference_problem(m.source, building, m.reference_limit_s, m.form)
-            record(opened[road], directory)
+            opened[family] = reference_problem(m.source, building, m.reference_limit_s, m.form)
+            record(opened[family], directory)
             display.ready(m.scene, time.monotonic() - start)
-        problem = opened[road]
+        problem = opened[family]
         display.doing(f"{m.scene}: {m.solver} {m.form}")
         timed_out_on = predicted_timeout(m, problem.prepared.assembly.asked, rows)
         task = Task(batch, solvers[m.solver, m.variant], timed_out_on)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.solving.answers import Refused
+from harness.solving.answers import InvalidAnswer
 from problems.forms.assembly import Matrix
 
 
@@ -20,10 +20,10 @@ class StoredFiles:
         self.before = {folder: _state(folder) for folder in self.folders}
 
     def check(self) -> None:
-        """Raises Refused if a file was written, replaced or deleted since."""
+        """Raises InvalidAnswer if a file was written, replaced or deleted since."""
         changed = [str(folder) for folder, before in self.before.items() if _state(folder) != before]
         if changed:
-            raise Refused(f"the solver wrote into the cache: delete {', '.join(changed)}")
+            raise InvalidAnswer(f"the solver wrote into the cache: delete {', '.join(changed)}")
 
 
 def _state(folder: Path) -> dict[str, tuple[int, ...]]:

@@ -17,7 +17,7 @@ import threadpoolctl
 from harness.planning.plan import Measurement
 from harness.results.machine import blas_kernels, resident_mib
 from harness.results.records import Row
-from harness.solving.answers import Refused, figures, save
+from harness.solving.answers import InvalidAnswer, figures, save
 from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -39,7 +39,7 @@ PAGE = 4096
 SHARED = ("load_s", "model_s", "convert_s", "prepare_s", "data_mib")
 
 
-class Unsupported(Refused):
+class Unsupported(InvalidAnswer):
     """The solver does not take this form or way of solving; the text says what it takes."""
 
     status = "unsupported"

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 from harness.results.machine import physical_memory_mib
 from problems.errors import Fault, InputError
-from problems.forms.names import DENSE_FORMS, Form, road_of
+from problems.forms.names import DENSE_FORMS, Form, form_family
 from problems.input.stored_matrices import SMALL, holds_sparse, stored_matrices
-from problems.model.effect import TieEffect
-from problems.model.scene import JointScene, MadeScene, MatricesScene, Scene
+from problems.model.effect import SpringEffect
+from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
 from problems.scene import read_scene
 from problems.stiffness.operator import dense_slices
 
@@ -58,7 +58,7 @@ def size_of(scene: Scene) -> Size | None:
     match scene:
         case JointScene():
             return _of_joint(scene)
-        case MadeScene() if scene.sparse and sum(scene.block_sizes) > SMALL:
+        case ManufacturedScene() if scene.sparse and sum(scene.block_sizes) > SMALL:
             assembly = scene.made.assembly
         case MatricesScene() if holds_sparse(files := dict(scene.files)):
             assembly = stored_matrices(files, scene.assembly_key, sparse=True)[0]
@@ -82,7 +82,7 @@ def _of_joint(scene: JointScene) -> Size:
 
     An element joins a node, with 4 unknowns, to the next on the next line: 4 (nodes per line + 1) + 3.
     """
-    joint, tied = scene.joint, any(scene.effects_of(TieEffect))
+    joint, tied = scene.joint, any(scene.effects_of(SpringEffect))
     (n, m), (nx, ny) = joint.size, joint.junction.nodes
     dense = _dense([n] if tied else [joint.node_count] * len(joint.part), m)
     # The grid lines y = const of each part that are not built in.
@@ -109,22 +109,22 @@ def refuse_what_cannot_fit(scene: Scene, form: Form) -> None:
     if isinstance(scene, JointScene):
         nodes = list(scene.joint.junction.nodes)
         raise InputError.one(scene.name, "junction.nodes", nodes, f"fewer nodes: {allowed}")
-    assert isinstance(scene, MatricesScene | MadeScene)
+    assert isinstance(scene, MatricesScene | ManufacturedScene)
     raise InputError.one(scene.source_of("K"), "K", f"{size.n} unknowns", allowed)
 
 
 def refuse_limits_too_low(plan: Iterable[Measurement]) -> None:
     """Raise InputError where a memory limit is above what this machine has, or below the matrices alone."""
     faults, physical = [], physical_memory_mib()
-    limits = {(m.source, road_of(m.form), m.memory_limit_mib) for m in plan}
+    limits = {(m.source, form_family(m.form), m.memory_limit_mib) for m in plan}
     for limit in sorted({limit for *_, limit in limits if limit > physical}):
         faults.append(Fault("--memory-limit", "memory_limit_mib", limit, f"this machine has {physical} MiB"))
-    for source, road, limit in sorted(limits):
+    for source, family, limit in sorted(limits):
         scene = read_scene(source)
         if not isinstance(scene, JointScene):
             continue
         size = _of_joint(scene)
-        if (size.sparse_mib if road == "sparse" else size.dense_mib) > limit:
+        if (size.sparse_mib if family == "sparse" else size.dense_mib) > limit:
             allowed = f"the matrices of scene {source} alone take {size.dense_mib:.0f} MiB in the dense forms"
             allowed += f", {size.sparse_mib:.0f} MiB in the sparse form (--form sparse)"
             faults.append(Fault("--memory-limit", "memory_limit_mib", limit, allowed))

@@ -20,8 +20,8 @@ from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import MatricesScene
 from problems.scene import read_scene
 
+from .atomic_output import atomic_output
 from .few_digits import digits_sentence
-from .into_place import into_place
 
 
 def places(sources: list[str], out: Path, format: str) -> list[tuple[str, Path]]:
@@ -46,7 +46,7 @@ def export(source: str, format: str, out: Path, console: Console) -> None:
         raise InputError.one("--format", "format", format, f"one of {', '.join(formats.FORMATS)}")
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
-    with into_place(out, [Path(source), *own]) as new:
+    with atomic_output(out, [Path(source), *own]) as new:
         problem = opened(scene)
         formats.FORMATS[format].write(new, matrices(problem.prepared, problem.load))
     size = f"n = {problem.prepared.assembly.n}, m = {problem.prepared.assembly.m}"
@@ -69,7 +69,7 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     if out.suffix != ".npz":
         raise InputError.one("--out", "path", str(out), "must end in .npz, which makes it a scene")
     given = [(name, Path(path)) for name, _, path in (file.rpartition("=") for file in files)]
-    with into_place(out, [path for _, path in given]) as new:
+    with atomic_output(out, [path for _, path in given]) as new:
         data, origin = _read_all(given)
         checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)
         formats.FORMATS["npz"].write(new, data | {name: sp.csr_array(data[name]) for name in "KA"})

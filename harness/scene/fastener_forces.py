@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from problems.forms.assembly import Vector
-from problems.model.effect import Effect, TieEffect
+from problems.model.effect import Effect, SpringEffect
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 
@@ -27,7 +27,7 @@ def fastener_forces(scene: Scene, x: Vector) -> list[dict[str, Any]]:
 
 
 def _of_effect(effect: Effect, joint: Joint, x: Vector) -> Iterator[dict[str, Any]]:
-    if isinstance(effect, TieEffect):
+    if isinstance(effect, SpringEffect):
         T, k = effect.springs(joint)
         forces = k * (getattr(effect, "approach", 0.0) - T.T @ x)
         names = [part.name for part in joint.part]

@@ -29,7 +29,7 @@ from problems.input import sparse_npz
 from problems.model.scene import MatricesScene, Scene
 from problems.scene import read_scene
 
-from .into_place import into_place
+from .atomic_output import atomic_output
 
 FORMATS = ("mtx", "npz")
 Arrays = dict[str, Any]
@@ -54,7 +54,7 @@ def export_form(
         raise InputError.one("--format", "format", format, allowed)
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
-    with into_place(out, [Path(source), *own]) as new:
+    with atomic_output(out, [Path(source), *own]) as new:
         arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
         (_write_npz if format == "npz" else _write_mtx)(new, arrays, about)
     size = f"{len(arrays['q'])} unknowns, {about['m']} contacts"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from problems.build import load_case
 from problems.forms.assembly import Vector
-from problems.model.effect import Effect, GapEffect, StiffnessEffect, TieEffect, effect_kinds
+from problems.model.effect import Effect, GapEffect, SpringEffect, StiffnessEffect, effect_kinds
 from problems.model.joint import Joint
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
@@ -67,7 +67,7 @@ def _added(effect: Effect, scene: JointScene, junction: NDArray[np.intp] | None)
         (part,) = (part for part in joint.part if part.name == effect.part)
         yield "stiffness", f"{effect.stiffness(joint.plate(part)).nnz} entries of the plate's K"
         return
-    if isinstance(effect, TieEffect):
+    if isinstance(effect, SpringEffect):
         T, k = effect.springs(joint)
         yield "stiffness", f"{T.shape[1]} × {k[0]:g} N/mm between parts"
     load = load_case(scene, "dual" if junction is None else "sparse", [effect])

@@ -23,15 +23,15 @@ from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.gap_error import GapError
 from problems.errors import InputError
 from problems.forms.names import Form
-from problems.model.effect import TieEffect
+from problems.model.effect import SpringEffect
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene
 from problems.scene import read_scene
 
 from . import allowed_gap, solution
+from .atomic_output import atomic_output, list_files
 from .fastener_forces import fastener_forces
 from .few_digits import digits_sentence
-from .into_place import into_place, list_files
 from .layout import layout
 from .ledger import ledger, not_called_for
 from .outcome import save, show
@@ -76,7 +76,7 @@ def solve(
         record["allowed_gap"] = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
     show(record, console)
     try:
-        with console.status(Text("pictures and files")), into_place(out, [Path(source)]) as new:
+        with console.status(Text("pictures and files")), atomic_output(out, [Path(source)]) as new:
             from report.writers.solution import write  # slow to import: not before the answer is shown
 
             new.mkdir()
@@ -146,7 +146,7 @@ def _skipped(found: Solution, built: list[str], condensed: bool, solver: str | N
     elif isinstance(scene, JointScene) and not condensed:
         yield "condensation: the parts came from the cache"
     if isinstance(scene, JointScene):
-        if not any(scene.effects_of(TieEffect)):
+        if not any(scene.effects_of(SpringEffect)):
             yield "springs between parts: K stays block diagonal"
         if not any(scene.effects_of(PartLoadEffect)) and not sparse:
             yield "condensing loads: none acts beyond the junction"

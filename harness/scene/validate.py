@@ -12,7 +12,7 @@ from harness.planning.memory import size_of
 from harness.results.machine import physical_memory_mib
 from problems.build import model_of, prepared
 from problems.forms.names import FORMS
-from problems.model.effect import TieEffect
+from problems.model.effect import SpringEffect
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
@@ -44,7 +44,7 @@ def validate(source: str, console: Console) -> None:
     console.print(f"One load case is solved in the {form} form, unless another is asked for.")
     if size.m == 0:
         console.print("No contact: a linear solve, without a quadratic program.")
-    if any(scene.effects_of(TieEffect)):
+    if any(scene.effects_of(SpringEffect)):
         console.print("Springs join parts into larger blocks of K.")
     beyond = [effect.kind for effect in scene.effects_of(PartLoadEffect)]
     if beyond:

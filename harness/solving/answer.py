@@ -14,7 +14,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
 from solvers.base import Answer, Solver
 
-from .answers import Refused
+from .answers import InvalidAnswer
 from .session import SolverSession
 
 NO_ANSWER = "gave no answer; try another solver or form"
@@ -55,7 +55,7 @@ def forces_of(name: str, solver: Solver, problem: Problem, case: LoadCase, toler
     (load,) = problem.loads([case])
     try:
         answer = session.next(load, None)
-    except Refused as error:
+    except InvalidAnswer as error:
         raise InputError.one(f"solver {name}", "answer", str(error), NO_ANSWER) from error
     if answer.lam is None and answer.x is None:
         raise no_answer(name, answer)

@@ -22,7 +22,7 @@ LONGEST_SHOWN = 80  # characters of a value in a message
 LONGEST_ERROR = 2000  # characters of an exception's text
 
 
-class Refused(Exception):
+class InvalidAnswer(Exception):
     """The answer is invalid; the text says why. status : what the row says of it."""
 
     status = "failed"
@@ -32,15 +32,16 @@ def checked(answer: object, problem: Problem) -> Answer:
     """The answer in plain types; everything that a solver returns passes here.
 
     lam (m,) and x (n,) become float64 arrays of their own, read-only; iterations integers; details plain
-    JSON, dropped if it is large. Raises Refused if type, status, shapes or values are wrong; complex λ too.
+    JSON, dropped if it is large. Raises InvalidAnswer if type, status, shapes or values are wrong, as of a
+    complex λ.
     """
     if not isinstance(answer, Answer):
-        raise Refused(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
+        raise InvalidAnswer(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
     if not isinstance(answer.status, str) or answer.status not in get_args(Status):
-        raise Refused(f"status {shown(answer.status)}; allowed: {', '.join(get_args(Status))}")
+        raise InvalidAnswer(f"status {shown(answer.status)}; allowed: {', '.join(get_args(Status))}")
     needed = problem.needs[-1]  # x in a form that gives it: forces may be missing there
     if answer.status == "solved" and getattr(answer, needed) is None:
-        raise Refused(f"says solved, and gives no {needed}")
+        raise InvalidAnswer(f"says solved, and gives no {needed}")
     return Answer(
         answer.status,
         vector("lam", answer.lam, problem.assembly.m),
@@ -55,22 +56,22 @@ def checked(answer: object, problem: Problem) -> Answer:
 def vector(name: str, value: Any, size: int) -> Vector | None:
     """A read-only copy of `value` as (size,) float64; None for None.
 
-    Raises Refused unless it is real (integers or floats of any precision), finite and of that shape.
+    Raises InvalidAnswer unless it is real (integers or floats of any precision), finite and of that shape.
     """
     if value is None:
         return None
     try:
         given = np.asarray(value)
     except Exception as error:
-        raise Refused(f"{name} is no array: {error_text(error)}") from error
+        raise InvalidAnswer(f"{name} is no array: {error_text(error)}") from error
     if given.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
-        raise Refused(f"{name} is {type(value).__name__} of {given.dtype}; wanted real numbers")
+        raise InvalidAnswer(f"{name} is {type(value).__name__} of {given.dtype}; wanted real numbers")
     if given.shape != (size,):
-        raise Refused(f"{name} has shape {given.shape}; wanted ({size},)")
+        raise InvalidAnswer(f"{name} has shape {given.shape}; wanted ({size},)")
     with np.errstate(over="ignore"):
         plain = np.array(given, dtype=np.float64)
     if not np.isfinite(plain).all():
-        raise Refused(f"{name} has NaN or infinity")
+        raise InvalidAnswer(f"{name} has NaN or infinity")
     plain.flags.writeable = False
     return plain
 
@@ -107,13 +108,13 @@ def error_text(error: BaseException) -> str:
 def _number(kind: Callable[[Any], Any], name: str, value: Any) -> Any:
     fits, wanted = (is_count, "a whole number from 0 to 2⁵³") if kind is int else (is_seconds, "seconds")
     if value is not None and not fits(value):
-        raise Refused(f"{name} is {shown(value)}; wanted {wanted}")
+        raise InvalidAnswer(f"{name} is {shown(value)}; wanted {wanted}")
     return None if value is None else kind(value)
 
 
 def _plain(details: object) -> dict[str, Any]:
     if not isinstance(details, dict):
-        raise Refused(f"details is {shown(details)}; wanted a dict")
+        raise InvalidAnswer(f"details is {shown(details)}; wanted a dict")
     try:
         text = to_line(details)
         if len(text) > LARGEST_DETAILS:
@@ -121,7 +122,7 @@ def _plain(details: object) -> dict[str, Any]:
         plain: dict[str, Any] = json.loads(text, parse_int=_bounded)
         json.dumps(plain, ensure_ascii=False).encode()  # no lone surrogates
     except Exception as error:
-        raise Refused(f"details is not JSON: {error_text(error)}") from error
+        raise InvalidAnswer(f"details is not JSON: {error_text(error)}") from error
     return plain
 
 

@@ -16,7 +16,7 @@ from problems.forms.problem import Problem
 from problems.forms.units import Units
 from solvers.base import Answer, Batch, Solver, WarmStart
 
-from .answers import Refused, checked
+from .answers import InvalidAnswer, checked
 
 #: A context around a step of the solver, given the row field of its seconds: times it, or names what failed.
 Lap = Callable[[str], AbstractContextManager[None]]
@@ -42,7 +42,7 @@ class SolverSession:
     lap : entered around each step, with convert_s, prepare_s, setup_s or solve_s.
     most : answers kept for warm starts; all by default.
 
-    Raises what the solver raises, and Refused if an answer is invalid.
+    Raises what the solver raises, and InvalidAnswer if an answer is invalid.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class SolverSession:
         with self.in_one_process():
             answers = list(self.batch(loads, self.tolerance))
         if len(answers) != len(loads):
-            raise Refused(f"{len(answers)} answers to {len(loads)} load cases")
+            raise InvalidAnswer(f"{len(answers)} answers to {len(loads)} load cases")
         return [checked(answer, self.problem) for answer in answers]
 
     def forget(self) -> None:

@@ -23,7 +23,7 @@ from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
 from problems.errors import Fault, InputError
-from problems.forms.names import road_of
+from problems.forms.names import form_family
 from problems.input.validation import validation_faults
 
 from .baseline import MARGIN, Baseline, read_baseline
@@ -120,12 +120,12 @@ def judged(
     """
     problem: ReferenceProblem | None = None
     opened: tuple[str, str] | None = None
-    for row in sorted(rows.values(), key=lambda row: (str(row["source"]), road_of(row["form"]))):
+    for row in sorted(rows.values(), key=lambda row: (str(row["source"]), form_family(row["form"]))):
         if row["answer"] and not is_kept(directory / row["answer"]):
             missing, limit_mm = Judgement("no_answer"), min(row["limit_mm"], LIMIT_MM)
             yield Finding(row["key"], missing, limit_mm, f"{row['answer']} {UNREADABLE}")
             continue
-        wanted = row["source"], road_of(row["form"])
+        wanted = row["source"], form_family(row["form"])
         if problem is None or wanted != opened:
             problem, opened = reference_problem(row["source"], limit_s=limit_s, form=row["form"]), wanted
         found = judged_row(row, problem.of_case(row.get("series"), row.get("case")), directory)

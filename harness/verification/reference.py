@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from harness.solving.answer import candidates
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
-from problems.model.scene import MadeScene, Scene
+from problems.model.scene import ManufacturedScene, Scene
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
@@ -47,7 +47,7 @@ def reference_of(
     given: Sequence[Vector] = (),
 ) -> Reference:
     """The reference of a scene: the answer that it was made from, if any, else that of its load case."""
-    made = scene.made if isinstance(scene, MadeScene) else None
+    made = scene.made if isinstance(scene, ManufacturedScene) else None
     if made is not None and made.x is not None and made.lam is not None:
         return Reference(made.x, made.lam, made.lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm)
     return reference(prepared, load, limit_s, given)

@@ -133,7 +133,7 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     scene, facts, known = problem.scene, problem.prepared.facts, problem.reference
     assembly = problem.prepared.assembly
     contacts = directory / "scenes" / (scene.name.replace("/", "_") + ".npz")
-    of_road: dict[str, Any] = {
+    of_family: dict[str, Any] = {
         "build_s": facts.get("seconds"),
         "stored_mib": problem.prepared.stored_mib,
         "reference_s": problem.reference_s,
@@ -148,7 +148,7 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
         "m": assembly.m,
         "active": int(known.active.sum()),
         **{name: facts.get(name) for name in ("cond_K", "lambda_min", "lambda_max")},
-        **of_road,
+        **of_family,
     }
     if printed := scene.printed:
         row |= {"printed_objective": printed.value, "printed_digits": printed.digits}
@@ -158,11 +158,14 @@ def record(problem: ReferenceProblem, directory: Path) -> None:
     x = assembly.at_junction(known.x)
     sparse = before.get("sparse", {}) if before else {}
     if problem.form == "sparse":
-        row = (before or row) | {"sparse": sparse | {"unknowns": assembly.n, **of_road}}
+        row = (before or row) | {"sparse": sparse | {"unknowns": assembly.n, **of_family}}
     elif sparse:
         row["sparse"] = sparse
     if before and (problem.form == "sparse") != bool(sparse) and "from_condensed_mm" not in sparse:
-        with suppress(OSError, KeyError, ValueError), np.load(contacts) as other:  # of the other road
+        with (
+            suppress(OSError, KeyError, ValueError),
+            np.load(contacts) as other,
+        ):  # of the other family of forms
             row["sparse"]["from_condensed_mm"] = float(abs(other["x"] - x).max())
     _put(row, directory)
     arrays = {

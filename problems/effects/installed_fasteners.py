@@ -10,12 +10,12 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import ContactEffect, Effect, Pair, TieEffect
+from problems.model.effect import ContactEffect, Effect, Pair, SpringEffect
 from problems.model.joint import TOOL, Joint
 from problems.model.positions import Positions
 
 
-class InstalledFasteners(Positions, ContactEffect, TieEffect):
+class InstalledFasteners(Positions, ContactEffect, SpringEffect):
     """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = e_a − e_b.
 
     stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium

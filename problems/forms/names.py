@@ -14,10 +14,10 @@ FORMS: tuple[Form, ...] = get_args(Form)
 DENSE_FORMS: tuple[Form, ...] = ("primal", "dual")
 
 
-Road = Literal["condensed", "sparse"]
+FormFamily = Literal["condensed", "sparse"]
 
 
-def road_of(form: Form) -> Road:
+def form_family(form: Form) -> FormFamily:
     """How the matrices of a form are made: condensed onto the junction, or taken as they are."""
     return "condensed" if form in DENSE_FORMS else "sparse"
 

@@ -12,7 +12,7 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared
 from problems.model.effect import Effect
-from problems.model.scene import MadeScene, MatricesScene
+from problems.model.scene import ManufacturedScene, MatricesScene
 from problems.storage.cache import digest
 from problems.storage.fingerprint import fingerprint
 
@@ -25,12 +25,12 @@ CODE = ("problems/model", "problems/full_model", "problems/input", "problems/for
 class GivenModel:
     """As JointModel, of the scene's own K, A, f and g."""
 
-    scene: MatricesScene | MadeScene
+    scene: MatricesScene | ManufacturedScene
 
     @classmethod
-    def of(cls, scene: MatricesScene | MadeScene) -> GivenModel:
+    def of(cls, scene: MatricesScene | ManufacturedScene) -> GivenModel:
         """Raises InputError if contacts of a rung depend on one another; a user's are checked when read."""
-        if isinstance(scene, MadeScene):
+        if isinstance(scene, ManufacturedScene):
             from problems.input.dependent_contacts import refuse_dependent
 
             refuse_dependent(scene.made.assembly.A, scene.source_of("A"))
@@ -68,7 +68,7 @@ class GivenModel:
     def _given(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
         """The matrices and loads, the seconds that reading them took, and their key."""
         scene = self.scene
-        if isinstance(scene, MadeScene):
+        if isinstance(scene, ManufacturedScene):
             return scene.made.assembly, scene.made.load, 0.0, scene.assembly_key
         from problems.input.stored_matrices import stored_matrices  # only for own matrices
 

@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
-from problems.model.effect import Effect, ForceEffect, GapEffect, TieEffect
+from problems.model.effect import Effect, ForceEffect, GapEffect, SpringEffect
 from problems.model.part import PartLoadEffect, PartModel
 from problems.model.scene import JointScene
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
@@ -103,7 +103,7 @@ class JointModel:
     @cached_property
     def springs(self) -> tuple[sp.csc_array, Vector] | None:
         """Directions T (n, r), stiffnesses k (r,) N/mm of the springs between parts: K + T diag(k) Tᵀ."""
-        pairs = [effect.springs(self.scene.joint) for effect in self.scene.effects_of(TieEffect)]
+        pairs = [effect.springs(self.scene.joint) for effect in self.scene.effects_of(SpringEffect)]
         if not pairs:
             return None
         return sp.csc_array(sp.hstack([T for T, _ in pairs])), np.concatenate([k for _, k in pairs])

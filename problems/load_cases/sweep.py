@@ -15,7 +15,7 @@ from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
 from problems.input.validation import validation_faults
-from problems.model.effect import StiffnessEffect, TieEffect
+from problems.model.effect import SpringEffect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
@@ -103,7 +103,7 @@ def _step(scene: JointScene, text: str, faults: list[Fault]) -> Step | None:
     keys = {
         f"{effect_name(scene, i)}.{'.'.join(path)}": Step(name, i, path, numbers)
         for i, effect in enumerate(scene.effects)
-        if not isinstance(effect, StiffnessEffect | TieEffect)  # on which K depends
+        if not isinstance(effect, StiffnessEffect | SpringEffect)  # on which K depends
         for path in _numbers(effect.model_dump())
     }
     if name not in keys:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
 
-from problems.model.scene import MadeScene, Scene
+from problems.model.scene import ManufacturedScene, Scene
 
 #: The package of the ladders whose scenes' names begin so, and what their rungs are called there.
 PREFIXES = {
@@ -27,7 +27,7 @@ LADDERS = ("hard/", "hard-full/")  # whose limit follows their conditioning
 Ladder = Mapping[str, Callable[[], Scene]]
 
 #: A rung of matrices, from its title and its problem. It has no name of its own: the ladder names it.
-matrices = partial(MadeScene, "")
+matrices = partial(ManufacturedScene, "")
 
 
 @cache

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
-from problems.model.scene import MadeScene, PrintedOptimum
+from problems.model.scene import ManufacturedScene, PrintedOptimum
 from problems.stiffness.operator import Stiffness
 
 from .ladder import matrices
@@ -58,7 +58,7 @@ def membrane(
     make: Callable[[], ManufacturedProblem],
     m: int | None = None,
     printed: PrintedOptimum | None = None,
-) -> MadeScene:
+) -> ManufacturedScene:
     """A rung of `size` unknowns with m contacts, by default one at each unknown, made when needed."""
     return matrices(title, DeferredProblem((size,), m or size, make, sparse=True), printed=printed)
 
@@ -71,7 +71,7 @@ def unit_square(
     cells: int,
     edge: float = 1.0,
     printed: PrintedOptimum | None = None,
-) -> MadeScene:
+) -> ManufacturedScene:
     """A rung on the unit square: `load` per area, and ±u ≤ ±`bound` at the nodes of the inner lines."""
     size, h = cells - 1, 1 / cells
 

@@ -8,7 +8,7 @@ Its module is imported only when a scene names it.
     Positions         (positions.py) forces at points of the junction
     PartLoadEffect    (part.py) a load anywhere on one part, condensed onto its junction nodes
     GapEffect         to the initial gap; it may add the contact that it acts on
-    TieEffect         springs between the junction nodes of two parts, and their installation forces
+    SpringEffect         springs between the junction nodes of two parts, and their installation forces
 
 One that acts on a part is a PartEffect as well, one that acts on contacts a ContactEffect.
 """
@@ -146,7 +146,7 @@ class GapEffect(Effect):
         """(m,) gap in mm."""
 
 
-class TieEffect(ForceEffect):
+class SpringEffect(ForceEffect):
     """Adds springs between parts at junction nodes: K += T diag(k) Tᵀ, after condensation."""
 
     @abstractmethod

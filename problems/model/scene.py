@@ -127,7 +127,7 @@ class MatricesScene(Scene):
 
 
 @dataclass(frozen=True)
-class MadeScene(Scene):
+class ManufacturedScene(Scene):
     """Matrices constructed in memory: a rung of a ladder without plates."""
 
     problem: ManufacturedProblem | DeferredProblem

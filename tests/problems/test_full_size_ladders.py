@@ -15,7 +15,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.manufactured.exact import contacts, exact_assembly, spectrum, two_parts
 from problems.manufactured.ladder import ladders, make_rung, rung_names
-from problems.model.scene import MadeScene
+from problems.model.scene import ManufacturedScene
 from problems.scene import read_scene
 from solvers.base import Form
 from solvers.registry import make_solver
@@ -94,7 +94,7 @@ def test_nothing_is_made_before_it_is_needed_and_one_is_kept(monkeypatch: pytest
 
     for name in RUNGS:
         scene = make_rung(name)
-        if isinstance(scene, MadeScene):
+        if isinstance(scene, ManufacturedScene):
             assert isinstance(scene.problem, DeferredProblem)
             monkeypatch.setitem(vars(scene.problem), "make", lambda name=name: make(name))
     expand(read_suite("hard-full"))

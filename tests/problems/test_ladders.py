@@ -20,7 +20,7 @@ from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.forms.problem import in_form
 from problems.manufactured.exact import spectrum
 from problems.manufactured.ladder import make_rung, rung_names
-from problems.model.scene import MadeScene
+from problems.model.scene import ManufacturedScene
 from problems.scene import read_scene, scene_names
 from solvers.base import Answer, Form
 from solvers.registry import make_solver
@@ -28,7 +28,11 @@ from solvers.registry import make_solver
 RUNGS = rung_names("hard/")
 TAKEN = [name for name in RUNGS if not make_rung(name).refused]
 REFUSED = [name for name in RUNGS if make_rung(name).refused]
-EXACT = [name for name in TAKEN if isinstance(made := make_rung(name), MadeScene) and made.made.x is not None]
+EXACT = [
+    name
+    for name in TAKEN
+    if isinstance(made := make_rung(name), ManufacturedScene) and made.made.x is not None
+]
 IN_HOUSE: list[tuple[str, Form, float]] = [
     ("ipm", "dual", 1e-14),
     ("gi", "dual", 1e-10),

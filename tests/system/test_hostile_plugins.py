@@ -27,7 +27,7 @@ from harness.conformance.known_problems import known_problems
 from harness.measurement.describe import describe
 from harness.planning.suite import read_suite
 from harness.results import records
-from harness.solving.answers import LARGEST_DETAILS, Refused, checked
+from harness.solving.answers import LARGEST_DETAILS, InvalidAnswer, checked
 from problems.forms.assembly import LoadCase
 from problems.forms.problem import in_form
 from solvers.base import Answer, Problem, Solver
@@ -295,7 +295,7 @@ def smallest() -> Problem:
 @pytest.mark.parametrize("name", WRONG)
 def test_an_answer_that_is_none_is_refused_by_the_gate_and_named_by_check(name: str) -> None:
     change, said = WRONG[name]
-    with pytest.raises(Refused, match=re.escape(said)):
+    with pytest.raises(InvalidAnswer, match=re.escape(said)):
         checked(replace(Answer("solved", LAM), **change), smallest())
 
     class Spoilt(Solver):
@@ -311,7 +311,7 @@ def test_an_answer_that_is_none_is_refused_by_the_gate_and_named_by_check(name: 
 def test_an_array_whose_conversion_raises_is_refused() -> None:
     with pytest.raises(ValueError, match="no words"):  # the exception itself cannot be shown
         str(Odd())
-    with pytest.raises(Refused, match="lam is no array"):
+    with pytest.raises(InvalidAnswer, match="lam is no array"):
         checked(Answer("solved", Raising()), smallest())  # type: ignore[arg-type]
 
 

@@ -17,7 +17,7 @@ RECORD = "solution.json"  # of an answer
 
 
 @contextmanager
-def into_place(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
+def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     """A path beside `out` to write a file or a folder to; at the end of the block it moves to `out`.
 
     Files of the same names are replaced, and those that an older answer left (see `list_files`) removed;
