@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable
 from io import StringIO
@@ -95,7 +96,7 @@ def outcome(content: Callable[[Path], Any], directory: Path) -> tuple[Any, str]:
         return None, str(error)
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
+@pytest.mark.parametrize("kept", [0.0, 0.4, 0.99])  # half of two rows may be one row
 @pytest.mark.parametrize(("name", "content"), FILES, ids=[name for name, _ in FILES])
 def test_a_file_that_was_cut_off_is_refused_by_name(
     name: str, content: Callable[[Path], Any], kept: float, made: Path
@@ -147,4 +148,4 @@ def test_fewer_cases_than_before_are_reported_as_that_many(made: Path) -> None:
     facts = series_file.read_facts(out) or {}
     series_file.write_fact(out, "series", json.dumps(facts | {"cases": 4}))
     assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
-    assert "4 of 4 cases solved" in (out / "report" / "report.md").read_text()
+    assert re.search(r"solved +\| 4 of 4 cases", (out / "report" / "report.md").read_text())
