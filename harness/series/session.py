@@ -30,7 +30,7 @@ from problems.model.scene import Scene
 from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver
 
-ENOUGH = 1e-2  # of the limit: a nearby answer proven to within it needs no further refinement
+ENOUGH = 0.5  # of the limit: an answer proven to within it needs no further refinement
 BLOCK = 64  # cases that share a pass over K and Q
 BLOCK_BYTES = 2**26  # of their f or x: some fifteen times as much is in use
 BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases are lost
