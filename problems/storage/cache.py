@@ -106,7 +106,7 @@ def load(key: str) -> Entry | None:
             arrays[path.stem] = np.load(path, mmap_mode="r")
     except InputError:
         raise
-    except (OSError, ValueError, RecursionError) as error:
+    except Exception as error:  # json, pydantic and numpy's reader of headers raise kinds of their own
         raise InputError.one(path, "content", str(error), _repair(folder)) from error
     return arrays, manifest.facts
 

@@ -64,6 +64,15 @@ def test_a_truncated_array_is_named_with_its_sizes(root: Path, kept: int) -> Non
         assert said in str(error.value)
 
 
+def test_a_damaged_header_of_an_array_is_named(root: Path) -> None:
+    """Its dictionary never ends: numpy's reader then raises a kind of error of its own."""
+    cache.store("key", ARRAYS, {})
+    path = root / "key" / "one.npy"
+    path.write_bytes(path.read_bytes().replace(b"}", b"(", 1))
+    with pytest.raises(InputError, match=r"one\.npy.*the cache is damaged"):
+        cache.load("key")
+
+
 def test_a_missing_array_is_named(root: Path) -> None:
     cache.store("key", ARRAYS, {})
     (root / "key" / "two.npy").unlink()
