@@ -15,7 +15,7 @@ from problems.errors import InputError
 from problems.forms.names import DENSE_FORMS, Form, default_form
 from problems.model.scene import JointScene, Scene
 
-from .memory import refuse_what_cannot_fit, size_of
+from .memory import Size, refuse_what_cannot_fit, size_of
 
 SMALL_MIB = 100.0  # of dense matrices
 MANY = 100  # load cases
@@ -36,14 +36,14 @@ def chosen_form(scene: Scene, taken: Sequence[Form], asked: Form | None, cases: 
     """
     if asked is not None and asked not in taken:
         raise InputError.one("--form", "form", asked, f"the solver takes {' and '.join(taken)}")
-    choice = _by_rule(scene, taken, cases) if asked is None else Choice(asked)
-    refuse_what_cannot_fit(scene, choice.form)
+    size = size_of(scene)
+    choice = _by_rule(scene, size, taken, cases) if asked is None else Choice(asked)
+    refuse_what_cannot_fit(scene, size, choice.form)
     return choice
 
 
-def _by_rule(scene: Scene, taken: Sequence[Form], cases: int) -> Choice:
+def _by_rule(scene: Scene, size: Size | None, taken: Sequence[Form], cases: int) -> Choice:
     dense = [form for form in taken if form in DENSE_FORMS]
-    size = size_of(scene)
     if not dense or "sparse" not in taken or size is None:
         return Choice(default_form(dense or taken))
     fits = size.dense_peak_mib <= physical_memory_mib()

@@ -98,9 +98,9 @@ def _of_joint(scene: JointScene) -> Size:
     return Size(n, m, *dense, 8 * entries / MIB, peak, unknowns, max(width for _, width in bands))
 
 
-def refuse_what_cannot_fit(scene: Scene, form: Form) -> None:
+def refuse_what_cannot_fit(scene: Scene, size: Size | None, form: Form) -> None:
     """Raise InputError where a form's matrices of a scene need more memory than this machine has."""
-    size, physical = size_of(scene), physical_memory_mib()
+    physical = physical_memory_mib()
     if size is None or size.peak_mib(form) <= physical:
         return
     allowed = f"a {form} form needs about {size.peak_mib(form):.0f} MiB, this machine has {physical}"

@@ -61,7 +61,7 @@ def reference(
         return best_of_candidates(prepared, load, limit_s, given)
     key = cache.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
     stored = cache.load(key)
-    if stored is not None and {"bound_mm", "route"} <= stored[1].keys():
+    if stored is not None:
         arrays, facts = stored
         x, lam = (np.array(arrays[name]) for name in ("x", "lam"))
         return Reference(x, lam, lam > 0, facts["bound_mm"], facts["route"])

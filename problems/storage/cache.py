@@ -34,6 +34,17 @@ class Manifest(BaseModel):
     facts: dict[str, Any]
 
 
+class Facts(dict[str, Any]):
+    """The facts of a stored entry; asking for one that it lacks raises InputError."""
+
+    def __init__(self, path: Path, facts: dict[str, Any]) -> None:
+        super().__init__(facts)
+        self.path = path
+
+    def __missing__(self, name: str) -> Any:
+        raise InputError.one(self.path, f"facts.{name}", None, _repair(self.path.parent))
+
+
 #: Arrays by name, and facts that JSON can hold.
 Entry = tuple[Mapping[str, NDArray[Any]], dict[str, Any]]
 
@@ -108,7 +119,7 @@ def load(key: str) -> Entry | None:
         raise
     except Exception as error:  # json, pydantic and numpy's reader of headers raise kinds of their own
         raise InputError.one(path, "content", str(error), _repair(folder)) from error
-    return arrays, manifest.facts
+    return arrays, Facts(folder / MANIFEST, manifest.facts)
 
 
 def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:

@@ -114,7 +114,8 @@ class Sweeps:
         """Iterations are products with Q, inner iterations contact sets tried with M. y is computed anew if
         the rounding that it brought along decides, or a force was below zero.
 
-        "solved" if max(max(−y), max_{λ>0} |y|) is at most max(tolerance, `kkt.largest_rounding`) mm.
+        "solved" if max(max(−y), max_{λ>0} |y|), and that rounding where y is not, is at most max(tolerance,
+        `kkt.largest_rounding`) mm.
         """
         order = self.order
         lam, y = np.empty(len(order)), np.empty(len(order))

@@ -57,13 +57,13 @@ def test_each_form_is_refused_by_what_it_needs(form: Form, monkeypatch: pytest.M
     scene = read_scene("scaling/100352")
     machine_of(24_000, monkeypatch)
     if form == "sparse":
-        refuse_what_cannot_fit(scene, form)
+        refuse_what_cannot_fit(scene, size_of(scene), form)
     else:
         with pytest.raises(InputError, match=r"the sparse form \(--form sparse\) needs 4\d{3}"):
-            refuse_what_cannot_fit(scene, form)
+            refuse_what_cannot_fit(scene, size_of(scene), form)
     machine_of(2_000, monkeypatch)
     with pytest.raises(InputError, match=r"fewer nodes: a \w+ form needs .* this machine has 2000"):
-        refuse_what_cannot_fit(scene, form)
+        refuse_what_cannot_fit(scene, size_of(scene), form)
 
 
 def test_a_wide_band_is_not_stored(monkeypatch: pytest.MonkeyPatch) -> None:

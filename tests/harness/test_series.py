@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import time
+from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,11 @@ from strip import write_strip
 from harness.measurement.run import run
 from harness.planning.suite import read_suite
 from harness.results import records
+from harness.results.records import Row
 from harness.verification.gate import gate
 from problems.build import prepared
 from problems.errors import InputError
+from problems.forms.assembly import Vector
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 from report.sections.series import compared
@@ -126,18 +129,21 @@ def read(run: Path) -> list[dict[str, Any]]:
     return records.read(run / records.MEASUREMENTS)
 
 
+def right(rows: list[Row]) -> Iterator[tuple[Row, Vector, Vector]]:
+    """Each row with the x and λ of its case, by another code."""
+    scene = read_scene("strip.toml")
+    data, cases = prepared(scene), random_gaps(scene, 4, 9)
+    for row in rows:
+        yield row, *solve_by_nnls(data, cases.load(row["case"]))
+
+
 def test_each_case_has_a_row_and_an_answer_of_its_own(two: Path) -> None:
     rows = read(two)
     assert [(row["solver"], row["case"]) for row in rows] == [
         (solver, k) for solver in ("newton", "piqp") for k in range(4)
     ]
     assert {(row["status"], row["verdict"]) for row in rows} == {("solved", "within")}
-    scene = read_scene("strip.toml")
-    data = prepared(scene)
-    cases = random_gaps(scene, 4, 9)
-    for row in rows:
-        case = cases.load(row["case"])
-        x, lam = solve_by_nnls(data, case)
+    for row, x, lam in right(rows):
         with np.load(Path("two") / row["answer"]) as saved:
             np.testing.assert_allclose(saved["x"], x, atol=1e-8)
         assert row["active"] == (lam > 0).sum()
@@ -199,12 +205,7 @@ def test_cases_solved_together_share_the_seconds(together: Path) -> None:
         assert len({row[name] for row in batched[:3]}) == 1
         assert len({row[name] for row in batched}) == 2
     assert len({row["prepare_s"] for row in batched}) == 1
-    scene = read_scene("strip.toml")
-    data = prepared(scene)
-    cases = random_gaps(scene, 4, 9)
-    for row in batched:
-        case = cases.load(row["case"])
-        x, lam = solve_by_nnls(data, case)
+    for row, x, lam in right(batched):
         with np.load(together / row["answer"]) as saved:
             np.testing.assert_allclose(saved["x"], x, atol=1e-8)
             np.testing.assert_allclose(saved["lam"], lam, atol=1e-4)

@@ -73,6 +73,14 @@ def test_a_damaged_header_of_an_array_is_named(root: Path) -> None:
         cache.load("key")
 
 
+def test_a_fact_that_is_not_there_is_named(root: Path) -> None:
+    cache.store("key", ARRAYS, {"seconds": 1.0})
+    _, facts = cache.load("key") or ({}, {})
+    assert facts["seconds"] == 1.0
+    with pytest.raises(InputError, match=r"manifest\.json: facts\.bound_mm.*the cache is damaged"):
+        _ = facts["bound_mm"]
+
+
 def test_a_missing_array_is_named(root: Path) -> None:
     cache.store("key", ARRAYS, {})
     (root / "key" / "two.npy").unlink()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 from exact_answer import is_exact
-from long import ASKED
+from long import tried
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
@@ -51,15 +51,7 @@ def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_o
     np.testing.assert_array_equal(K, (H * d) @ H)  # 64 = the stiffness of the grid's smallest eigenvalue
 
 
-TRIED = [
-    (name, *line)
-    for i, name in enumerate(SMALL)
-    for j, line in enumerate(IN_HOUSE)
-    if ASKED or line[0] == "newton" or (i + j) % 3 == 0
-]
-
-
-@pytest.mark.parametrize(("name", "solver", "form", "tolerance"), TRIED, ids=str)
+@pytest.mark.parametrize(("name", "solver", "form", "tolerance"), tried(SMALL, IN_HOUSE), ids=str)
 def test_in_house_solvers_are_right(name: str, solver: str, form: Form, tolerance: float) -> None:
     made = SMALL[name]
     data = Prepared(made.assembly)

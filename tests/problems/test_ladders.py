@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from exact_answer import is_exact
-from long import ASKED
+from long import tried
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
@@ -130,16 +130,7 @@ def judged(name: str, solver: str, form: Form, tolerance: float) -> tuple[Answer
     return answer, judge(data, case, base.reference, x, answer.lam, base.limit_mm(1e-7)).verdict
 
 
-#: newton on every rung, the others on every third; all with RIVETBENCH_LONG.
-TRIED = [
-    (name, *line)
-    for i, name in enumerate(TAKEN)
-    for j, line in enumerate(IN_HOUSE)
-    if ASKED or line[0] == "newton" or (i + j) % 3 == 0
-]
-
-
-@pytest.mark.parametrize(("name", "solver", "form", "tolerance"), TRIED, ids=str)
+@pytest.mark.parametrize(("name", "solver", "form", "tolerance"), tried(TAKEN, IN_HOUSE), ids=str)
 def test_in_house_solvers_hold(name: str, solver: str, form: Form, tolerance: float) -> None:
     """Up to cond(K) = 1e12 within what conditioning allows; beyond it, or else a status that says so."""
     answer, verdict = judged(name, solver, form, tolerance)

@@ -58,17 +58,20 @@ def invoke(*words: object) -> Result:
 
 
 @pytest.mark.parametrize("own", [True, False])
-def test_a_refused_import_leaves_what_is_there(own: bool, tmp_path: Path) -> None:
+def test_a_refused_import_leaves_what_is_there(
+    own: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The input itself, and another file."""
-    bad = tmp_path / "bad.npz"
+    monkeypatch.chdir(tmp_path)  # a long path would be cut in the message
+    bad = Path("bad.npz")
     np.savez(bad, **own_matrices(K=-np.eye(12)))
-    out = bad if own else tmp_path / "mine.npz"
+    out = bad if own else Path("mine.npz")
     if not own:
         out.write_bytes(b"precious")
     before = out.read_bytes()
     refused = invoke("import", bad, "--out", out)
     assert refused.exit_code == 2
-    assert str(bad)[:60] in refused.output  # a long path is cut
+    assert str(bad) in refused.output
     assert out.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
 
