@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
+from problems.stiffness.band_solve import band_cholesky
+
 from .assembly import Matrix, Vector
 
 Contacts = NDArray[np.intp]
@@ -78,7 +80,7 @@ class BandFactor:
     @classmethod
     def of(cls, S: NDArray[np.bool_], rows: NDArray[np.intp], band: Matrix) -> BandFactor:
         """band : of M_SS, column-major; overwritten. Raises LinAlgError if it is not positive definite."""
-        L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1) if rows.size else (band, 0)
+        L, info = band_cholesky(band) if rows.size else (band, 0)
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} of M_SS is not positive definite")
         return cls(S, rows, L)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import blas, lapack
+from scipy.linalg import blas
 
-from .band_solve import band_solve
+from .band_solve import band_cholesky, band_solve
 from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector, scaled
 from .rounding import U, gamma
 from .selected_inverse import BlockPart, Rows, band_blocks
@@ -31,8 +31,8 @@ class BandedBlock(SparseBlock):
         """(b + 1, N), column-major: L[j + d, j] in row d. Raises NotPositiveDefinite."""
         band = lower_band(self._ordered(self.matrix))
         smallest = self.lost * band[0]
-        L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
-        lost = [int(info) - 1] if info else np.flatnonzero(L[0] ** 2 <= smallest)
+        L, info = band_cholesky(band)
+        lost = [info - 1] if info else np.flatnonzero(L[0] ** 2 <= smallest)
         if len(lost):
             raise NotPositiveDefinite(int(lost[0] if self.order is None else self.order[lost[0]]))
         return L
@@ -63,7 +63,7 @@ class BandedBlock(SparseBlock):
         band = lower_band(self._ordered(scaled(self.matrix, D, D)))
         band[0] -= s
         largest = float(abs(band[0]).max())
-        L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
+        L, info = band_cholesky(band)
         return None if info else gamma(2 * (len(L) + 1)) * _norm(L) + U * (largest + abs(s))
 
     def compliance(self, A: sp.csc_array) -> Matrix:

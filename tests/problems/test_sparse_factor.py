@@ -2,10 +2,12 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+import threadpoolctl
 from long import seeds
 from sparse_matrices import band_matrix, chain, graph_matrix, renumbered
 
@@ -14,6 +16,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Matrix
 from problems.forms.names import FORMS
 from problems.scene import read_scene
+from problems.stiffness import band_solve
 from problems.stiffness.banded import BandedBlock, half_bandwidth, lower_band
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.general import GeneralBlock
@@ -29,6 +32,23 @@ def scattered(random: np.random.Generator, n: int, half: int) -> tuple[sp.csc_ar
     """A band matrix in a random order, and where its unknowns lie along the model."""
     order = random.permutation(n)
     return renumbered(band_matrix(random, n, half), order), np.column_stack([order / 1.0, order % 2])
+
+
+def test_a_band_is_factored_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limit holds for the factorisation alone."""
+    seen, dpbtrf = [], band_solve.lapack.dpbtrf
+
+    def counted() -> set[int]:
+        return {pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"}
+
+    def factor(band: Matrix, **how: int) -> tuple[Matrix, int]:
+        seen.append(counted())
+        return dpbtrf(band, **how)
+
+    monkeypatch.setattr(band_solve, "lapack", SimpleNamespace(dpbtrf=factor))
+    before = counted()
+    L, info = band_solve.band_cholesky(np.array([[4.0, 5.0], [2.0, 0.0]], order="F"))
+    assert (L.tolist(), info, seen, counted()) == ([[2.0, 2.0], [1.0, 0.0]], 0, [{1}], before)
 
 
 @pytest.mark.parametrize("seed", seeds(3, 12))
