@@ -1,4 +1,5 @@
-"""The solvers by name. A new one is one file: in `methods` if the method is our own, else in `libraries`.
+"""The solvers by name. A new one is one file: in `methods` if the method is our own, in `textbook` if it is a
+standard method in a few lines of SciPy, else in `libraries`.
 
 It defines one subclass of Solver; its file name, with - for _, is the solver's name. Further solvers found by
 qpsolvers have their name there, and a plug-in (plugin.py) has the name of its file.
@@ -14,7 +15,7 @@ from collections.abc import Callable
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from problems import __version__
 from problems.errors import InputError
@@ -24,29 +25,36 @@ from .base import Solver
 from .plugin import load_plugin, own_files, solver_class
 from .settings import require
 
-METHODS, LIBRARIES = "solvers.methods", "solvers.libraries"
+#: Who stands behind a solver.
+Group = Literal["ours", "textbook", "library"]
+PACKAGES: dict[Group, str] = {
+    "ours": "solvers.methods",
+    "textbook": "solvers.textbook",
+    "library": "solvers.libraries",
+}
 #: The one module for many solvers: all others that qpsolvers finds.
 QPSOLVERS = "qpsolvers"
 
 
 @cache
 def modules() -> dict[str, str]:
-    """Solver → module, not yet imported: the methods of this project, then the libraries."""
+    """Solver → module, not yet imported: the methods of this project, the textbook's, then the libraries."""
     found: dict[str, str] = {}
-    for package in (METHODS, LIBRARIES):
+    for package in PACKAGES.values():
         path = importlib.import_module(package).__path__
         names = sorted(module.name for module in pkgutil.iter_modules(path) if module.name != QPSOLVERS)
         found |= {name.replace("_", "-"): f"{package}.{name}" for name in names}
     return found
 
 
-def in_house(name: str) -> bool:
-    """Whether the method is written in this project."""
-    return modules().get(name, "").startswith(METHODS)
+def group_of(name: str) -> Group:
+    """The group of a solver; a plug-in, and what only qpsolvers finds, stands among the libraries."""
+    module = modules().get(name, "")
+    return next((group for group, package in PACKAGES.items() if module.startswith(package)), "library")
 
 
 def solver_names() -> list[str]:
-    """In-house solvers, libraries, then the others that qpsolvers finds."""
+    """Our solvers, the textbook's, libraries, then the others that qpsolvers finds."""
     return [*modules(), *_found_by_qpsolvers()]
 
 
@@ -77,10 +85,10 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
     if plugin is not None and name == plugin.stem:
         contents = sorted(hashlib.sha256(file.read_bytes()).digest() for file in own_files(plugin))
         return "sha256:" + hashlib.sha256(b"".join(contents)).hexdigest()[:12]
-    if in_house(name):
-        return __version__
     if name in modules():
         distribution = _class_of(name).distribution
+        if distribution is None and group_of(name) != "library":
+            return __version__
     else:
         from .libraries.qpsolvers import DISTRIBUTIONS
 

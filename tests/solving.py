@@ -7,7 +7,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer, Form
-from solvers.registry import in_house, make_solver, modules, solver_names
+from solvers.registry import group_of, make_solver, modules, solver_names
 
 #: Those of the project and of its extra `extra-solvers`: what else is installed decides about no test.
 TESTED = [
@@ -16,13 +16,20 @@ TESTED = [
 CASES: list[tuple[str, Form]] = [(name, form) for name in TESTED for form in make_solver(name, {}).forms]
 #: Its steps grow with cond(Q): it may give up, but must not be wrong.
 SLOW = ("projected-gauss-seidel",)
-IN_HOUSE = [(name, form) for name, form in CASES if in_house(name) and name not in SLOW]
+IN_HOUSE = [(name, form) for name, form in CASES if group_of(name) == "ours"]
+
+#: The textbook methods written here.
+WRITTEN_HERE = (*SLOW, "textbook-active-set")
 
 #: The tolerance handed over; 1e-9 to the others.
-TOLERANCES = {name: 1e-14 if name == "ipm" else 1e-10 for name in modules() if in_house(name)}
+TOLERANCES = {
+    name: 1e-14 if name == "ipm" else 1e-10
+    for name in modules()
+    if group_of(name) == "ours" or name in WRITTEN_HERE
+}
 
 #: These end with the right contact set and solve its equations: no tolerance is left in their answer.
-ACTIVE_SET = ("gi", "newton", "ipm-fast", "quadprog", "daqp", "nnls")
+ACTIVE_SET = ("gi", "newton", "ipm-fast", "quadprog", "daqp", "nnls", "textbook-active-set")
 
 
 def solve(name: str, form: Form, prepared: Prepared, case: LoadCase) -> tuple[Answer, Vector | None]:

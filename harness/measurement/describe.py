@@ -27,12 +27,14 @@ IMPORT_MIB = 8192
 
 @dataclass(frozen=True)
 class Description:
-    """The forms that a solver takes, the version of its library, and a hash of this project's code for it."""
+    """What rows say of a solver: its forms, the version of its library, a hash of this project's code for it,
+    and its group (`solvers.registry.group_of`).
+    """
 
     forms: list[Form]
     version: str
     code: str
-    in_house: bool = False
+    group: str = "library"
 
     @property
     def default_form(self) -> Form:
@@ -79,7 +81,7 @@ def refuse_unimportable(end: Row, process: Monitored, where: str | Path, name: s
 
 def describe_here(job: tuple[list[tuple[str, dict[str, Any]]], Path | None], events: Events) -> Row:
     """The descriptions; in the process of its own. Raises InputError, all faults at once."""
-    from solvers.registry import in_house, make_solver, solver_version
+    from solvers.registry import group_of, make_solver, solver_version
 
     solvers, plugin = job
     found: list[Description] = []
@@ -94,7 +96,7 @@ def describe_here(job: tuple[list[tuple[str, dict[str, Any]]], Path | None], eve
                     f"solver {name}", "forms", shown(forms), f"a tuple of {', '.join(FORMS)}"
                 )
             version, code = solver_version(name, plugin), code_of(solver)
-            found.append(Description(list(forms), version, code, in_house(name)))
+            found.append(Description(list(forms), version, code, group_of(name)))
         except InputError as error:
             faults += error.faults
     if faults:

@@ -85,7 +85,7 @@ def rows_of(
     shared = {
         **origin,
         "scene_key": problem.scene.key,
-        "in_house": task.solver.in_house,
+        "group": task.solver.group,
         "solver_version": task.solver.version,
         "solver_code": task.solver.code,
         "rivetbench_version": installed_version("rivetbench"),

@@ -51,9 +51,13 @@ def _fields(kind: Kind, names: str) -> dict[str, Kind]:
     return dict.fromkeys(names.split(), kind)
 
 
-#: What was requested. searched : the tolerance is one of those tried for the loosest that suffices.
+#: Who stands behind a solver, in the order of every table.
+GROUPS = ("ours", "textbook", "library")
+
+#: What was requested. group : of GROUPS; older rows have `in_house` instead.
+#: searched : the tolerance is one of those tried for the loosest that suffices.
 ASKED: dict[str, Kind] = {
-    **_fields("text", "key suite scene source solver form variant"),
+    **_fields("text", "key suite scene source solver group form variant"),
     **_fields("number", "tolerance threads_asked repeat case time_limit_s memory_limit_mib"),
     **_fields("number", "limit_mm limit_asked_mm"),
     **_fields("object", "options series"),

@@ -88,19 +88,20 @@ def fastest_first(
     known = cells[good & (cells[seconds] > 0)]
     known = known[known.groupby(name)["scene"].transform("nunique") == cells["scene"].nunique()]
     means = np.exp(np.log(known[seconds]).groupby(known[name]).mean()).rename("seconds")
-    lines = known.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "in_house"]]
+    lines = known.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "group"]]
     return lines.assign(seconds=means).sort_values("seconds", ignore_index=True)
 
 
 def recommended(
     cells: pd.DataFrame, accuracy_mm: float | None = None, seconds: str = "load_case_s"
 ) -> dict[str, Any]:
-    """The advice for the scenes of one size: `use` and its `seconds`; `next`, the fastest other method, and
-    `library`, the fastest library, each with how many times as long it takes.
+    """The advice for the scenes of one size: `use` and its `seconds`; `next`, the fastest other method,
+    `textbook`, the fastest textbook method, and `library`, the fastest library, each with how
+    many times as long it takes.
     """
     line = {"n": cells["n"].iloc[0], "scenes": cells["scene"].nunique(), "accuracy_mm": accuracy_mm}
-    line |= {"use": "none on every scene", "seconds": None, "next": "", "library": ""}
-    line |= {"to_next": None, "to_library": None}
+    line |= {"use": "none on every scene", "seconds": None, "next": "", "textbook": "", "library": ""}
+    line |= {"to_next": None, "to_textbook": None, "to_library": None}
     if accuracy_mm is not None and not judged(cells, accuracy_mm):
         return line | {"use": "cannot be judged: the reference is not accurate enough"}
     lines = fastest_first(cells, "label", seconds, accuracy_mm)
@@ -109,7 +110,8 @@ def recommended(
     best = lines.iloc[0]
     others = (lines[["solver", "form"]] != best[["solver", "form"]]).any(axis=1)
     line |= {"use": best["label"], "seconds": best["seconds"]}
-    for name, among in (("next", others), ("library", ~lines["in_house"])):
+    groups = {name: lines["group"] == name for name in ("textbook", "library")}
+    for name, among in {"next": others, **groups}.items():
         if among.any():
             other = lines[among].iloc[0]
             line |= {name: other["label"], f"to_{name}": other["seconds"] / best["seconds"]}

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 BLUE, VERMILLION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 SKY, ORANGE, BLACK, GREY = "#56B4E9", "#E69F00", "#000000", "#7F7F7F"
 ROSE, INDIGO, BROWN, PINK, CYAN = "#AA4466", "#332288", "#661100", "#FA9FB5", "#33BBEE"
-OLIVE = "#999933"
+OLIVE, MUSTARD = "#999933", "#B2B259"
 
 WIDTH = 9.0  # inches; at 100 pixels per inch the width of a page of text on a screen
 DPI = 160
@@ -45,6 +45,7 @@ KNOWN = {
     "projected-newton": (BROWN, "d"),
     "lemke": (PINK, "H"),
     "projected-gauss-seidel": (CYAN, "8"),
+    "textbook-active-set": (MUSTARD, "<"),
     "piqp": (GREEN, "D"),
     "proxqp": (PURPLE, "P"),
     "clarabel": (ORANGE, "X"),

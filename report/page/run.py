@@ -30,13 +30,25 @@ from .maps import scene_maps
 from .packed import Data, column
 
 TEXTS = (
-    *("scene", "method", "label", "solver", "form", "variant", "status", "verdict", "machine", "message"),
+    *(
+        "scene",
+        "method",
+        "label",
+        "solver",
+        "group",
+        "form",
+        "variant",
+        "status",
+        "verdict",
+        "machine",
+        "message",
+    ),
     *("solver_version", "solver_code", "commit", "recorded_at", "key"),
 )
 NUMBERS = (
     *("n", "m", "active", "tolerance", "threads", "repeats", "iterations", "inner_iterations"),
     *("load_case_s", "least_s", "most_s", "once_s", "scene_s", "peak_rss_mib", "time_limit_s"),
-    *("displacement_error_mm", "bound_mm", "least_mm", "backward_error", "contact_mismatch", "in_house"),
+    *("displacement_error_mm", "bound_mm", "least_mm", "backward_error", "contact_mismatch"),
 )
 LIMIT_MM = 1e-7  # of rows that do not say
 
@@ -71,7 +83,7 @@ def _cells(results: Results) -> pd.DataFrame:
     else:
         cells = cells.assign(scene_s=float("nan"))
     eased = cells["scene"].str.startswith(LADDERS) & (cells["limit_mm"] > cells["limit_asked_mm"])
-    cells = cells.assign(least_mm=cells["limit_mm"].where(eased), in_house=cells["in_house"].astype(float))
+    cells = cells.assign(least_mm=cells["limit_mm"].where(eased))
     return cells if "options" in cells else cells.assign(options=None)
 
 

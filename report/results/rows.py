@@ -18,9 +18,9 @@ CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
     """The rows with every field of the schema as a column of one type, the last of equal measurements.
 
-    Flags are 1.0, 0.0 or missing, except `in_house`, which is a bool. Adds `working_mib`, what the solver
-    needs on top of the data. The size and the limits of a row that lacks them are those of its scene,
-    of `problems` and of the suite.
+    Flags are 1.0, 0.0 or missing. A row without a `group` has that of its flag `in_house`. Adds
+    `working_mib`, what the solver needs on top of the data. The size and the limits of a row that lacks them
+    are those of its scene, of `problems` and of the suite.
     """
     rows = pd.DataFrame(records)
     for name in [*NUMBERS, *FLAGS]:
@@ -29,7 +29,8 @@ def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str
     for name in TEXTS:
         column = rows[name] if name in rows else pd.Series(None, index=rows.index, dtype=object)
         rows[name] = column.map(_text)
-    rows["in_house"] = rows["in_house"] == 1.0
+    of_flag = np.where(rows["in_house"] == 1.0, "ours", "library")
+    rows["group"] = rows["group"].where(rows["group"] != "", of_flag)
     if "scene" in problems:
         known = problems.drop_duplicates("scene", keep="last").set_index("scene")
         for name in {"n", "m", "active"} & set(known):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from harness.results.schema import LADDERS
+from harness.results.schema import GROUPS, LADDERS
 from report.analysis.outcomes import (
     CORRECT,
     CORRECT_UNCLAIMED,
@@ -60,13 +60,11 @@ def claims(cells: pd.DataFrame) -> str:
     """How often a wrong answer is reported as solved."""
     wrong = cells["outcome"] == WRONG_CLAIMED
     counts = [
-        f"{wrong[ours].sum()} of {counted(len(wrong[ours]), 'row')} of the {whose}"
-        for whose, ours in (
-            ("in-house solvers", cells["in_house"]),
-            ("libraries", ~cells["in_house"]),
-        )
+        f"{wrong[mine].sum()} of {counted(len(wrong[mine]), 'row')} of {whose}"
+        for group, whose in zip(GROUPS, ("our solvers", "textbook methods", "libraries"), strict=True)
+        if (mine := cells["group"] == group).any()
     ]
-    return f"Wrong answers reported as solved: {' and '.join(counts)}."
+    return f"Wrong answers reported as solved: {', '.join(counts)}."
 
 
 def honesty(cells: pd.DataFrame, order: list[str]) -> Table:

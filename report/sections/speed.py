@@ -30,6 +30,8 @@ FEWEST = 3  # sizes of a fit, and scenes of a size for a line against their cont
 FEWEST_PROFILED = 5  # load cases
 PLANNED = 0.75  # share of the scenes in the plan of a method, for it to be in a profile
 FACTORS = {1.0: "fastest", 2.0: "τ ≤ 2", 10.0: "τ ≤ 10"}
+#: Whom a method is compared with, and their names in headings.
+OPPONENTS = {"library": "library", "textbook": "textbook method"}
 MADE = ("model_s", "K_s", "factors_s", "Q_s")  # before the solver's own preparation
 FROM_SCENE: Looks = {
     "model_s": ("finite-element model", "#C9C9C9", None),
@@ -82,6 +84,7 @@ def load_cases(results: Results) -> pd.DataFrame:
     total_s : the same with the solver's own preparation, paid once per assembly
     to_cholesky : load_case_s over one Cholesky factorisation of Q in the same process
     to_library, total_to_library : over the fastest library on the same scene, in any form, by its median
+    to_textbook, total_to_textbook : the same over the fastest textbook method
     """
     rows = results.rows
     keys = ["scene", "solver", "form", "variant", "tolerance", "threads"]
@@ -90,11 +93,13 @@ def load_cases(results: Results) -> pd.DataFrame:
     cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
     cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
     cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
-    libraries = cases[~cases["in_house"]].groupby(["scene", "threads", "method", "tolerance"])
-    library = libraries[["load_case_s", "total_s"]].median().groupby(["scene", "threads"]).min()
-    cases = cases.join(library.add_prefix("library_"), on=["scene", "threads"])
-    cases["to_library"] = cases["load_case_s"] / cases["library_load_case_s"]
-    cases["total_to_library"] = cases["total_s"] / cases["library_total_s"]
+    for group in OPPONENTS:
+        lines = cases[cases["group"] == group].groupby(["scene", "threads", "method", "tolerance"])
+        fastest = lines[["load_case_s", "total_s"]].median().groupby(["scene", "threads"]).min()
+        fastest.columns = pd.Index(["fastest", "fastest_total"])
+        cases = cases.join(fastest, on=["scene", "threads"])
+        cases[f"to_{group}"] = cases["load_case_s"] / cases.pop("fastest")
+        cases[f"total_to_{group}"] = cases["total_s"] / cases.pop("fastest_total")
     return cases
 
 
@@ -106,7 +111,7 @@ def relative(results: Results) -> Section | None:
 
     def line(mine: pd.DataFrame) -> dict[str, Any]:
         found: dict[str, Any] = {"scenes": mine["scene"].nunique(), "runs": len(mine)}
-        for name in ("to_library", "total_to_library", "to_cholesky"):
+        for name in [*(f"{of}{group}" for group in OPPONENTS for of in ("to_", "total_to_")), "to_cholesky"]:
             found |= _spread(mine[name], name) | {name: mine.groupby("scene")[name].median().median()}
         return found
 
@@ -118,14 +123,17 @@ def relative(results: Results) -> Section | None:
         number("n", "n", whole),
         number("threads", "threads", whole),
         word("solver (form)", "method"),
-        Column("per load case / fastest library", spread("to_library")),
-        Column("with preparation / fastest library", spread("total_to_library")),
+        *(
+            Column(f"{what} / fastest {name}", spread(of + group))
+            for group, name in OPPONENTS.items()
+            for what, of in (("per load case", "to_"), ("with preparation", "total_to_"))
+        ),
         Column("per load case / one Cholesky of Q", spread("to_cholesky")),
     ]
     caption = (
-        "*Relative times within the limit*: over those of the fastest library on the same scene in any of "
-        "its forms, and over one Cholesky factorisation of Q in the same process. The median over the "
-        "scenes (range of all runs); 0.1 is ten times as fast."
+        "*Relative times within the limit*: over those of the fastest library and of the fastest textbook "
+        "method on the same scene in any form, and over one Cholesky factorisation of Q in the same process. "
+        "The median over the scenes (range of all runs); 0.1 is ten times as fast."
     )
     return Section("Relative speed", [Table("speed-ratios", caption, table, columns, keys=3)])
 

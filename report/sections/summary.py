@@ -45,6 +45,7 @@ def advice(results: Results) -> Section | None:
         word("use", "use"),
         number("s", "seconds"),
         Column("next (times as long)", lambda line: _other(line, "next"), "left"),
+        Column("fastest textbook method", lambda line: _other(line, "textbook"), "left"),
         Column("fastest library", lambda line: _other(line, "library"), "left"),
     ]
     caption = (

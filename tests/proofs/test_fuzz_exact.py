@@ -16,7 +16,7 @@ from exact_draws import LOADS, ExactLoad, ExactProblem, exact_problem
 from fuzz_log import Log, contained, max_error
 from long import draws
 from promises import promised, promises
-from solving import SLOW, TOLERANCES
+from solving import TOLERANCES
 
 from harness import InputError, own_matrices, solve_dual
 from harness.solving.session import SolverSession
@@ -29,17 +29,14 @@ from problems.forms.assembly import Vector
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from solvers.registry import in_house, make_solver, modules
+from solvers.registry import group_of, make_solver, modules
 
 SEED = 16
 LARGEST_CONDITION = 1e13  # the commands refuse 1e14
 
 Variant = tuple[str, Form, dict[str, Any]]
 USUAL: list[Variant] = [
-    (name, form, {})
-    for name in modules()
-    if in_house(name) and name not in SLOW
-    for form in make_solver(name, {}).forms
+    (name, form, {}) for name in modules() if group_of(name) == "ours" for form in make_solver(name, {}).forms
 ]
 OTHERS: list[Variant] = [
     *(("ipm-fast", "dual", {key: False}) for key in ("finish", "single", "start_at_gaps")),

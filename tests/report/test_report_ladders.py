@@ -116,9 +116,9 @@ def test_each_ladder_breaks_at_its_first_wrong_rung(directory: Path) -> None:
 
 def test_wrong_answers_reported_as_solved_are_counted_apart(directory: Path) -> None:
     text = write(directory).read_text("utf-8")
-    assert "solved: 0 of 4 rows of the in-house solvers and 2 of 8 rows of the libraries." in text
+    assert "solved: 0 of 4 rows of our solvers, 2 of 8 rows of libraries." in text
     write_rows(directory, [r | (WRONG if r["solver"] == "ipm" and r["scene"] == EASY else {}) for r in ROWS])
-    assert "solved: 1 of 4 rows of the in-house" in write(directory).read_text("utf-8")
+    assert "solved: 1 of 4 rows of our" in write(directory).read_text("utf-8")
 
 
 def test_what_the_model_refuses_is_listed_and_not_awaited(directory: Path) -> None:

@@ -42,11 +42,11 @@ def test_a_section_is_a_function_in_the_list(tmp_path: Path, monkeypatch: pytest
 
 
 def test_rows_are_taken_at_their_word(tmp_path: Path) -> None:
-    rows = [row(LOW, "mine", in_house=True, batched=8), row(LOW, "newton", in_house=False)]
-    rows += [row(HIGH, "mine", in_house=True, **no_answer("not_run"))]
-    rows += [row(HIGH, "newton", in_house=False, **no_answer("crashed"), message="not run: no reason")]
+    rows = [row(LOW, "mine", group="textbook", batched=8), row(LOW, "newton", group=None, in_house=False)]
+    rows += [row(HIGH, "mine", group=None, in_house=True, **no_answer("not_run"))]
+    rows += [row(HIGH, "newton", **no_answer("crashed"), message="not run: no reason")]
     found = read(write_rows(tmp_path, rows)).rows
-    assert found["in_house"].tolist() == [True, False, True, False]
+    assert found["group"].tolist() == ["textbook", "library", "ours", "ours"]
     assert found["status"].tolist() == ["solved", "solved", "not_run", "crashed"]
     assert found["batched"].tolist()[0] == 8
 
@@ -54,7 +54,7 @@ def test_rows_are_taken_at_their_word(tmp_path: Path) -> None:
 # Order and forms.
 
 
-def test_in_house_first_then_by_name_and_the_sparse_form_before_dual_and_primal(tmp_path: Path) -> None:
+def test_ours_first_then_by_name_and_the_sparse_form_before_dual_and_primal(tmp_path: Path) -> None:
     lines = [("piqp", "primal"), ("newton", "dual"), ("clarabel", "sparse"), ("clarabel", "primal")]
     lines += [("clarabel", "dual"), ("gi", "primal"), ("mine", "other"), ("mine", "dual"), ("gi", "sparse")]
     cells = read(write_rows(tmp_path, [row(LOW, solver, form) for solver, form in lines])).cells

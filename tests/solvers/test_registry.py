@@ -8,23 +8,25 @@ import pytest
 from problems.errors import InputError
 from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
-from solvers.registry import in_house, make_solver, modules, solver_names, solver_version
+from solvers.registry import group_of, make_solver, modules, solver_names, solver_version
 
 NAMES = solver_names()
-IN_HOUSE = ["gi", "ipm", "ipm-fast", "lemke", "mprgp", "newton", "projected-gauss-seidel", "projected-newton"]
-LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp", "l-bfgs-b", "nnls")
+OURS = ["gi", "ipm", "ipm-fast", "lemke", "mprgp", "newton", "projected-newton"]
+TEXTBOOK = ["l-bfgs-b", "nnls", "projected-gauss-seidel", "textbook-active-set"]
+LIBRARIES = ["clarabel", "osqp", "piqp", "proxqp"]
 
 
 def test_solvers_are_found_by_their_files() -> None:
-    """In-house ones first, then the libraries, then what qpsolvers finds."""
-    assert list(modules()) == [*IN_HOUSE, *sorted(LIBRARIES)]
+    """Ours first, the textbook's, the libraries, then what qpsolvers finds."""
+    assert list(modules()) == [*OURS, *TEXTBOOK, *LIBRARIES]
     assert NAMES[: len(modules())] == list(modules())
     assert {"quadprog", "daqp", "qpalm"} <= set(NAMES)
     assert len(NAMES) == len(set(NAMES))
-    assert [name for name in NAMES if in_house(name)] == IN_HOUSE
+    assert [name for name in NAMES if group_of(name) == "ours"] == OURS
+    assert [name for name in NAMES if group_of(name) == "textbook"] == TEXTBOOK
 
 
-@pytest.mark.parametrize("name", LIBRARIES)
+@pytest.mark.parametrize("name", [*LIBRARIES, "l-bfgs-b", "nnls"])
 def test_versions_are_those_installed(name: str) -> None:
     assert solver_version(name)[0].isdigit()
 

@@ -8,8 +8,8 @@ from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer
-from solvers.libraries import l_bfgs_b
 from solvers.registry import make_solver
+from solvers.textbook import l_bfgs_b
 
 EPS = float(np.finfo(float).eps)
 
