@@ -52,5 +52,6 @@ def outdated(row: Row, m: Measurement, solver: Description, scene_key: str) -> b
     solved = (row.get(k) for k in ("scene_key", "solver_version", "solver_code"))
     before = (*solved, asked, row.get("gated"), drawn)
     out_of_time = row["status"] in OUT_OF_TIME and row["time_limit_s"] < m.time_limit_s
+    left_behind = m.stop_at_times_fastest is not None and bool(row.get("stop"))
     out_of_memory = row["status"] == "memory_limit" and row["memory_limit_mib"] < m.memory_limit_mib
-    return now != before or out_of_time or out_of_memory
+    return now != before or (out_of_time and not left_behind) or out_of_memory

@@ -131,5 +131,6 @@ def _row(m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, e
         **asdict(judgement),
         "message": measured["message"] or _why_not_judged(judgement, problem),
         **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
+        "stop": m.stop or None,
         "overhead_s": elapsed_s - sum(steps) if m.case is None else None,
     }

@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ from rich.console import Console
 from harness.planning.memory import refuse_limits_too_low
 from harness.planning.one_row import of_key, with_key
 from harness.planning.plan import Measurement, expand
-from harness.planning.search import superfluous
+from harness.planning.search import due
+from harness.planning.stopping import stopped_at
 from harness.planning.suite import Suite, to_toml
 from harness.planning.timeouts import predicted_timeout
 from harness.results import records
@@ -83,7 +84,7 @@ def run(
 def unmeasured(plan: list[Measurement], rows: list[Row]) -> list[Measurement]:
     """Those without a row that need one."""
     done = {row["key"] for row in rows}
-    return [m for m in plan if m.key not in done and not superfluous(m, rows)]
+    return [m for m in plan if m.key not in done and due(m, rows) is not None]
 
 
 def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
@@ -153,8 +154,8 @@ def pending_tasks(
     """One task after another; a scene is opened before its first of a family. `rows` grow meanwhile."""
     opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
     for batch in batches(remaining):
-        m = batch[0]
-        if superfluous(m, rows):
+        m = due(batch[0], rows)
+        if m is None:
             display.passed_over(batch)
             continue
         if any(problem.scene.name != m.scene for problem in opened.values()):
@@ -167,7 +168,9 @@ def pending_tasks(
             display.ready(m.scene, time.monotonic() - start)
         problem = opened[family]
         display.doing(f"{m.scene}: {m.solver} {m.form}")
-        timed_out_on = predicted_timeout(m, problem.prepared.assembly.asked, rows)
+        limit_s, stop = stopped_at(m, rows)
+        batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
+        timed_out_on = predicted_timeout(batch[0], problem.prepared.assembly.asked, rows)
         task = Task(batch, solvers[m.solver, m.variant], timed_out_on)
         yield Pending(task, problem), task
 

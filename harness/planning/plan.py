@@ -29,6 +29,7 @@ class Measurement:
 
     scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
     searched, paced : it may turn out to need no measuring (search.py).
+    stop : why its time limit is tighter than the suite's, or "" (stopping.py).
     """
 
     suite: str
@@ -53,6 +54,8 @@ class Measurement:
     reference_limit_s: float | None = None
     searched: bool = False
     paced: bool = False
+    stop_at_times_fastest: float | None = None
+    stop: str = ""
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -172,6 +175,7 @@ def _of_entry(
             reference_limit_s=suite.reference_limit_s,
             searched=asked == "auto",
             paced=(entry.repeats or suite.repeats) == "auto",
+            stop_at_times_fastest=suite.stop_at_times_fastest,
         )
 
 

@@ -1,12 +1,14 @@
-"""Measurements that need not be made, as the rows so far show.
+"""Which measurement is due, as the rows so far show.
 
-tolerances = "auto" searches, in decades, the loosest tolerance whose answer is within the limit on the scene;
-repeats = "auto" repeats what is quick: five times what takes under 2 s, three times what takes under 20 s.
+tolerances = "auto" searches, in decades, the loosest tolerance whose answer is within the limit on the scene,
+from the one found on the scene before; repeats = "auto" repeats what is quick: five times what takes under
+2 s, three times what takes under 20 s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf
 
 from harness.results.records import Row
@@ -18,37 +20,55 @@ from .plan import DECADES, MOST_REPEATS, Measurement
 REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
 
 
-def superfluous(m: Measurement, rows: Sequence[Row]) -> bool:
-    """Whether the search at looser tolerances has ended, or m was repeated often enough."""
+def due(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
+    """What to measure in m's place in the plan: of a search, its next tolerance. None if nothing."""
     if not (m.searched or m.paced):
-        return False
-    first = [row for row in rows if row["repeat"] == 0 and row["scene"] == m.scene and m.same_settings(row)]
-    if m.searched and not _due(m, first):
-        return True
+        return m
+    own = [row for row in rows if row["repeat"] == 0 and m.same_settings(row)]
+    first = [row for row in own if row["scene"] == m.scene]
+    if m.searched and m.repeat == 0:
+        tolerance = _next(first, _start(m, own))
+        return None if tolerance is None else replace(m, tolerance=tolerance)
+    if m.searched and found(first) != m.tolerance and _next(first, DECADES[0]) is None:
+        return None
     same = [row for row in first if row["tolerance"] == m.tolerance]
-    return m.paced and any(m.repeat >= _repeats(row) for row in same)
-
-
-def _due(m: Measurement, first: Sequence[Row]) -> bool:
-    """first : the rows of the search. It ends with a tolerance that the solver did not reach, or whose answer
-    is within the limit; only the latter is repeated.
-    """
-    if m.repeat:
-        return not _ended(first) or found(first) == m.tolerance
-    looser = [row for row in first if row["tolerance"] > m.tolerance]
-    return not _ended(looser)
-
-
-def _ended(first: Sequence[Row]) -> bool:
-    return any(
-        row["verdict"] == "within" or row["status"] != "solved" or row["tolerance"] == DECADES[-1]
-        for row in first
-    )
+    return None if m.paced and any(m.repeat >= _repeats(row) for row in same) else m
 
 
 def found(rows: Sequence[Row]) -> float | None:
     """The loosest tolerance whose answer is within the limit."""
     return max((row["tolerance"] for row in rows if row["verdict"] == "within"), default=None)
+
+
+def _start(m: Measurement, own: Sequence[Row]) -> float:
+    """The tolerance found on the last scene before m's where there was one, else the loosest."""
+    before = [row for row in own if row["scene"] != m.scene and row["verdict"] == "within"]
+    return found([row for row in before if row["scene"] == before[-1]["scene"]]) or DECADES[0]
+
+
+def _next(tried: Sequence[Row], start: float) -> float | None:
+    """One decade looser than what is within the limit; one tighter than answers that are solved and outside;
+    one looser than what was not solved. None if that was tried, or there is no such decade.
+    """
+    if not tried:
+        return start
+    place, step = _place(tried)
+    candidate = place + step
+    known = {row["tolerance"] for row in tried}
+    if not 0 <= candidate < len(DECADES) or DECADES[candidate] in known:
+        return None
+    return DECADES[candidate]
+
+
+def _place(tried: Sequence[Row]) -> tuple[int, int]:
+    """The decade, as an index, from which the search goes on, and where to: 1 tighter, −1 looser."""
+    loosest = found(tried)
+    if loosest is not None:
+        return DECADES.index(loosest), -1
+    outside = [row["tolerance"] for row in tried if row["status"] == "solved"]
+    if outside:
+        return DECADES.index(min(outside)), 1
+    return DECADES.index(max(row["tolerance"] for row in tried)), -1
 
 
 def _repeats(row: Row) -> int:

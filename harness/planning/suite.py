@@ -82,6 +82,7 @@ class Suite(BaseModel):
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
+    stop_at_times_fastest stops what takes that many times as long as the fastest library (stopping.py).
     after reference_limit_s no further method is tried for a reference; by default 60 s per thousand
     contacts, at least 60.
     """
@@ -97,6 +98,7 @@ class Suite(BaseModel):
     threads: Annotated[list[PositiveInt], NonEmpty] = [2]
     time_limit_s: Positive = 60.0
     time_limit_by_size_s: dict[PositiveInt, Positive] = {}
+    stop_at_times_fastest: Annotated[float, Field(ge=1)] | None = None
     memory_limit_mib: PositiveInt = 8192
     reference_limit_s: Positive | None = None
     limit_mm: Positive = 1e-7

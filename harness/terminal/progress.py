@@ -106,7 +106,7 @@ class Display:
 
     def finished(self, measurement: Measurement, row: Row, seconds: float) -> None:
         """Note that a measurement is done, and print its row."""
-        self.left.remove(measurement)
+        self.left = [m for m in self.left if m.key != measurement.key]
         self._record((measurement.solver, measurement.form), measurement.scene, seconds)
         self.console.print(row_text(row), soft_wrap=True)
         self.progress.update(self.task, advance=1, left=self._time_left())

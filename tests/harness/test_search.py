@@ -13,7 +13,8 @@ from rich.console import Console
 from harness.measurement.run import run
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import DECADES, Measurement, expand
-from harness.planning.search import superfluous
+from harness.planning.search import due
+from harness.planning.stopping import stopped_at
 from harness.planning.suite import read_suite, suite_from
 from problems.errors import InputError
 from report.results.reader import read
@@ -79,6 +80,70 @@ def test_it_ends_where_the_solver_gives_up(tmp_path: Path) -> None:
     assert cell["tolerance"] == 1e-5
 
 
+def test_the_search_starts_where_it_ended_on_the_scene_before(tmp_path: Path) -> None:
+    """On a second scene: the tolerance of the first, then the next looser one, which does not suffice."""
+    suite = suite_of(tmp_path)
+    data = suite.model_dump(exclude_none=True)
+    (first,) = suite.scenes
+    second = tmp_path / "second.npz"
+    second.write_bytes(Path(first).read_bytes())
+    rows = measured(
+        suite_from(data | {"scenes": [first, str(second)]}, tmp_path / "s.toml"), tmp_path / "out"
+    )
+    tried = [row["tolerance"] for row in rows if row["scene"] == "second"]
+    assert tried == [rows[len(rows) - len(tried) - 1]["tolerance"], 10 * tried[0]]
+    cells = read(tmp_path / "out").cells
+    assert cells["tolerance"].nunique() == 1
+
+
+@pytest.mark.parametrize(
+    ("tried", "expected"),
+    [
+        ({}, 1e-3),
+        ({1e-3: "outside"}, 1e-4),
+        ({1e-3: "outside", 1e-4: "within"}, None),
+        ({1e-6: "within"}, 1e-5),
+        ({1e-6: "within", 1e-5: "outside"}, None),
+        ({1e-6: "time_limit"}, 1e-5),
+        ({1e-6: "time_limit", 1e-5: "outside"}, None),
+        ({1e-6: "inaccurate", 1e-5: "within", 1e-4: "within", 1e-3: "within"}, None),
+        ({1e-16: "outside"}, None),
+    ],
+)
+def test_the_next_tolerance(tmp_path: Path, tried: dict[float, str], expected: float | None) -> None:
+    m = expand(suite_of(tmp_path))[0]
+    rows = []
+    for tolerance, ended in tried.items():
+        row = row_of(replace(m, tolerance=tolerance), 1.0, ended if ended == "within" else "outside")
+        rows.append(row | ({"status": ended} if ended in ("time_limit", "inaccurate") else {}))
+    found = due(m, rows)
+    assert (None if found is None else found.tolerance) == expected
+
+
+@pytest.mark.parametrize(
+    ("others", "limit_s", "stop"),
+    [
+        ([], 60.0, ""),
+        ([("piqp", "library", 2.0, "within"), ("osqp", "library", 1.5, "outside")], 20.0, "10 × piqp"),
+        ([("piqp", "library", 0.2, "within")], 10.0, "at least 10 s"),
+        ([("piqp", "library", 7.0, "within")], 60.0, ""),
+        ([("newton", "ours", 0.2, "within"), ("rough", "library", 1.0, "within")], 60.0, ""),
+    ],
+)
+def test_who_is_ten_times_slower_is_stopped(
+    tmp_path: Path, others: list[tuple[str, str, float, str]], limit_s: float, stop: str
+) -> None:
+    m = replace(expand(suite_of(tmp_path))[0], time_limit_s=60.0, stop_at_times_fastest=10.0)
+    rows = [
+        row_of(m, seconds, verdict) | {"solver": name, "group": group}
+        for name, group, seconds, verdict in others
+    ]
+    found, why = stopped_at(m, rows)
+    assert found == pytest.approx(limit_s)
+    assert stop in why
+    assert bool(why) == bool(stop)
+
+
 def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str, Any]:
     names = ("scene", "solver", "form", "variant", "options", "tolerance", "repeat")
     steps = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "form_s")) | {"solve_s": seconds}
@@ -92,8 +157,8 @@ def test_what_is_quick_is_repeated(tmp_path: Path, seconds: float, repeats: int)
     plan = [m for m in expand(suite) if m.solver == suite.solver[0].name]
     rows = [row_of(plan[0], seconds)]
     others = [m for m in plan if m.tolerance == plan[0].tolerance and m.form == plan[0].form]
-    assert [m.repeat for m in others if not superfluous(m, rows)] == [*range(repeats)]
-    assert not superfluous(replace(plan[0], repeat=4), [])
+    assert [m.repeat for m in others if due(m, rows)] == [*range(repeats)]
+    assert due(replace(plan[0], repeat=4), [])
 
 
 @pytest.mark.parametrize(

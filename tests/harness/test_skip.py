@@ -1,5 +1,6 @@
 """A measurement that cannot end in time is not run, and only such a one."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,9 @@ def test_a_row_out_of_time_stands_until_there_is_more_of_it(large, status):
     known = {"scene_key": "s", "solver_version": "1", "solver_code": "c", "gated": large.gated}
     rows = [row("6112/0600", 6112, status, t, limit_mm=large.limit_mm) | known for t in (40.0, 39.0)]
     assert [outdated(r, large, Description(["primal"], "1", "c"), "s") for r in rows] == [False, True]
+    stopped, left_behind = rows[1] | {"stop": "10 × daqp"}, replace(large, stop_at_times_fastest=10.0)
+    for m, expected in ((left_behind, False), (large, True)):
+        assert outdated(stopped, m, Description(["primal"], "1", "c"), "s") is expected
 
 
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-3])
