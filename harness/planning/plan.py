@@ -88,7 +88,7 @@ def expand(suite: Suite) -> list[Measurement]:
     """All measurements of a suite, scene by scene, the load cases of a series in order; none on a rung that
     the model should refuse.
 
-    Repeats are interleaved, each round shuffled with its own seed, so that a drift of the machine does not
+    Repeats are interleaved, each round after the first shuffled with its own seed, so that a drift of the machine does not
     affect one solver alone. Measurements that differ only in tolerance keep the suite's order, so that a
     loose tolerance can show that a tight one would exceed the time limit.
 
@@ -118,7 +118,7 @@ def expand(suite: Suite) -> list[Measurement]:
         for repeat in range(rounds):
             due = [entry for entry, repeats in entries if repeat < repeats]
             one_round = [made for entry in due for made in _of_entry(suite, entry, name, source, repeat)]
-            for measurement in _shuffled(one_round, f"{name} {repeat}") if rounds > 1 else one_round:
+            for measurement in _shuffled(one_round, f"{name} {repeat}") if repeat else one_round:
                 plan.setdefault(measurement.key, measurement)
     if not plan:
         restricted = {entry.name: entry.scenes for entry in suite.solver}

@@ -114,7 +114,8 @@ def test_the_suite_says_every_name_it_stands_for(tmp_path: Path) -> None:
     plan = expand(overridden(suite, Overrides(sizes=(6112,))))
     usual = Counter((m.solver, m.form) for m in plan if m.tolerance == 1e-10)
     forms = ("dual", "sparse")
-    assert usual == {(solver, form): 60 for solver in ("newton", "mprgp") for form in forms}
+    expected = {(solver, form): 60 for solver in ("newton", "mprgp") for form in forms}
+    assert usual == expected | {("textbook-active-set", "dual"): 8}
     others = Counter((m.solver, m.form, m.tolerance) for m in plan if m.tolerance != 1e-10)
     assert others == {("newton", form, tol): 6 for form in forms for tol in (1e-2, 1e-4, 1e-8, 1e-12)}
     assert {m.scene for m in plan if m.tolerance != 1e-10} == {f"drawn/6112/{k}" for k in range(6)}

@@ -152,6 +152,8 @@ def test_the_suite_measures_every_rung_with_every_solver() -> None:
     suite = read_suite("hard")
     plan = expand(suite)
     assert {m.scene for m in plan} == set(TAKEN)
+    assert {m.tolerance for m in plan if m.solver == "projected-gauss-seidel"} == {1e-10, 1e-14}
+    plan = [m for m in plan if (m.solver, m.tolerance) != ("projected-gauss-seidel", 1e-10)]
     lines = {(m.solver, m.form) for m in plan}
     taken = {line: {m.scene for m in plan if (m.solver, m.form) == line} for line in lines}
     assert len(plan) == sum(map(len, taken.values()))
