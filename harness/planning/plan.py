@@ -88,9 +88,9 @@ def expand(suite: Suite) -> list[Measurement]:
     """All measurements of a suite, scene by scene, the load cases of a series in order; none on a rung that
     the model should refuse.
 
-    Repeats are interleaved: a round in the suite's order, then rounds each shuffled with its own seed, so that
-    a drift of the machine does not affect one solver alone. Measurements that differ only in tolerance keep
-    their order, so that a loose tolerance can show that a tight one would exceed the time limit.
+    Repeats are interleaved: a round in the suite's order, then rounds each shuffled with its own seed, so
+    that a drift of the machine does not affect one solver alone. Measurements that differ only in tolerance
+    keep their order, so that a loose tolerance can show that a tight one would exceed the time limit.
 
     Raises InputError if nothing is left to measure or if two files have the same scene name.
     """
