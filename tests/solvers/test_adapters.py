@@ -32,6 +32,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("proxqp", {"backend": "primal_ldlt"}),
     ("proxqp", {"backend": "primal_dual_ldlt"}),
     ("piqp", {"backend": "sparse"}),
+    ("cvxpy", {"via": "CLARABEL"}),
 ]
 
 

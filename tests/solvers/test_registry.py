@@ -13,7 +13,7 @@ from solvers.registry import group_of, make_solver, modules, solver_names, solve
 NAMES = solver_names()
 OURS = ["gi", "ipm", "ipm-fast", "lemke", "mprgp", "newton", "projected-newton"]
 TEXTBOOK = ["l-bfgs-b", "nnls", "projected-gauss-seidel", "textbook-active-set"]
-LIBRARIES = ["clarabel", "osqp", "piqp", "proxqp"]
+LIBRARIES = ["clarabel", "cvxpy", "osqp", "piqp", "proxqp"]
 
 
 def test_solvers_are_found_by_their_files() -> None:

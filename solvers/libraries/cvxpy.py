@@ -1,0 +1,102 @@
+"""CVXPY, a modelling language, as a road to OSQP or Clarabel, https://www.cvxpy.org: what modelling costs.
+
+The set-up is CVXPY's compilation of the model, the solve is the solver with CVXPY's own conversion of its
+answer. The model has P, G as constants and q, h as parameters, so that a further load case is not compiled
+again. The tolerance is passed on as OSQP's `eps_abs` or as Clarabel's three, with relative ones 0; all else
+is left at CVXPY's defaults, as a user would have it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import cvxpy as cp
+import scipy.sparse as sp
+
+from solvers.adapter import Converted, gap_tolerance
+from solvers.base import FORMS, Answer, Form, LoadCase, Problem, Solver, Status, WarmStart
+from solvers.settings import one_of, require
+
+STATUS: dict[str, Status] = {
+    cp.OPTIMAL: "solved",
+    cp.OPTIMAL_INACCURATE: "inaccurate",
+    cp.USER_LIMIT: "iteration_limit",
+}
+#: CVXPY's own choice for a quadratic program, and those that may be asked for.
+SOLVERS = (None, cp.OSQP, cp.CLARABEL)
+
+
+@dataclass
+class Model:
+    """A compiled model. data, chain, inverse : of CVXPY, for the values of q and h."""
+
+    problem: cp.Problem
+    z: cp.Variable
+    q: cp.Parameter
+    h: cp.Parameter | None
+    data: Any = None
+    chain: Any = None
+    inverse: Any = None
+
+
+class Cvxpy(Solver):
+    """via : "OSQP", "CLARABEL", or None for CVXPY's own choice, which is OSQP."""
+
+    forms: ClassVar[tuple[Form, ...]] = FORMS
+
+    def __init__(self, *, via: str | None = None) -> None:
+        require("cvxpy", {"via": via}, via=one_of(via, SOLVERS))
+        self.via = via
+
+    def convert(self, problem: Problem) -> Converted:
+        G = problem.G
+        P = sp.block_diag(problem.blocks, format="csc") if len(problem.blocks) > 1 else problem.blocks[0]
+        return Converted(problem, P, None if G is None else sp.csc_matrix(G))
+
+    def setup(self, state: Converted, load: LoadCase, tolerance: float) -> Any:
+        q, h = state.vectors(load)
+        z, linear = cp.Variable(len(q)), cp.Parameter(len(q))
+        right = None if h is None else cp.Parameter(len(h))
+        rows = z >= 0 if right is None else state.G @ z <= right
+        # psd_wrap: CVXPY's own test for convexity would cost an eigenvalue
+        objective = cp.quad_form(z, cp.psd_wrap(state.P)) / 2 + linear @ z
+        model = Model(cp.Problem(cp.Minimize(objective), [rows]), z, linear, right)
+        return self._compiled(state, model, load)
+
+    def update(self, state: Converted, ready: Any, load: LoadCase, tolerance: float, start: WarmStart) -> Any:
+        """The parameters' new values; CVXPY keeps what it has compiled."""
+        return self._compiled(state, ready[1], load)
+
+    def _compiled(self, state: Converted, model: Model, load: LoadCase) -> tuple[Converted, Model]:
+        q, h = state.vectors(load)
+        model.q.value = q
+        if model.h is not None:
+            model.h.value = h
+        model.data, model.chain, model.inverse = model.problem.get_problem_data(self.via, solver_opts={})
+        return state, model
+
+    def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
+        state, model = ready
+        gap = gap_tolerance(tolerance, load)
+        name = model.chain.solver.name()
+        settings = {
+            cp.OSQP: {"eps_abs": tolerance, "eps_rel": 0.0, "max_iter": 1_000_000},
+            cp.CLARABEL: {"tol_feas": tolerance, "tol_gap_abs": gap, "tol_gap_rel": 0.0},
+        }[name]
+        raw = model.chain.solve_via_data(model.problem, model.data, solver_opts=settings)
+        try:
+            model.problem.unpack_results(raw, model.chain, model.inverse)
+        except cp.SolverError as error:
+            return Answer("failed", None, details={"solver": name, "message": str(error)})
+        (rows,) = model.problem.constraints
+        if model.z.value is None:
+            return Answer("failed", None, details={"solver": name, "status": model.problem.status})
+        return state.answer(
+            STATUS.get(model.problem.status, "failed"),
+            tolerance,
+            model.z.value,
+            rows.dual_value,
+            iterations=model.problem.solver_stats.num_iters,
+            details={"solver": name},
+        )
