@@ -26,10 +26,13 @@ STATUS: dict[Any, Status] = {
 class Piqp(Library):
     """backend : "dense" or "sparse" Cholesky; None: as the blocks of P are. Where they are dense, dense is
     several times faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal
-    form. settings : PIQP's own, as rho_init = 1e-8.
+    form. kkt_solver : of the sparse form, with or without the rows. settings : PIQP's own, as rho_init = 1e-8.
     """
 
-    choices: ClassVar[dict[str, tuple[str | None, ...]]] = {"backend": (None, "dense", "sparse")}
+    choices: ClassVar[dict[str, tuple[str | None, ...]]] = {
+        "backend": (None, "dense", "sparse"),
+        "kkt_solver": ("sparse_ldlt_ineq_cond", "sparse_ldlt"),
+    }
 
     def __init__(self, **options: object) -> None:
         super().__init__(**options)
@@ -48,7 +51,7 @@ class Piqp(Library):
         set_absolute(settings, tolerance, load)
         settings.max_iter = 500
         if is_sparse(state.problem.blocks):
-            settings.kkt_solver = piqp.sparse_ldlt_ineq_cond
+            settings.kkt_solver = getattr(piqp, self.own["kkt_solver"])
         apply(settings, self.settings)
         q, h = state.vectors(load)
         limits = {"x_l": np.zeros_like(q)} if h is None else {"G": state.G, "h_u": h}
