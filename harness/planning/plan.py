@@ -28,7 +28,8 @@ class Measurement:
     """One solver on one scene in one form: what one process will do.
 
     scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
-    searched, paced : it may turn out to need no measuring (search.py).
+    searched, paced : it may turn out to need no measuring (search.py). requirements : what its environment
+    has in other versions than this one.
     """
 
     suite: str
@@ -53,6 +54,7 @@ class Measurement:
     reference_limit_s: float | None = None
     searched: bool = False
     paced: bool = False
+    requirements: tuple[str, ...] = ()
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -155,8 +157,9 @@ def _of_entry(
             source=source,
             solver=entry.name,
             form=form,
-            variant=entry.variant,
+            variant=entry.label,
             options=entry.options,
+            requirements=tuple(entry.requirements or ()),
             tolerance=tolerance,
             threads=threads,
             repeat=repeat,
