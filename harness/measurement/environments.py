@@ -100,5 +100,6 @@ def _called(command: Sequence[str], requirements: Sequence[str], doing: Callable
     if process.returncode:
         library, _, version = requirements[0].partition("==")
         allowed = f"pip cannot install it: `pip index versions {library}` lists all; run again to retry"
-        last = [line.strip() for line in printed.splitlines() if line.strip()][-LAST_LINES:]
+        said = [line.strip() for line in printed.splitlines() if line.strip()]
+        last = [line for line in said if not line.startswith("WARNING")][-LAST_LINES:]
         raise InputError.one("--with", library, version, "\n".join([allowed, *last]))
