@@ -54,16 +54,15 @@ def _side_by_side(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _what(rows: pd.DataFrame) -> pd.Series[str]:
-    """The form, the variant without the version, and tolerance and threads where there are several."""
+    """The form, the variant without the version, and tolerance and threads where a solver has several."""
     cut = asked_for(rows)
     pairs = zip(rows["variant"], rows["solver_version"], cut, strict=True)
     base = [variant.removesuffix(v).strip() if named else variant for variant, v, named in pairs]
     words = rows["form"] + [f" {name}" if name else "" for name in base]
-    if rows.loc[rows["searched"] != 1.0, "tolerance"].nunique() > 1:
-        words += (" " + rows["tolerance"].map(tidy_power)).where(rows["searched"] != 1.0, "")
-    if rows["threads"].nunique() > 1:
-        words += " × " + rows["threads"].map("{:.0f}".format)
-    return words
+    several = rows.groupby("solver")[["tolerance", "threads"]].transform("nunique") > 1
+    chosen = several["tolerance"] & (rows["searched"] != 1.0)
+    words += (" " + rows["tolerance"].map(tidy_power)).where(chosen, "")
+    return words + (" × " + rows["threads"].map("{:.0f}".format)).where(several["threads"], "")
 
 
 def _numbers(version: str) -> list[int]:

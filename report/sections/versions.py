@@ -8,13 +8,14 @@ from report.analysis.comparison import WORSE
 from report.analysis.seconds import seconds_text
 from report.analysis.versions import of_versions
 from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
-from report.document.escape import file_name, short
+from report.document.escape import QUOTED, file_name, short
 from report.document.numbers import counted, power, whole
 from report.results.reader import Results
 
-CAPTION = (
+MEANING = (
     "Worse than the version above: a verdict lost, an error more than ten times as large, or more than 10 % "
-    "more seconds per load case, beyond their spread; fewer than three repeats are taken to vary by 15 %."
+    "more seconds per load case, beyond their spread; fewer than three repeats are taken to vary by 15 %. A "
+    "version that failed could not be installed, or has another interface than its adapter calls."
 )
 LONGEST = 300  # characters of a reason
 
@@ -24,7 +25,7 @@ def section(results: Results) -> Section | None:
     blocks: list[Block] = []
     for solver, cells in of_versions(results).items():
         blocks += _blocks(solver, cells)
-    return Section("Versions", blocks) if blocks else None
+    return Section("Versions", [Text(MEANING), *blocks]) if blocks else None
 
 
 def _blocks(solver: str, cells: pd.DataFrame) -> list[Block]:
@@ -47,11 +48,10 @@ def _blocks(solver: str, cells: pd.DataFrame) -> list[Block]:
     ]
     count = f"{worse.sum()} of {counted(compared, 'measurement')} became worse"
     count += f", {counted(int(lost.sum()), 'measurement')} without an answer" if lost.any() else ""
-    blocks: list[Block] = [
-        Table(f"versions-{file_name(solver)}", f"*{solver}*: {count}. {CAPTION}", cells, columns)
+    blocks: list[Block] = [Table(f"versions-{file_name(solver)}", f"*{solver}*: {count}.", cells, columns)]
+    failed = records(cells[cells["status"].isin(["failed", "crashed"]) & (cells["message"] != "")])
+    first = [short(cell["message"].partition(QUOTED["\n"])[0], LONGEST) for cell in failed]
+    reasons = [
+        f"- {solver} {cell['solver_version']}: {line}" for cell, line in zip(failed, first, strict=True)
     ]
-    reasons = cells[lost & (cells["message"] != "")].drop_duplicates(["solver_version", "message"])
-    lines = [
-        f"- {solver} {line['solver_version']}: {short(line['message'], LONGEST)}" for line in records(reasons)
-    ]
-    return [*blocks, Text("\n".join(lines))] if lines else blocks
+    return [*blocks, Text("\n".join(dict.fromkeys(reasons)))] if reasons else blocks
