@@ -82,7 +82,7 @@ def run(
         typer.Option(
             "--with",
             metavar="NAME==VERSION",
-            help="Only this library, in this version; NAME alone: the one installed here. Repeatable.",
+            help="Only this library, in this version; NAME alone: as installed here. Repeatable.",
         ),
     ] = None,
     form: Annotated[
@@ -121,7 +121,7 @@ def run(
 
     --with measures versions of a library side by side. pip installs each once, into an environment in the
     cache that has all other packages from here. A version that cannot be installed, or that its adapter
-    cannot call, gives rows `failed` with the reason. If the solver has another name, add --solver.
+    cannot call, gives rows `failed` with the reason. If its solver has another name, add --solver.
 
     \b
     Examples:

@@ -52,19 +52,14 @@ def describe(suite: Suite, doing: Callable[[str], None] = lambda text: None) -> 
     """A description of each of the suite's solver entries, as `described` gives them."""
     installed = [(e.name, e.options) for e in suite.solver if not e.requirements]
     here = iter(described(installed, suite.plugin, f"suite {suite.name}", doing))
-    return [
-        _of_version(e, e.requirements, suite.plugin, doing) if e.requirements else next(here)
-        for e in suite.solver
-    ]
+    return [_of_version(e, suite.plugin, doing) if e.requirements else next(here) for e in suite.solver]
 
 
-def _of_version(
-    entry: SolverEntry, requirements: Sequence[str], plugin: str | None, doing: Callable[[str], None]
-) -> Description:
+def _of_version(entry: SolverEntry, plugin: str | None, doing: Callable[[str], None]) -> Description:
     """A description in the entry's own environment; one that says so if it cannot be had there."""
+    solver, requirements = (entry.name, entry.options), entry.requirements or []
     try:
-        solver = entry.name, entry.options
-        (found,) = described([solver], plugin, requirements[0], doing, requirements)
+        (found,) = described([solver], plugin, "--with", doing, requirements)
     except InputError as error:
         return Description(entry.forms or list(FORMS), entry.version, code="", failure=str(error))
     return replace(found, version=entry.version)

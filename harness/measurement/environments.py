@@ -21,7 +21,7 @@ from problems.storage import cache
 
 #: Read after the .pth files of packages, whose folders come before those it adds.
 PARENT = "zzz-parent.pth"
-#: Where packages made by cmeel are, as proxsuite: its own .pth adds the folder beside cmeel alone.
+#: Where packages made by cmeel are, such as proxsuite. The .pth of cmeel adds only the folder beside cmeel.
 CMEEL = "cmeel.prefix/lib/python{}.{}/site-packages".format(*sys.version_info)
 COMPLETE = "complete"
 POLL_S = 0.2
@@ -53,8 +53,8 @@ def interpreter(requirements: Sequence[str], doing: Callable[[str], None] = lamb
 
 def _make(folder: Path, python: Path, requirements: Sequence[str], doing: Callable[[str], None]) -> None:
     what = f"installing {' '.join(requirements)}"
-    own_pip = [] if importlib.util.find_spec("pip") is None else ["--without-pip"]
-    _called([sys.executable, "-m", "venv", *own_pip, str(folder)], requirements, lambda: doing(what))
+    known = ["--without-pip"] if importlib.util.find_spec("pip") else []  # it sees that of this interpreter
+    _called([sys.executable, "-m", "venv", *known, str(folder)], requirements, lambda: doing(what))
     own = sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)})
     lines = [f"import site; site.addsitedir({folder!r})" for folder in _packages()]
     (Path(own) / PARENT).write_text("\n".join([CMEEL, *lines, ""]), "utf-8")

@@ -14,6 +14,7 @@ from problems.input.bounded import resolved
 from problems.input.validation import unknown
 from problems.scene import read_scene
 from solvers.base import Form
+from solvers.registry import modules
 
 from .suite import Suite, resolved_scenes, suite_from
 
@@ -48,7 +49,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
 
     --scene replaces the suite's scenes; --size keeps those of that size; --solver keeps those entries and
     adds a default one for a solver that is not in the suite; --with does so for its library, and takes each
-    of its entries once in each version; --plugin adds its solver.
+    entry once in each version; --plugin adds its solver.
     """
     faults: list[Fault] = []
     data = suite.model_dump(exclude_none=True)
@@ -62,7 +63,7 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
         data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
     plugin = str(resolved(change.plugin)) if change.plugin else suite.plugin
     versions = _versions(change, faults)
-    solvers = change.solvers or tuple(versions)
+    solvers = [*change.solvers, *(name for name in versions if name not in change.solvers)]
     if solvers:
         data["solver"] = [entry for entry in data["solver"] if entry["name"] in solvers]
     named = {entry["name"] for entry in data["solver"]}
@@ -98,21 +99,17 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
 def _versions(change: Overrides, faults: list[Fault]) -> dict[str, list[dict[str, Any]]]:
     """Of each solver whose library --with names, what the entry of each version says.
 
-    The solver has the library's name, or is the only one that --solver names.
+    The solver has the library's name; if there is none, it is the only one that --solver names.
     """
     found: dict[str, list[dict[str, Any]]] = {}
-    named = change.solvers
     for requirement in change.requirements:
         library, equals, version = requirement.partition("==")
         if not WORD.fullmatch(library) or bool(equals) != bool(version):
             allowed = "NAME==VERSION, as piqp==0.6.2, or NAME alone for the version installed here"
             faults.append(Fault("--with", "with", requirement, allowed))
-        elif len(named) > 1 and library not in named:
-            allowed = f"name the solver of {library}, and it alone, with --solver"
-            faults.append(Fault("--with", "with", requirement, allowed))
-        else:
-            solver = named[0] if named and library not in named else library
-            found.setdefault(solver, []).append({"with": [requirement] if version else None})
+        other = len(change.solvers) == 1 and library not in modules()
+        solver = change.solvers[0] if other else library
+        found.setdefault(solver, []).append({"with": [requirement] if version else None})
     return found
 
 
