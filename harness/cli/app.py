@@ -77,6 +77,14 @@ def run(
     solver: Annotated[
         list[str] | None, option("NAME", "Only these solvers, in the suite or not. Repeatable.")
     ] = None,
+    with_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="NAME==VERSION",
+            help="Only this library, in this version; NAME alone: as installed here. Repeatable.",
+        ),
+    ] = None,
     form: Annotated[
         list[FormName] | None, option("FORM", "Only this form: primal, dual or sparse. Repeatable.")
     ] = None,
@@ -111,12 +119,18 @@ def run(
     Each measurement is a process of its own, stopped at its time or memory limit. Rows are saved as they are
     finished: stop with Ctrl-C, run the same command again, and it continues where it stopped.
 
+    --with measures versions of a library side by side. pip installs each once, into an environment in the
+    cache that has all other packages from here. A version that cannot be installed, or that its adapter
+    cannot call, gives rows `failed` with the reason. If its solver has another name, add --solver.
+
     \b
     Examples:
       python -m harness run --size 4386
       python -m harness run --scene 4386/0107 --solver ipm --solver piqp --form dual
       python -m harness run --scene my-matrices.npz --tolerance 1e-6 --tolerance 1e-9
       python -m harness run --scene 4386/1471 --solver osqp --tolerance auto --option osqp.scaling=0
+      python -m harness run --size 4386 --with piqp --with piqp==0.6.2 --repeat 3 --out results/piqp
+      python -m harness run --solver proxqp --with proxsuite==0.7.2 --with proxsuite==0.8.0
       python -m harness run gate --out results/gate
       python -m harness run my-suite.toml --repeat 5 --threads 1 --threads 2
       python -m harness run --scheduler tcp://10.0.0.5:8786
@@ -137,6 +151,7 @@ def run(
             sizes=tuple(size or ()),
             scenes=tuple(scene or ()),
             solvers=tuple(solver or ()),
+            requirements=tuple(with_ or ()),
             forms=tuple(choice.value for choice in form or ()),
             tolerances=tolerances_of(tolerance or []),
             options=tuple(setting or ()),

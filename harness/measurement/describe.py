@@ -6,11 +6,11 @@ A library that prints, crashes or hangs while it is imported then does no harm, 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from harness.planning.suite import Suite
+from harness.planning.suite import SolverEntry, Suite
 from harness.results.records import Row
 from harness.solving.answers import shown
 from problems.errors import Fault, InputError
@@ -18,6 +18,7 @@ from problems.forms.names import FORMS, default_form
 from solvers.base import Form
 
 from .child import Events
+from .environments import interpreter, refuse_other_copies
 from .monitored import Monitored
 from .solver_code import code_of
 
@@ -29,26 +30,40 @@ IMPORT_MIB = 8192
 class Description:
     """What rows say of a solver: its forms, the version of its library, a hash of this project's code for it,
     and its group (`solvers.registry.group_of`).
+
+    failure : why the version asked for cannot be used, "" if it can.
     """
 
     forms: list[Form]
     version: str
     code: str
     group: str = "library"
+    failure: str = ""
 
     @property
     def default_form(self) -> Form:
         return default_form(self.forms)
 
 
-#: By name and variant.
+#: By name and label.
 Solvers = dict[tuple[str, str], Description]
 
 
 def describe(suite: Suite, doing: Callable[[str], None] = lambda text: None) -> list[Description]:
     """A description of each of the suite's solver entries, as `described` gives them."""
-    entries = [(e.name, e.options) for e in suite.solver]
-    return described(entries, suite.plugin, f"suite {suite.name}", doing)
+    installed = [(e.name, e.options) for e in suite.solver if not e.requirements]
+    here = iter(described(installed, suite.plugin, f"suite {suite.name}", doing))
+    return [_of_version(e, suite.plugin, doing) if e.requirements else next(here) for e in suite.solver]
+
+
+def _of_version(entry: SolverEntry, plugin: str | None, doing: Callable[[str], None]) -> Description:
+    """A description in the entry's own environment; one that says so if it cannot be had there."""
+    solver, requirements = (entry.name, entry.options), entry.requirements or []
+    try:
+        (found,) = described([solver], plugin, "--with", doing, requirements)
+    except InputError as error:
+        return Description(entry.forms or list(FORMS), entry.version, code="", failure=str(error))
+    return replace(found, version=entry.version)
 
 
 def described(
@@ -56,13 +71,17 @@ def described(
     plugin: str | Path | None,
     where: str,
     doing: Callable[[str], None] = lambda text: None,
+    requirements: Sequence[str] = (),
 ) -> list[Description]:
     """A description of each solver, given by name and options. Raises InputError, all faults at once.
 
     where : what names them. doing : called with what is being imported, again and again.
+    requirements : what the environment has in other versions than this one.
     """
-    name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None)
-    with Monitored(describe_here, job, 1, {"importing the solvers": IMPORT_S}, IMPORT_MIB) as process:
+    name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None, requirements)
+    python = interpreter(requirements, doing)
+    limits = {"importing the solvers": IMPORT_S}
+    with Monitored(describe_here, job, 1, limits, IMPORT_MIB, python) as process:
         for event in process:
             name = event.get("name", name)
             doing(f"importing {name}")
@@ -79,11 +98,13 @@ def refuse_unimportable(end: Row, process: Monitored, where: str | Path, name: s
         raise InputError.one(where, "solver", name, " ".join([f"importing it: {end['message']}", *last]))
 
 
-def describe_here(job: tuple[list[tuple[str, dict[str, Any]]], Path | None], events: Events) -> Row:
+def describe_here(
+    job: tuple[list[tuple[str, dict[str, Any]]], Path | None, Sequence[str]], events: Events
+) -> Row:
     """The descriptions; in the process of its own. Raises InputError, all faults at once."""
     from solvers.registry import group_of, make_solver, solver_version
 
-    solvers, plugin = job
+    solvers, plugin, requirements = job
     found: list[Description] = []
     faults: list[Fault] = []
     for name, options in solvers:
@@ -101,4 +122,5 @@ def describe_here(job: tuple[list[tuple[str, dict[str, Any]]], Path | None], eve
             faults += error.faults
     if faults:
         raise InputError(faults)
+    refuse_other_copies(requirements)
     return {"found": [asdict(each) for each in found]}

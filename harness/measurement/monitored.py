@@ -57,6 +57,7 @@ class Monitored:
     function : of a module; called there (child.py) with `job` and an `Events` to report to.
     job : anything that can be pickled. threads : for linear algebra.
     phases : the limit on each phase, s; an event with `phase` starts the next one, of `times` that limit.
+    python : the interpreter (environments.py).
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class Monitored:
         threads: int,
         phases: Mapping[str, float],
         memory_limit_mib: float,
+        python: str = sys.executable,
     ) -> None:
         self.phases, self.memory_limit_mib = phases, memory_limit_mib
         self.arrived: list[Row] = []
@@ -78,7 +80,7 @@ class Monitored:
         events, events_of_child = os.pipe()
         try:
             self.process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "harness.measurement.child", function.__qualname__],
+                [python, "-P", "-m", "harness.measurement.child", function.__qualname__],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,

@@ -55,6 +55,8 @@ def run_task(task: Task, answers: Path) -> TaskResult:
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     if task.timed_out_on:
         reports = [{"status": "not_run", "message": f"too slow already on {task.timed_out_on}"}] * len(batch)
+    elif task.solver.failure:
+        reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
     elif batch[0].form in forms:
         reports = measure(batch, [answers / f"{m.stem}.npz" for m in batch])
     else:

@@ -57,7 +57,7 @@ def run(
     with waiting(console) as show:
         descriptions = describe(suite, show)
     suite = with_forms(suite, descriptions)
-    solvers = {(e.name, e.variant): d for e, d in zip(suite.solver, descriptions, strict=True)}
+    solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite) if key is None else of_key(expand(suite), key)
     refuse_limits_too_low(plan)
     with records.locked(directory):

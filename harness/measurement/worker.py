@@ -28,6 +28,7 @@ from solvers.base import Answer
 from solvers.registry import make_solver
 
 from .child import Events
+from .environments import interpreter
 from .monitored import Monitored
 from .stored_files import StoredFiles
 from .yardstick import yardstick
@@ -54,7 +55,8 @@ def measure(measurements: Sequence[Measurement], answers: Sequence[Path]) -> lis
     first, finished, row = measurements[0], list[Row](), Row()
     phases = {"start": START_S, "solve": first.time_limit_s * (first.batched or 1), "save": SAVE_S}
     job = measurements, answers
-    with Monitored(measure_here, job, first.threads, phases, first.memory_limit_mib) as process:
+    python = interpreter(first.requirements)
+    with Monitored(measure_here, job, first.threads, phases, first.memory_limit_mib, python) as process:
         for event in process:
             row |= event
             if "status" in event:

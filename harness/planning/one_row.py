@@ -14,7 +14,8 @@ from .suite import Suite
 def with_key(suite: Suite, key: str) -> Suite:
     """The suite with the scene and the solver entries that a row's key names. Raises InputError."""
     scenes = [scene for scene in suite.scenes if key.startswith(f"{read_scene(scene).name} ")]
-    entries = [entry for entry in suite.solver if entry.name in key.split()]
+    words = key.split()
+    entries = [e for e in suite.solver if {e.name, *e.label.split()} <= set(words)]
     if not scenes or not entries:
         raise _unknown(suite.name, key)
     return suite.model_copy(update={"scenes": scenes, "solver": entries})

@@ -14,6 +14,7 @@ from problems.input.bounded import resolved
 from problems.input.validation import unknown
 from problems.scene import read_scene
 from solvers.base import Form
+from solvers.registry import modules
 
 from .suite import Suite, resolved_scenes, suite_from
 
@@ -24,12 +25,14 @@ WORD = re.compile(r"[\w-]+")  # a text without quotes
 class Overrides:
     """What the command line changes in a suite; empty or None leaves it as it is.
 
-    options : "osqp.scaling=0", each with a value as in a suite file.
+    options : "osqp.scaling=0", each with a value as in a suite file. requirements : "piqp==0.6.2", or the
+    name alone for the version installed here.
     """
 
     sizes: tuple[int, ...] = ()
     scenes: tuple[str, ...] = ()
     solvers: tuple[str, ...] = ()
+    requirements: tuple[str, ...] = ()
     forms: tuple[Form, ...] = ()
     tolerances: tuple[float, ...] | Literal["auto"] = ()
     options: tuple[str, ...] = ()
@@ -45,7 +48,8 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     """The suite with the command line's changes. Raises InputError, all faults at once.
 
     --scene replaces the suite's scenes; --size keeps those of that size; --solver keeps those entries and
-    adds a default one for a solver that is not in the suite; --plugin adds its solver.
+    adds a default one for a solver that is not in the suite; --with does so for its library, and takes each
+    entry once in each version; --plugin adds its solver.
     """
     faults: list[Fault] = []
     data = suite.model_dump(exclude_none=True)
@@ -58,11 +62,16 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
             faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
         data["scenes"] = [scene for scene in data["scenes"] if sizes.get(scene) in change.sizes]
     plugin = str(resolved(change.plugin)) if change.plugin else suite.plugin
-    if change.solvers:
-        data["solver"] = [entry for entry in data["solver"] if entry["name"] in change.solvers]
+    versions = _versions(change, faults)
+    solvers = [*change.solvers, *(name for name in versions if name not in change.solvers)]
+    if solvers:
+        data["solver"] = [entry for entry in data["solver"] if entry["name"] in solvers]
     named = {entry["name"] for entry in data["solver"]}
-    own = [change.plugin.stem] if change.plugin and not change.solvers else []
-    data["solver"] += [{"name": name} for name in (*change.solvers, *own) if name not in named]
+    own = [change.plugin.stem] if change.plugin and not solvers else []
+    data["solver"] += [{"name": name} for name in (*solvers, *own) if name not in named]
+    data["solver"] = [
+        entry | asked for entry in data["solver"] for asked in versions.get(entry["name"], [{}])
+    ]
     changes = {
         "tolerances": change.tolerances if change.tolerances == "auto" else list(change.tolerances),
         "repeats": change.repeats,
@@ -85,6 +94,23 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     if faults:
         raise InputError(faults)
     return suite_from(data, Path("command line"))
+
+
+def _versions(change: Overrides, faults: list[Fault]) -> dict[str, list[dict[str, Any]]]:
+    """Of each solver whose library --with names, what the entry of each version says.
+
+    The solver has the library's name; if there is none, it is the only one that --solver names.
+    """
+    found: dict[str, list[dict[str, Any]]] = {}
+    for requirement in change.requirements:
+        library, equals, version = requirement.partition("==")
+        if not WORD.fullmatch(library) or bool(equals) != bool(version):
+            allowed = "NAME==VERSION, as piqp==0.6.2, or NAME alone for the version installed here"
+            faults.append(Fault("--with", "with", requirement, allowed))
+        other = len(change.solvers) == 1 and library not in modules()
+        solver = change.solvers[0] if other else library
+        found.setdefault(solver, []).append({"with": [requirement] if version else None})
+    return found
 
 
 def _set_options(entries: list[dict[str, Any]], options: Sequence[str], faults: list[Fault]) -> None:

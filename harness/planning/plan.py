@@ -30,6 +30,7 @@ class Measurement:
     scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
     searched, paced : it may turn out to need no measuring (search.py).
     stop : why its time limit is tighter than the suite's, or "" (stopping.py).
+    requirements : what its environment has in other versions than this one.
     """
 
     suite: str
@@ -56,6 +57,7 @@ class Measurement:
     paced: bool = False
     stop_at_times_fastest: float | None = None
     stop: str = ""
+    requirements: tuple[str, ...] = ()
 
     @property
     def process(self) -> tuple[object, ...]:
@@ -158,8 +160,9 @@ def _of_entry(
             source=source,
             solver=entry.name,
             form=form,
-            variant=entry.variant,
+            variant=entry.label,
             options=entry.options,
+            requirements=tuple(entry.requirements or ()),
             tolerance=tolerance,
             threads=threads,
             repeat=repeat,

@@ -11,12 +11,23 @@ forms = ["dual"]
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, JsonValue, PositiveInt, Tag, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    JsonValue,
+    PositiveInt,
+    Tag,
+    ValidationError,
+)
 
 from problems.drawn import EXAMPLES, drawn_names
 from problems.errors import Fault, InputError
@@ -37,16 +48,27 @@ Tolerances = Annotated[Annotated[list[Positive], NonEmpty, Tag(VALUE)] | Auto, D
 Cases = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
+def pinned(requirement: str) -> str:
+    """A package in one version. Raises ValueError."""
+    if not re.fullmatch(r"[A-Za-z0-9][\w.-]*==[\w.!+-]+", requirement):
+        raise ValueError("must be NAME==VERSION, as piqp==0.6.2")
+    return requirement
+
+
+Requirement = Annotated[str, AfterValidator(pinned)]
+
+
 class SolverEntry(BaseModel):
     """One [[solver]]: its name and options, and what it is measured on.
 
     The default of `forms` is the dual, or the primal if the solver takes no other. `threads` and `cases`
     override the suite's. "auto" as tolerances searches for the loosest decade that reaches the limit on each
     scene, as repeats it repeats what is quick (see search.py). batched : load cases of a series solved at
-    once, by the solver's `batched`.
+    once, by the solver's `batched`. with = ["piqp==0.6.2"] measures it in an environment that has this
+    version of its library, and what else is listed.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, serialize_by_alias=True)
 
     name: str
     forms: Annotated[list[Form], NonEmpty] | None = None
@@ -60,6 +82,17 @@ class SolverEntry(BaseModel):
     batched: PositiveInt | None = None
     gated: bool = True
     time_limit_s: Positive | None = None
+    requirements: Annotated[list[Requirement] | None, NonEmpty, Field(alias="with")] = None
+
+    @property
+    def version(self) -> str:
+        """What `with` asks for, without the solver's own name: "0.6.2", "proxsuite==0.7.2"; "" if nothing."""
+        return " ".join(self.requirements or ()).removeprefix(f"{self.name}==")
+
+    @property
+    def label(self) -> str:
+        """What tells its rows from those of other entries for the solver: the variant and the version."""
+        return f"{self.variant} {self.version}".strip()
 
 
 class RandomCases(BaseModel):
@@ -203,12 +236,16 @@ def _unknown_solvers(data: dict[str, Any], path: Path) -> list[Fault]:
 
 def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
     """Entries that could not be distinguished in a table."""
-    above: dict[tuple[str, str], tuple[object, bool]] = {}
+    above: dict[tuple[str, str], dict[str, object]] = {}
     for k, entry in enumerate(suite.solver):
-        setting = entry.options, entry.batched is not None
-        if above.setdefault((entry.name, entry.variant), setting) != setting:
-            what = "options" if above[entry.name, entry.variant][0] != entry.options else "`batched`"
-            allowed = f"{entry.name} has other {what} under this variant above; choose another variant"
+        setting: dict[str, object] = {
+            "options": entry.options,
+            "`with`": entry.requirements,
+            "`batched`": entry.batched is not None,
+        }
+        first = above.setdefault((entry.name, entry.label), setting)
+        if other := [what for what in setting if first[what] != setting[what]]:
+            allowed = f"{entry.name} has other {other[0]} under this variant above; choose another variant"
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
 
 

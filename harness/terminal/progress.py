@@ -18,7 +18,7 @@ STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no
 #: Heading, width (negative: left-aligned), content.
 COLUMNS = [
     ("scene", -23, lambda row: row["scene"]),
-    ("solver", -14, lambda row: f"{row['solver']} {row['variant']}".strip()),
+    ("solver", -16, lambda row: f"{row['solver']} {row['variant']}".strip()),
     ("form", -6, lambda row: row["form"]),
     ("tol", 6, lambda row: f"{row['tolerance']:.0e}"),
     ("thr", 3, lambda row: str(row["threads_asked"])),

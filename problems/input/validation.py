@@ -49,7 +49,8 @@ def _allowed(item: Any, model: type[BaseModel]) -> str:
     match item["type"]:
         case "extra_forbidden":
             *above, key = item["loc"]
-            return unknown("key", key, list(_table(model, above).model_fields))
+            fields = _table(model, above).model_fields
+            return unknown("key", key, [field.alias or name for name, field in fields.items()])
         case "missing":
             return "required"
         case "too_short" | "too_long" as wrong:

@@ -10,6 +10,7 @@ from report.document.numbers import counted, listed
 from report.results.reader import Results
 
 from .code import code_warnings
+from .versions import asked_for
 
 
 def warnings(results: Results) -> list[str]:
@@ -56,7 +57,7 @@ def planned_measurements(suite: dict[str, Any]) -> int:
         scenes = [s for s in suite.get("scenes", []) if any(fnmatchcase(s, glob) for glob in patterns)]
         tolerances = solver.get("tolerances", suite.get("tolerances", [None]))
         tolerances = [tolerances] if tolerances == "auto" else tolerances
-        what = [(solver.get("name"), solver.get("variant", ""))]
+        what = [(solver.get("name"), solver.get("variant", ""), *solver.get("with", []))]
         rounds = solver.get("repeats", suite.get("repeats", 1))
         repeats = range(1 if rounds == "auto" else rounds)
         threads = solver.get("threads", suite.get("threads", [None]))
@@ -67,7 +68,7 @@ def planned_measurements(suite: dict[str, Any]) -> int:
 
 
 def _versions(results: Results) -> list[str]:
-    rows = results.rows[results.rows["solver_version"] != ""]
+    rows = results.rows[(results.rows["solver_version"] != "") & ~asked_for(results.rows)]
     found = []
     for solver, versions in rows.groupby("solver")["solver_version"].unique().items():
         if len(versions) > 1:

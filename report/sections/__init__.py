@@ -26,6 +26,7 @@ from . import (
     series,
     speed,
     summary,
+    versions,
 )
 
 About = Literal["scenes", "ladders", "drawn", "all"]
@@ -37,6 +38,7 @@ SECTIONS: list[tuple[About, Callable[[Results], Section | None]]] = [
     ("scenes", outside.section),
     ("scenes", summary.advice),
     ("scenes", summary.summary),
+    ("all", versions.section),
     ("scenes", speed.from_scene),
     ("scenes", speed.steps),
     ("scenes", speed.relative),

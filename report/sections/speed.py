@@ -17,6 +17,7 @@ from report.analysis.precision import judged, with_errors
 from report.analysis.roads import LOAD_CASES, STAGES, roads
 from report.analysis.seconds import seconds_text
 from report.analysis.standings import best_tolerances, shown
+from report.analysis.versions import asked_for
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, counted, significant, spread, whole
 from report.figures import style
@@ -246,7 +247,7 @@ def steps(results: Results) -> Section | None:
 def variants(results: Results) -> Section | None:
     """A solver without one of its ingredients, relative to the complete solver."""
     cells = results.cells_by_threads()
-    cells = cells[cells["status"] != "unsupported"]
+    cells = cells[(cells["status"] != "unsupported") & ~asked_for(cells)]
     keys = ["solver", "form", "scene", "threads", "tolerance"]
     plain = cells[(cells["variant"] == "") & (cells["verdict"] == "within")]
     both = cells[cells["variant"] != ""].merge(plain, on=keys, suffixes=("", "_plain"))

@@ -7,6 +7,7 @@ import pytest
 import tiny
 
 from harness.planning.memory import refuse_limits_too_low
+from harness.planning.one_row import with_key
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand
 from harness.planning.suite import Suite, read_suite, suite_from, suite_names, to_toml, validated
@@ -215,3 +216,53 @@ def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
     tiny.write_problem(tmp_path / "other" / "tiny.npz")
     with pytest.raises(InputError, match="another is called tiny too"):
         plan_of(tmp_path, scenes=["tiny.npz", "other/tiny.npz"])
+
+
+# Versions of a library.
+
+
+def versions_asked(tmp_path: Path, *requirements: str, **more: tuple[str, ...]) -> list[tuple[str, str, str]]:
+    suite = overridden(
+        read_suite(str(tiny.write_suite(tmp_path, TWO))), Overrides(requirements=requirements, **more)
+    )
+    assert suite_from(tomllib.loads(to_toml(suite)), tmp_path / "small.toml") == suite
+    return [(e.name, e.label, e.version) for e in suite.solver]
+
+
+def test_each_version_is_an_entry_of_its_own(tmp_path: Path) -> None:
+    """--with keeps the library's entries only, and adds a library that is not in the suite."""
+    assert versions_asked(tmp_path, "piqp==0.6.2", "piqp", "clarabel==0.10.0") == [
+        ("piqp", "plain 0.6.2", "0.6.2"),
+        ("piqp", "plain", ""),
+        ("clarabel", "0.10.0", "0.10.0"),
+    ]
+    assert versions_asked(tmp_path, "proxsuite==0.7.2", solvers=("proxqp",)) == [
+        ("proxqp", "proxsuite==0.7.2", "proxsuite==0.7.2")
+    ]
+    assert versions_asked(tmp_path, "piqp==0.6.2", solvers=("exact",)) == [
+        ("exact", "", ""),
+        ("piqp", "plain 0.6.2", "0.6.2"),
+    ]
+
+
+def test_a_version_is_part_of_what_a_row_is_of(tmp_path: Path) -> None:
+    text = TWO + 'with = ["piqp==0.6.2", "numpy==2.1.0"]\n'
+    plan = expand(read_suite(str(tiny.write_suite(tmp_path, text))))
+    assert plan[-1].key == "tiny piqp primal plain 0.6.2 numpy==2.1.0 tol=1e-06 threads=1 repeat=0"
+    assert plan[-1].requirements == ("piqp==0.6.2", "numpy==2.1.0")
+    (entry,) = with_key(read_suite(str(tmp_path / "small.toml")), plan[-1].key).solver
+    assert entry.label == "plain 0.6.2 numpy==2.1.0"
+
+
+@pytest.mark.parametrize("requirement", ["piqp>=0.6", "piqp==", "==1.0", "--index-url=x", "piqp==0.6.*"])
+def test_a_version_is_exact(tmp_path: Path, requirement: str) -> None:
+    with pytest.raises(InputError, match=r"NAME==VERSION, as piqp==0\.6\.2"):
+        versions_asked(tmp_path, requirement)
+    with pytest.raises(InputError, match=r"solver.1.with.*must be NAME==VERSION"):
+        read_suite(str(tiny.write_suite(tmp_path, TWO + f'with = ["{requirement}"]\n')))
+
+
+def test_versions_that_could_not_be_told_apart_are_refused(tmp_path: Path) -> None:
+    other = '[[solver]]\nname = "piqp"\nvariant = "plain 0.6.2"\n'
+    with pytest.raises(InputError, match="other `with` under this variant"):
+        read_suite(str(tiny.write_suite(tmp_path, TWO + 'with = ["piqp==0.6.2"]\n' + other)))

@@ -1,0 +1,105 @@
+"""Environments with other versions of a library than this one has, as `run --with piqp==0.6.2` asks for.
+
+Each is a virtual environment in the cache, made by venv and pip. Behind its own packages it sees those of
+this interpreter, so that it differs in what was asked for and what that pulls in, and in nothing else.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import site
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable, Sequence
+from importlib.metadata import distribution
+from pathlib import Path
+
+from problems.errors import InputError
+from problems.storage import cache
+
+#: Read after the .pth files of packages, whose folders come before those it adds.
+PARENT = "zzz-parent.pth"
+#: Where packages made by cmeel are, such as proxsuite. The .pth of cmeel adds only the folder beside cmeel.
+CMEEL = "cmeel.prefix/lib/python{}.{}/site-packages".format(*sys.version_info)
+COMPLETE = "complete"
+POLL_S = 0.2
+LAST_LINES = 5  # of what pip prints
+
+
+def interpreter(requirements: Sequence[str], doing: Callable[[str], None] = lambda text: None) -> str:
+    """The Python that has these packages, each NAME==VERSION; without any, this one.
+
+    The first call makes the environment, later ones find it. doing : called with what is being installed,
+    again and again. Raises InputError if pip fails; then there is no environment.
+    """
+    if not requirements:
+        return sys.executable
+    key = f"{requirements[0]}-{cache.digest(list(requirements), sys.version, _packages())}"
+    folder = cache.root() / key
+    python = folder / "bin" / "python"
+    with cache.lock(key):
+        if not ((folder / COMPLETE).is_file() and python.exists()):  # else one was cut off, or its base moved
+            shutil.rmtree(folder, ignore_errors=True)
+            try:
+                _make(folder, python, requirements, doing)
+            except BaseException:
+                shutil.rmtree(folder, ignore_errors=True)
+                raise
+            (folder / COMPLETE).touch()
+    return str(python)
+
+
+def _make(folder: Path, python: Path, requirements: Sequence[str], doing: Callable[[str], None]) -> None:
+    what = f"installing {' '.join(requirements)}"
+    known = ["--without-pip"] if importlib.util.find_spec("pip") else []  # it sees that of this interpreter
+    _called([sys.executable, "-m", "venv", *known, str(folder)], requirements, lambda: doing(what))
+    own = sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)})
+    lines = [f"import site; site.addsitedir({folder!r})" for folder in _packages()]
+    (Path(own) / PARENT).write_text("\n".join([CMEEL, *lines, ""]), "utf-8")
+    pip = [str(python), "-I", "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
+    # First what is asked for, even if this interpreter has it; then what that needs and nobody has.
+    for more in (["--ignore-installed", "--no-deps"], []):
+        _called([*pip, *more, *requirements], requirements, lambda: doing(what))
+
+
+def _packages() -> list[str]:
+    """The folders of this interpreter's packages."""
+    return [*site.getsitepackages(), *([site.getusersitepackages()] if site.ENABLE_USER_SITE else [])]
+
+
+def refuse_other_copies(requirements: Sequence[str]) -> None:
+    """In an environment: raise InputError if a package was imported from elsewhere, as by PYTHONPATH."""
+    imported = [str(getattr(module, "__file__", None)) for module in sys.modules.values()]
+    for requirement in requirements:
+        library, _, version = requirement.partition("==")
+        installed = distribution(library)
+        for file in installed.files or ():
+            own = str(installed.locate_file(file))
+            if other := next((each for each in imported if each.endswith(f"/{file}") and each != own), None):
+                raise InputError.one("--with", library, version, f"another copy is imported: {other}")
+
+
+def _called(command: Sequence[str], requirements: Sequence[str], doing: Callable[[], None]) -> None:
+    """Wait for a command. Raises InputError with the end of what it printed if it fails."""
+    nothing, pipe, same = subprocess.DEVNULL, subprocess.PIPE, subprocess.STDOUT
+    with subprocess.Popen(
+        command, stdin=nothing, stdout=pipe, stderr=same, text=True, errors="replace"
+    ) as process:
+        try:
+            while True:
+                try:
+                    printed, _ = process.communicate(timeout=POLL_S)
+                    break
+                except subprocess.TimeoutExpired:
+                    doing()
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode:
+        library, _, version = requirements[0].partition("==")
+        allowed = f"pip cannot install it: `pip index versions {library}` lists all; run again to retry"
+        said = [line.strip() for line in printed.splitlines() if line.strip()]
+        last = [line for line in said if not line.startswith("WARNING")][-LAST_LINES:]
+        raise InputError.one("--with", library, version, "\n".join([allowed, *last]))
