@@ -6,13 +6,10 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import psutil
 import pytest
 import tiny
@@ -21,16 +18,10 @@ from rich.console import Console
 import harness.conformance.isolated as isolated
 import harness.measurement.describe as describing
 import harness.terminal.waiting as waiting_module
-from harness import InputError, own_matrices, solve, solve_series
-from harness.conformance.check import run as check_here
-from harness.conformance.known_problems import known_problems
+from harness import InputError
 from harness.measurement.describe import describe
 from harness.planning.suite import read_suite
 from harness.results import records
-from harness.solving.answers import LARGEST_DETAILS, InvalidAnswer, checked
-from problems.forms.assembly import LoadCase
-from problems.forms.problem import in_form
-from solvers.base import Answer, Problem, Solver
 
 pytestmark = pytest.mark.slow
 
@@ -233,102 +224,6 @@ def test_a_check_that_lasts_says_what_it_is_doing(tmp_path: Path, monkeypatch: p
     assert log.getvalue() == "mine: no faults\n"
 
 
-class Odd(Exception):
-    def __str__(self) -> str:
-        raise ValueError("no words")
-
-
-class Raising:
-    def __array__(self, *arguments: Any, **options: Any) -> Any:
-        raise Odd
-
-    def __repr__(self) -> str:
-        raise ValueError("no text")
-
-
-def nested(depth: int) -> list[Any]:
-    deep: list[Any] = []
-    for _ in range(depth):
-        deep = [deep]
-    return deep
-
-
-LAM = np.ones(1)
-#: What an answer may not hold, and what is said of it.
-WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "complex": ({"lam": LAM + 0j}, "wanted real numbers"),
-    "objects": ({"lam": LAM.astype(object)}, "wanted real numbers"),
-    "text": ({"lam": np.array(["1"])}, "wanted real numbers"),
-    "truth": ({"lam": LAM > 0}, "wanted real numbers"),
-    "dates": ({"lam": LAM.astype("m8[s]")}, "wanted real numbers"),
-    "masked": ({"lam": np.ma.masked_array(LAM, [True])}, "wanted real numbers"),
-    "ragged": ({"lam": [[1.0], [1.0, 2.0]]}, "no array"),
-    "scalar": ({"lam": 1.0}, "has shape ()"),
-    "column": ({"lam": LAM[:, None]}, "has shape (1, 1)"),
-    "empty": ({"lam": LAM[:0]}, "has shape (0,)"),
-    "complex x": ({"x": np.ones(2) + 1e-30j}, "wanted real numbers"),
-    "overflow": ({"lam": np.full(1, 1e4000, dtype=np.longdouble)}, "NaN or infinity"),
-    "status": ({"status": np.array(["solved", "solved"])}, "status array("),
-    "no status": ({"status": None}, "status None"),
-    "word": ({"iterations": "five"}, "iterations is 'five'"),
-    "fraction": ({"iterations": 1.5}, "iterations is 1.5"),
-    "NaN count": ({"inner_iterations": np.nan}, "inner_iterations is nan"),
-    "huge count": ({"iterations": 10**400}, "iterations is 1000"),
-    "unprintable": ({"iterations": 10**5000}, "iterations is a int"),
-    "negative": ({"inner_iterations": -1}, "inner_iterations is -1"),
-    "no repr": ({"iterations": Raising()}, "iterations is a Raising"),
-    "seconds": ({"reported_s": "fast"}, "reported_s is 'fast'"),
-    "NaN seconds": ({"reported_s": np.nan}, "reported_s is nan"),
-    "huge seconds": ({"reported_s": 10**400}, "reported_s is 1000"),
-    "list": ({"details": [1]}, "details is [1]"),
-    "deep": ({"details": {"a": nested(100_000)}}, "details is not JSON"),
-    "huge number": ({"details": {"a": 10**400}}, "an integer of 401 digits"),
-    "longer number": ({"details": {"a": 10**5000}}, "details is not JSON"),
-    "half a letter": ({"details": {"a": "\ud800"}}, "details is not JSON"),
-}
-
-
-def smallest() -> Problem:
-    return in_form(known_problems()[0].prepared, "dual")
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_an_answer_that_is_none_is_refused_by_the_gate_and_named_by_check(name: str) -> None:
-    change, said = WRONG[name]
-    with pytest.raises(InvalidAnswer, match=re.escape(said)):
-        checked(replace(Answer("solved", LAM), **change), smallest())
-
-    class Spoilt(Solver):
-        forms = ("dual",)
-
-        def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
-            return replace(Answer("solved", np.zeros(len(load.p))), **change)
-
-    words = "\n".join(map(str, check_here(Spoilt)))
-    assert {"dates": "lam is", "x": "x is"}.get(name, next(iter(change))) in words
-
-
-def test_an_array_whose_conversion_raises_is_refused() -> None:
-    with pytest.raises(ValueError, match="no words"):  # the exception itself cannot be shown
-        str(Odd())
-    with pytest.raises(InvalidAnswer, match="lam is no array"):
-        checked(Answer("solved", Raising()), smallest())  # type: ignore[arg-type]
-
-
-def test_the_gate_makes_plain_types_that_nobody_can_change() -> None:
-    lam = np.ones(1, dtype=np.float32)
-    given = Answer("solved", lam, [1, 2], np.int32(3), None, np.float32(0.5), {"a": np.ones(2)})  # type: ignore[arg-type]
-    found = checked(given, smallest())
-    assert [found.lam.dtype, found.x.dtype] == [np.float64] * 2
-    assert [type(found.iterations), type(found.reported_s), found.details] == [int, float, {"a": [1.0, 1.0]}]
-    lam[:] = 7
-    assert found.lam == [1]
-    with pytest.raises(ValueError, match="read-only"):
-        found.lam[0] = 7
-    large = checked(replace(given, details={"a": "x" * LARGEST_DETAILS}), smallest())
-    assert large.details.keys() == {"dropped"}
-
-
 #: What breaks the contract, and what is said of it; the last one spoils the cache.
 BREACHES = {
     "Answer('solved', lam + 1j)": "wanted real numbers",
@@ -353,20 +248,3 @@ def test_a_run_goes_on_after_a_solver_that_breaks_the_contract(tmp_path: Path) -
     assert {(row["status"], row["verdict"]) for row in rows} == {("failed", "no_answer")}
     for row, said in zip(rows, BREACHES.values(), strict=True):
         assert said in row["message"]
-
-
-def test_the_api_refuses_what_the_gate_refuses(tmp_path: Path) -> None:
-    class Complex(Solver):
-        forms = ("dual",)
-
-        def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
-            return Answer("solved", np.zeros(len(load.p)) + 1j)
-
-    with np.load(tiny.write_problem(tmp_path / "tiny.npz")) as given:
-        scene = own_matrices(**given)
-        case = LoadCase(given["f"], given["g"])
-    with pytest.raises(InputError, match="wanted real numbers"):
-        solve(scene, Complex())
-    (result,) = solve_series(scene, [case], Complex())
-    assert (result.row["status"], result.gap) == ("failed", None)
-    assert "wanted real numbers" in result.row["message"]
