@@ -31,10 +31,10 @@ from problems.scene import read_scene
 from . import allowed_gap, solution
 from .atomic_output import atomic_output, list_files
 from .fastener_forces import fastener_forces
-from .few_digits import digits_sentence
 from .layout import layout
 from .ledger import ledger, not_called_for
 from .outcome import save, show
+from .own_matrices import digits_sentence
 from .solution import Solution
 
 

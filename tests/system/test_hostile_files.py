@@ -21,7 +21,8 @@ from harness.planning.suite import read_written
 from harness.results import records, series_file
 from harness.results.kinds import refuse_unreadable
 from harness.results.schema import SERIES
-from harness.scene.exchange import import_, matrices
+from harness.scene.export import matrices
+from harness.scene.matrix_import import import_
 from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
