@@ -1,4 +1,4 @@
-"""Runs of a suite in this process: what they say, their rows, answers that were moved."""
+"""Runs of a suite: what they say, their rows, answers that were moved, and the processes that they leave."""
 
 import time
 from io import StringIO
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 from rich.console import Console
 
 from harness.results import records, series_file
@@ -53,3 +54,24 @@ def wait_for(condition: Any) -> Any:
         assert time.monotonic() < deadline, "waited too long"
         time.sleep(0.01)
     return found
+
+
+def processes(cache: Path) -> list[psutil.Process]:
+    """Those that were started with this cache, which marks a test's own."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            ours = process.environ().get("RIVETBENCH_CACHE") == str(cache)
+            if ours and process.status() != psutil.STATUS_ZOMBIE:
+                found.append(process)
+        except psutil.Error:
+            continue
+    return found
+
+
+def all_end(cache: Path) -> bool:
+    """Whether no process is left; the killed ones take a moment."""
+    deadline = time.monotonic() + 5
+    while processes(cache) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return not processes(cache)
