@@ -13,44 +13,12 @@ from typing import TYPE_CHECKING, Any
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 if TYPE_CHECKING:
-    from harness.api import (
-        Answer,
-        InputError,
-        Judgement,
-        LoadCase,
-        Scene,
-        Solution,
-        Solver,
-        check_solver,
-        judge,
-        load_scene,
-        own_matrices,
-        random_gaps,
-        solve,
-        solve_dual,
-        solve_series,
-    )
-
-__all__ = [
-    "Answer",
-    "InputError",
-    "Judgement",
-    "LoadCase",
-    "Scene",
-    "Solution",
-    "Solver",
-    "check_solver",
-    "judge",
-    "load_scene",
-    "own_matrices",
-    "random_gaps",
-    "solve",
-    "solve_dual",
-    "solve_series",
-]
+    from harness.api import *  # noqa: F403
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:
-        return getattr(importlib.import_module("harness.api"), name)
+    if name == "__all__" or not name.startswith("_"):
+        api = importlib.import_module("harness.api")
+        if name in ("__all__", *api.__all__):
+            return getattr(api, name)
     raise AttributeError(f"module 'harness' has no attribute {name!r}")

@@ -6,4 +6,7 @@ from harness.cli.app import app
 
 
 def harness(*words: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, words)])
+    """It ends with an exit code, not with a traceback."""
+    done = CliRunner().invoke(app, [*map(str, words)])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done

@@ -18,7 +18,7 @@ from harness.cli.app import app
 from harness.measurement.run import run
 from harness.planning.suite import read_suite
 from harness.results import records
-from harness.scene.exchange import matrices
+from harness.scene.export import matrices
 from problems import formats
 
 QUIET = Console(file=StringIO())

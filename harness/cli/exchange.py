@@ -50,21 +50,12 @@ def export(
     Exit codes: 0 written, 2 wrong usage or bad input.
     """
     with error_reporting(SAFE, INTERRUPTED) as console:
-        from harness.scene.exchange import export as export_scene
-        from harness.scene.exchange import places
-        from harness.scene.form_export import export_form
-        from problems.errors import InputError
+        from harness.scene.export import export as export_scene
+        from harness.scene.export import places
 
-        if format is None and form is None:
-            raise InputError.one("export", "--format", None, "is needed without --form; see `list formats`")
-        if with_reference and form is None:
-            raise InputError.one("--with-reference", "form", None, "needs --form: primal, dual or sparse")
         taken: Any = form.value if form else None
-        for source, path in places(scene, out, format or "mtx"):
-            if form is None:
-                export_scene(source, format or "", path, console)
-            else:
-                export_form(source, taken, format, path, console, with_reference, reference_limit)
+        for source, path in places(scene, out, format or ("mtx" if form else None)):
+            export_scene(source, format, path, console, taken, with_reference, reference_limit)
 
 
 @app.command("import")
@@ -91,7 +82,7 @@ def import_(
     Exit codes: 0 read and written, 2 wrong usage or bad input.
     """
     with error_reporting(SAFE, INTERRUPTED) as console:
-        from harness.scene.exchange import import_ as import_files
+        from harness.scene.matrix_import import import_ as import_files
 
         import_files(files, out, console)
 

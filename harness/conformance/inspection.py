@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 
-from harness.solving.answers import InvalidAnswer, checked, is_count, is_seconds, shown
+from harness.solving.answers import examined
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
-from solvers.base import Answer, Form, Status
+from solvers.base import Answer, Form
 
 from .known_problems import KnownCase, KnownProblem
 
@@ -35,81 +33,36 @@ class Finding:
 
 def inspect(answer: Answer, known: KnownProblem, case: KnownCase, form: Form) -> Iterator[Finding]:
     """What is wrong with the answer to a case at TOLERANCE."""
-    where = f"{known.name}, {case.name}"
+    where, problem = f"{known.name}, {case.name}", in_form(known.prepared, form)
 
     def finding(wrong: str, fix: str) -> Finding:
         return Finding(form, where, wrong, fix)
 
+    plain, faults = examined(answer, problem)
+    for fault in faults:
+        yield finding(str(fault), fault.fix)
     if not isinstance(answer, Answer):
-        yield finding(f"solve returned {type(answer).__name__}", "Return a solvers.base.Answer")
         return
-    if not isinstance(answer.status, str) or answer.status not in get_args(Status):
-        yield finding(f"status is {shown(answer.status)}", f"Use one of {', '.join(get_args(Status))}")
-        if not isinstance(answer.status, str):
-            return
-    yield from (facts := list(_wrong_facts(answer, finding)))
-    yield from (shape_faults := list(_wrong_arrays(answer, known, form, finding)))
-    if shape_faults or answer.lam is None:
+    for name in problem.needs:
+        if getattr(answer, name) is None:
+            fix = "The problem is small and easy: return λ, and x in all forms but the dual"
+            yield finding(f'{name} is None, status "{plain.status}"', fix)
+    for name in ("lam", "x"):
+        given = getattr(answer, name)
+        if getattr(plain, name) is not None and getattr(given, "dtype", None) != np.float64:
+            kind = getattr(given, "dtype", type(given).__name__)
+            yield finding(f"{name} is {kind}", f"Return {name} in double precision: a numpy array of float64")
+    if plain.lam is None:
         return
-    try:
-        checked(answer, in_form(known.prepared, form))
-    except InvalidAnswer as error:
-        if not facts and answer.status in get_args(Status):
-            yield finding(f"a measurement refuses it: {error}", "Return plain numbers")
-    wrong = list(_wrong_values(answer, answer.lam, known, case, finding))
+    wrong = list(_wrong_values(plain, plain.lam, known, case, finding))
     yield from wrong
-    smallest = float(answer.lam.min())
+    smallest = float(plain.lam.min())
     if not wrong and smallest < -10 * TOLERANCE:
         yield finding(f"λ is as low as {smallest:.3g} N", "Contacts only push: λ ≥ 0 in both forms")
 
 
-NewFinding = Callable[[str, str], Finding]
-
-
-def _wrong_facts(answer: Answer, finding: NewFinding) -> Iterator[Finding]:
-    for name in ("iterations", "inner_iterations"):
-        value = getattr(answer, name)
-        if value is not None and not is_count(value):
-            yield finding(f"{name} is {shown(value)}", "Give a whole number, or None")
-    if answer.reported_s is not None and not is_seconds(answer.reported_s):
-        yield finding(f"reported_s is {shown(answer.reported_s)}", "Give seconds as a float, or None")
-    try:
-        json.dumps(answer.details)
-    except Exception as error:  # also of a class of the user's, or too deep
-        yield finding(f"details is not JSON ({error})", "Put only numbers, text, lists and dicts there")
-
-
-def _wrong_arrays(answer: Answer, known: KnownProblem, form: Form, finding: NewFinding) -> Iterator[Finding]:
-    n, m = known.prepared.assembly.n, known.prepared.assembly.m
-    if answer.lam is None:
-        if answer.status == "solved":
-            yield finding('status is "solved" but lam is None', "Return λ, or a status that says it failed")
-        else:
-            yield finding(f'no answer, status "{answer.status}"', "The problem is small and easy: solve it")
-        return
-    arrays = [("lam", answer.lam, m)]
-    if "x" in in_form(known.prepared, form).needs and answer.x is None:
-        yield finding("x is None", "Return the displacements; only the dual form may leave them out")
-    elif answer.x is not None:
-        arrays.append(("x", answer.x, n))
-    for name, array, size in arrays:
-        if not isinstance(array, np.ndarray) or array.dtype != np.float64:
-            kind = getattr(array, "dtype", type(array).__name__)
-            yield finding(f"{name} is {kind}", "Return a numpy array of float64")
-        elif array.shape != (size,):
-            yield finding(
-                f"{name} has the shape {array.shape}", f"It must be ({size},): one per {_UNIT[name]}"
-            )
-        elif not np.isfinite(array).all():
-            claim = ', and yet status is "solved"' if answer.status == "solved" else ""
-            yield finding(f"{name} has NaN or infinite values{claim}", "Return lam=None and failed instead")
-
-
-_UNIT = {"lam": "contact (m)", "x": "unknown (n)"}
-
-
 def _wrong_values(
-    answer: Answer, lam: Vector, known: KnownProblem, case: KnownCase, finding: NewFinding
+    answer: Answer, lam: Vector, known: KnownProblem, case: KnownCase, finding: Callable[[str, str], Finding]
 ) -> Iterator[Finding]:
     """Compare x with the known displacements, and so K⁻¹(f − Aλ), which follows from λ."""
     load, prepared = case.load, known.prepared

@@ -20,7 +20,7 @@ RECORD = "solution.json"  # of an answer
 def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     """A path beside `out` to write a file or a folder to; at the end of the block it moves to `out`.
 
-    Files of the same names are replaced, and those that an older answer left (see `list_files`) removed;
+    Files of the same names are replaced, and those that an older answer left (see `write_record`) removed;
     whatever the block raises, nothing has changed. Raises InputError if `out` is no regular file or folder,
     is of the other kind, or is one of the inputs.
     """
@@ -44,11 +44,10 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
             new.replace(target)
 
 
-def list_files(folder: Path, record: dict[str, Any]) -> None:
-    """Write the record into folder/solution.json, with the names of all files there under `files`."""
-    path = folder / RECORD
+def write_record(folder: Path, record: dict[str, Any]) -> None:
+    """Write folder/solution.json, with the names of all files there under `files`."""
     names = sorted({RECORD, *(each.name for each in folder.iterdir())})
-    replace_text(path, to_line(record | {"files": names}) + "\n")
+    replace_text(folder / RECORD, to_line(record | {"files": names}) + "\n")
 
 
 def _listed(folder: Path) -> set[Path]:

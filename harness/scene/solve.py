@@ -14,13 +14,17 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
 from harness.results.machine import machine, resident_mib
 from harness.results.provenance import provenance
 from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.gap_error import GapError
+from harness.verification.judge import LIMIT_MM
+from harness.verification.reference import UNPROVEN
 from problems.errors import InputError
 from problems.forms.names import Form
 from problems.model.effect import SpringEffect
@@ -29,12 +33,11 @@ from problems.model.scene import JointScene, MatricesScene
 from problems.scene import read_scene
 
 from . import allowed_gap, solution
-from .atomic_output import atomic_output, list_files
+from .atomic_output import atomic_output, write_record
 from .fastener_forces import fastener_forces
-from .few_digits import digits_sentence
 from .layout import layout
 from .ledger import ledger, not_called_for
-from .outcome import save, show
+from .own_matrices import digits_sentence
 from .solution import Solution
 
 
@@ -69,20 +72,21 @@ def solve(
         doing=lambda step: console.status(Text(step)),
         said=lambda sentence: console.print(Text(f"{sentence}.", style="yellow")),
     )
-    assembly, load, x = found.problem.prepared.assembly, found.problem.load, found.unknowns
+    assembly = found.problem.prepared.assembly
     record = _record(found, list(built), solver)
     if allow_gap_mm is not None:
-        uncertainty = GapError.of(assembly)(load.g, x, found.error_bound_mm)
+        uncertainty = GapError.of(assembly)(found.problem.load.g, found.unknowns, found.error_bound_mm)
         record["allowed_gap"] = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
-    show(record, console)
+    _show(record, console)
     try:
         with console.status(Text("pictures and files")), atomic_output(out, [Path(source)]) as new:
             from report.writers.solution import write  # slow to import: not before the answer is shown
 
             new.mkdir()
-            save(new, record, assembly, load, x, found.lam)
+            np.savez(new / "solution.npz", **_arrays(found))
+            write_record(new, record)
             written = out / write(new).name
-            list_files(new, record)
+            write_record(new, record)  # with the files that were added
     except OSError as error:
         raise InputError.one("--out", "directory", str(out), f"cannot be written: {error}") from error
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
@@ -90,6 +94,15 @@ def solve(
     if allow_gap_mm is not None:
         code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
     return code
+
+
+def _arrays(found: Solution) -> dict[str, Any]:
+    """DIR/solution.npz: of x and A, what is asked for."""
+    assembly = found.problem.prepared.assembly
+    A, nodes = assembly.asked_contacts, assembly.asked_nodes
+    arrays = {"x": found.x, "lam": found.lam, "gap_before": found.problem.load.g, "gap_after": found.gap}
+    arrays |= {"A_data": A.data, "A_indices": A.indices, "A_indptr": A.indptr}
+    return arrays if nodes is None else arrays | {"nodes": nodes, "contact_nodes": assembly.contact_nodes}
 
 
 def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, Any]:
@@ -152,3 +165,27 @@ def _skipped(found: Solution, built: list[str], condensed: bool, solver: str | N
             yield "condensing loads: none acts beyond the junction"
         if others := not_called_for(scene):
             yield f"effects that the scene does not name, not imported: {', '.join(others)}"
+
+
+def _show(record: dict[str, Any], console: Console) -> None:
+    """Print the ledger, what was skipped, and the answer with its bound."""
+    table = Table("effect", "adds", "what", "s", title="What each effect added")
+    for entry in record["ledger"]:
+        seconds = "–" if entry["seconds"] is None else f"{entry['seconds']:.3f}"
+        table.add_row(entry["effect"], entry["adds"], entry["amount"], seconds)
+    if record["ledger"]:
+        console.print(table)
+    if record["digits"]:
+        console.print(f"{record['digits']}.")
+    for line in record["skipped"]:
+        console.print(f"Skipped: {line}.", style="dim")
+    error, bound = record["judged_error_mm"], record["error_bound_mm"]
+    proven = np.isfinite(bound)
+    if error is None:
+        text = f"every displacement within {bound:.1e} mm, proven" if proven else f"a bound {UNPROVEN}"
+    else:
+        known = f"with a proven bound ({bound:.1e} mm)" if proven else f"whose bound {UNPROVEN}"
+        text = (
+            f"{record['status']}, {error:.1e} mm from the answer {known}: {record['verdict']} {LIMIT_MM:g} mm"
+        )
+    console.print(f"{record['method']}: {text}.", style="green" if record["verdict"] == "within" else "red")

@@ -17,7 +17,7 @@ from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 
-from .few_digits import digits_of
+from .own_matrices import digits_of, print_facts
 
 
 def validate(source: str, console: Console) -> None:
@@ -54,15 +54,10 @@ def validate(source: str, console: Console) -> None:
 def _matrices(scene: Scene, console: Console) -> None:
     """Print the sizes and digits of given matrices. Raises InputError if K is not positive definite."""
     choice = chosen_form(scene, FORMS, None)
-    data = prepared(scene, form=choice.form)
-    _ = data.assembly.K.factors
-    assembly = data.assembly
-    blocks = ", ".join(str(K.shape[0]) for K in assembly.K.matrices)
     if choice.form == "sparse":
         console.print(f"Sparse form by default: {choice.why}.")
-    console.print(f"{scene.name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
-    for note in assembly.notes:
-        console.print(f"{note}.", style="yellow")
+    assembly = prepared(scene, form=choice.form).assembly
+    print_facts(scene.name, assembly, console)
     digits = digits_of(assembly)
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
 

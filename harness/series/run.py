@@ -116,7 +116,7 @@ def solve_remaining(
     with display(console) as progress:
         task = progress.add_task(job.scene.name, total=count, rate="")
         for some in results:
-            store.append(directory, some)
+            series_file.append(directory, some)
             made += len(some)
             rate = f"{made / (time.monotonic() - begun):.3g} cases/s"
             progress.update(task, completed=made, rate=rate)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from uuid import uuid4
 
 import numpy as np
@@ -60,8 +60,7 @@ class Job:
     key: str = field(default_factory=lambda: uuid4().hex)
 
 
-@dataclass(frozen=True)
-class Result:
+class Result(NamedTuple):
     """The row of a case and its final gap, (m,) mm; None if there is no answer."""
 
     row: Row

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,6 @@ from harness.results.records import to_line
 from harness.results.schema import SERIES
 from problems.errors import Fault, InputError
 from problems.load_cases.base import LoadCases
-
-from .session import Result
 
 OTHER = "name another directory with --out"
 MAX_FAULTS = 10  # named at once
@@ -55,8 +52,3 @@ def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
     if faults:
         raise InputError(faults[:MAX_FAULTS])
     return done
-
-
-def append(directory: Path, results: Sequence[Result]) -> None:
-    """Write rows and gaps, all of them or none."""
-    series_file.append(directory, ((result.row, result.gap) for result in results))

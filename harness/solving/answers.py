@@ -23,34 +23,63 @@ LONGEST_ERROR = 2000  # characters of an exception's text
 
 
 class InvalidAnswer(Exception):
-    """The answer is invalid; the text says why. status : what the row says of it."""
+    """The answer is invalid; the text says why. status : of its row. fix : what to do about it."""
 
     status = "failed"
 
+    def __init__(self, wrong: str, fix: str = "") -> None:
+        super().__init__(wrong)
+        self.fix = fix
+
 
 def checked(answer: object, problem: Problem) -> Answer:
-    """The answer in plain types; everything that a solver returns passes here.
+    """The answer in plain types; everything that a solver returns passes here. Raises InvalidAnswer."""
+    plain, faults = examined(answer, problem)
+    if faults:
+        raise faults[0]
+    needed = problem.needs[-1]  # x in a form that gives it: forces may be missing there
+    if plain.status == "solved" and getattr(plain, needed) is None:
+        raise InvalidAnswer(f"says solved, and gives no {needed}")
+    return plain
+
+
+def examined(answer: object, problem: Problem) -> tuple[Answer, list[InvalidAnswer]]:
+    """The answer in plain types, None for what is invalid, and all that is wrong with it.
 
     lam (m,) and x (n,) become float64 arrays of their own, read-only; iterations integers; details plain
-    JSON, dropped if it is large. Raises InvalidAnswer if type, status, shapes or values are wrong, as of a
-    complex λ.
+    JSON, dropped if it is large. Type, status, shapes or values may be wrong, as of a complex λ.
     """
     if not isinstance(answer, Answer):
-        raise InvalidAnswer(f"solve returned {type(answer).__name__}, not solvers.base.Answer")
-    if not isinstance(answer.status, str) or answer.status not in get_args(Status):
-        raise InvalidAnswer(f"status {shown(answer.status)}; allowed: {', '.join(get_args(Status))}")
-    needed = problem.needs[-1]  # x in a form that gives it: forces may be missing there
-    if answer.status == "solved" and getattr(answer, needed) is None:
-        raise InvalidAnswer(f"says solved, and gives no {needed}")
-    return Answer(
-        answer.status,
-        vector("lam", answer.lam, problem.assembly.m),
-        vector("x", answer.x, problem.assembly.n),
-        _number(int, "iterations", answer.iterations),
-        _number(int, "inner_iterations", answer.inner_iterations),
-        _number(float, "reported_s", answer.reported_s),
-        _plain(answer.details),
+        wrong = f"solve returned {type(answer).__name__}, not solvers.base.Answer"
+        return Answer("failed", None), [InvalidAnswer(wrong, "Return a solvers.base.Answer")]
+    faults: list[InvalidAnswer] = []
+
+    def plain(convert: Callable[..., Any], *given: Any) -> Any:
+        try:
+            return convert(*given)
+        except InvalidAnswer as fault:
+            faults.append(fault)
+            return None
+
+    found = Answer(
+        plain(_status, answer.status),
+        plain(vector, "lam", answer.lam, problem.assembly.m),
+        plain(vector, "x", answer.x, problem.assembly.n),
+        plain(_count, "iterations", answer.iterations),
+        plain(_count, "inner_iterations", answer.inner_iterations),
+        plain(_seconds, "reported_s", answer.reported_s),
+        plain(_plain, answer.details),
     )
+    return found, faults
+
+
+def _status(value: Any) -> Any:
+    if not isinstance(value, str) or value not in get_args(Status):
+        words = ", ".join(get_args(Status))
+        raise InvalidAnswer(
+            f"status {shown(value)}; allowed: {words}", "Say how it ended in one of these words"
+        )
+    return value
 
 
 def vector(name: str, value: Any, size: int) -> Vector | None:
@@ -60,32 +89,39 @@ def vector(name: str, value: Any, size: int) -> Vector | None:
     """
     if value is None:
         return None
+    fix = f"Return {name} as a numpy array of float64; without an answer, None and a status that says so"
     try:
         given = np.asarray(value)
     except Exception as error:
-        raise InvalidAnswer(f"{name} is no array: {error_text(error)}") from error
+        raise InvalidAnswer(f"{name} is no array: {error_text(error)}", fix) from error
     if given.dtype.kind not in "fiu" or isinstance(value, np.ma.MaskedArray):
-        raise InvalidAnswer(f"{name} is {type(value).__name__} of {given.dtype}; wanted real numbers")
+        raise InvalidAnswer(f"{name} is {type(value).__name__} of {given.dtype}; wanted real numbers", fix)
     if given.shape != (size,):
-        raise InvalidAnswer(f"{name} has shape {given.shape}; wanted ({size},)")
+        raise InvalidAnswer(f"{name} has shape {given.shape}; wanted ({size},)", fix)
     with np.errstate(over="ignore"):
         plain = np.array(given, dtype=np.float64)
     if not np.isfinite(plain).all():
-        raise InvalidAnswer(f"{name} has NaN or infinity")
+        raise InvalidAnswer(f"{name} has NaN or infinity", fix)
     plain.flags.writeable = False
     return plain
 
 
-def is_count(value: object) -> bool:
-    """Whether it can be a number of iterations."""
-    return isinstance(value, Integral) and 0 <= int(value) < LARGEST_COUNT
+def _count(name: str, value: Any) -> int | None:
+    if value is not None and not (isinstance(value, Integral) and 0 <= int(value) < LARGEST_COUNT):
+        wrong = f"{name} is {shown(value)}; wanted a whole number from 0 to 2⁵³"
+        raise InvalidAnswer(wrong, "Give a whole number, or None")
+    return None if value is None else int(value)
 
 
-def is_seconds(value: object) -> bool:
+def _seconds(name: str, value: Any) -> float | None:
+    if value is None:
+        return None
     try:
-        return isinstance(value, Real) and 0 <= float(value) < inf
+        if isinstance(value, Real) and 0 <= float(value) < inf:
+            return float(value)
     except OverflowError:  # an integer beyond the range of floats
-        return False
+        pass
+    raise InvalidAnswer(f"{name} is {shown(value)}; wanted seconds", "Give seconds as a float, or None")
 
 
 def shown(value: object) -> str:
@@ -105,16 +141,10 @@ def error_text(error: BaseException) -> str:
         return type(error).__name__
 
 
-def _number(kind: Callable[[Any], Any], name: str, value: Any) -> Any:
-    fits, wanted = (is_count, "a whole number from 0 to 2⁵³") if kind is int else (is_seconds, "seconds")
-    if value is not None and not fits(value):
-        raise InvalidAnswer(f"{name} is {shown(value)}; wanted {wanted}")
-    return None if value is None else kind(value)
-
-
 def _plain(details: object) -> dict[str, Any]:
+    fix = "Put only numbers, text, lists and dicts there"
     if not isinstance(details, dict):
-        raise InvalidAnswer(f"details is {shown(details)}; wanted a dict")
+        raise InvalidAnswer(f"details is {shown(details)}; wanted a dict", fix)
     try:
         text = to_line(details)
         if len(text) > LARGEST_DETAILS:
@@ -122,7 +152,7 @@ def _plain(details: object) -> dict[str, Any]:
         plain: dict[str, Any] = json.loads(text, parse_int=_bounded)
         json.dumps(plain, ensure_ascii=False).encode()  # no lone surrogates
     except Exception as error:
-        raise InvalidAnswer(f"details is not JSON: {error_text(error)}") from error
+        raise InvalidAnswer(f"details is not JSON: {error_text(error)}", fix) from error
     return plain
 
 

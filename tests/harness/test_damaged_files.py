@@ -1,151 +1,188 @@
-"""A file of a results or series directory that was cut off, or is none of ours, is refused by name."""
+"""Directories of results and of series whose files are damaged, cut off or foreign: refused by name."""
 
 import json
-import os
 import re
 import shutil
-from collections.abc import Callable
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import tiny
-from rich.console import Console
+from commands import harness
+from runs import rows_of
 from strip import write_strip
-from typer.testing import CliRunner
+from typer.testing import Result
 
-from harness.cli.app import app
-from harness.measurement.run import record_machine, run
-from harness.planning.suite import read_suite
+from harness.measurement.run import record_machine
+from harness.planning.suite import read_written
 from harness.results import records, series_file
 from harness.results.kinds import refuse_unreadable
 from harness.results.schema import SERIES
-from harness.verification.reference_problem import reference_problem
-from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 
+PUBLISHED = Path(__file__).parents[2] / "results" / "published"
+CASES = 12
+
+
+def cut(share: float) -> Any:
+    return lambda content: content[: int(share * len(content))]
+
+
+def flipped(content: bytes) -> bytes:
+    """One bit of the numbers of an array: the CRC of a .npz sees it."""
+    damaged = bytearray(content)
+    damaged[content.index(b"x.npy") + 200] ^= 1
+    return bytes(damaged)
+
+
+CUTS = [*map(cut, (0.0, 0.4, 0.99))]
+NESTED = b"[" * 100_000
+#: For each file what stands in it instead, or what is done to it.
+DAMAGES: dict[str, list[Any]] = {
+    records.MEASUREMENTS: [*CUTS, lambda content: NESTED + b"\n" + content],
+    "problems.jsonl": [
+        *CUTS[1:],
+        NESTED + b"\n{}\n",
+        b"{}\n",
+        b'{"scene": 3}\n',
+        b'{"scene": "a", "n": "many"}\n',
+    ],
+    "machine.json": [*CUTS, NESTED, b"1", b"\xff"],
+    "suite.toml": [b"solver = [3]", b"[[solver]]\nname = 1", b"\xff", b"scenes = 3"],
+    "scenes/tiny.npz": [*CUTS, flipped],
+}
+
+
+@pytest.mark.parametrize(("name", "damage"), [(name, each) for name in DAMAGES for each in DAMAGES[name]])
+def test_a_damaged_file_of_a_run_is_named(name: str, damage: Any, copy: Path) -> None:
+    path = copy / name
+    path.write_bytes(damage if isinstance(damage, bytes) else damage(path.read_bytes()))
+    done = harness("report", copy)
+    assert done.exit_code == 2, done.output
+    assert path.name in done.output
+
 
 @pytest.fixture(scope="module")
-def directories(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`run`, a directory of results, and `series`."""
-    folder = tmp_path_factory.mktemp("whole")
-    text = '[[solver]]\nname = "exact"\nforms = ["dual"]\n'
-    suite = read_suite(str(tiny.write_suite(folder, text, tolerances=[1e-6, 1e-8])))
-    assert run(suite, folder / "run", Console(file=StringIO())) == 0
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("series")
     write_strip(folder)
-    words = ["series", folder / "strip.toml", "--cases", 6, "--check", 0, "--out", folder / "series"]
-    assert CliRunner().invoke(app, list(map(str, words))).exit_code == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("report.writers.series.write", lambda directory: directory)
+        assert solve_series(folder / "out").exit_code == 0
     return folder
 
 
 @pytest.fixture
-def made(directories: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(directories, tmp_path / "copy"))
+def series(solved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The directory of a finished series of CASES cases; its report is not drawn."""
+    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    return Path(shutil.copytree(solved, tmp_path / "copy")) / "out"
 
 
-def arrays_of(directory: Path) -> Any:
-    refuse_unreadable(directory)
-    (path,) = (directory / "scenes").iterdir()
-    with np.load(path) as file:
-        return {name: values.tolist() for name, values in file.items()}
+def solve_series(out: Path) -> Result:
+    asked = ("--cases", CASES, "--threads", 1, "--check", 0, "--out", out)
+    return harness("series", out.parent / "strip.toml", *asked)
 
 
-def answer_of(directory: Path) -> Any:
-    """What the judge says of the saved answer."""
-    row = records.read(directory / records.MEASUREMENTS)[0]
-    judged = reference_problem(row["source"]).judge_file(directory / row["answer"], 1e-7)
-    if judged.verdict == "no_answer":
-        raise InputError.one(directory / row["answer"], "content", "damaged", "")
-    return judged
+@pytest.mark.parametrize("damage", [*CUTS, b"[]", b"SQLite format 3\0", b"\xff" * 5000])
+def test_a_file_that_holds_no_series_is_named(damage: Any, series: Path) -> None:
+    content = damage if isinstance(damage, bytes) else damage((series / SERIES).read_bytes())
+    (series / SERIES).write_bytes(content)
+    refused = harness("report", series)
+    assert refused.exit_code == 2
+    assert SERIES in refused.output
+    assert solve_series(series).exit_code == (2 if content else 0)  # an empty file is a new database
 
 
-def rows_of(directory: Path) -> Any:
-    refuse_unreadable(directory)
-    return records.read(directory / records.MEASUREMENTS), records.read(directory / "problems.jsonl")
+@pytest.mark.parametrize(
+    "statement",
+    [
+        *(f"UPDATE facts SET value = '{value}' WHERE name = 'series'" for value in ("[]", '{"identity": 1}')),
+        "DELETE FROM facts WHERE name = 'series'",
+        "DELETE FROM facts WHERE name = 'contacts'",
+        "UPDATE cases SET gap = NULL WHERE number = 3",
+        "UPDATE cases SET gap = substr(gap, 5) WHERE number = 3",
+        *(f"UPDATE cases SET row = '{row}' WHERE number = 3" for row in ("[]", "1", '{"case": 3}')),
+        "DROP TABLE cases",
+    ],
+)
+def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series: Path) -> None:
+    assert harness("report", series).exit_code == 0
+    with series_file.connected(series) as connection:
+        connection.execute(statement)
+    refused = harness("report", series)
+    assert refused.exit_code == 2, refused.output
+    assert SERIES in refused.output
 
 
-def machine_of(directory: Path) -> Any:
-    refuse_unreadable(directory)
-    return records.parsed((directory / "machine.json").read_bytes())
+def test_fewer_cases_than_before_are_reported_as_that_many(
+    series: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rows of the other cases stay, for a longer series."""
+    monkeypatch.undo()
+    facts = series_file.read_facts(series) or {}
+    series_file.write_fact(series, "series", json.dumps(facts | {"cases": 4}))
+    assert harness("report", series).exit_code == 0
+    assert re.search(r"solved +\| 4 of 4 cases", (series / "report" / "report.md").read_text())
 
 
-def series_of(directory: Path) -> Any:
-    series_file.refuse_damaged(directory)
-    gaps = series_file.StoredGaps(directory, 45)[range(6)]
-    return series_file.read_facts(directory), list(series_file.rows(directory)), gaps
-
-
-FILES: list[tuple[str, Callable[[Path], Any]]] = [
-    (f"run/{records.MEASUREMENTS}", rows_of),
-    ("run/problems.jsonl", rows_of),
-    ("run/machine.json", machine_of),
-    ("run/scenes/*.npz", arrays_of),
-    ("run/answers/*.npz", answer_of),
-    (f"series/{SERIES}", series_of),
+WRONG: list[tuple[str, Any]] = [
+    *(("limit_mm", value) for value in ("a", -1.0, True)),
+    *((name, 3) for name in ("key", "status", "answer", "scene")),
+    *(("gated", 1), ("series", {"cases": "a"}), ("case", "a"), ("solve_s", [1, 2])),
 ]
 
 
-def outcome(content: Callable[[Path], Any], directory: Path) -> tuple[Any, str]:
-    """What is read, or what is said."""
-    try:
-        return content(directory), ""
-    except InputError as error:
-        return None, str(error)
+@pytest.mark.parametrize(("name", "value"), WRONG)
+def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, copy: Path) -> None:
+    rows = rows_of(copy)
+    rows[1][name] = value
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    for command in ("gate", "report"):
+        done = harness(command, copy)
+        if done.exit_code != 0 or command == "gate":
+            assert done.exit_code == 2, done.output
+            assert f"measurements.jsonl: line 2: {name}" in done.output
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.4, 0.99])  # half of two rows may be one row
-@pytest.mark.parametrize(("name", "content"), FILES, ids=[name for name, _ in FILES])
-def test_a_file_that_was_cut_off_is_refused_by_name(
-    name: str, content: Callable[[Path], Any], kept: float, made: Path
-) -> None:
-    path = sorted(made.glob(name))[0]
-    directory = made / name.split("/")[0]
-    content(directory)
-    os.truncate(path, int(kept * path.stat().st_size))
-    found, said = outcome(content, directory)
-    if kept or path.suffix != ".jsonl":
-        assert path.name in said
-    else:
-        assert not found or "no row yet" in said or not found[1]  # as before the first row
+@pytest.mark.parametrize(("name", "value"), [("key", None), ("time_limit_s", "a")])
+def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, copy: Path) -> None:
+    rows = rows_of(copy)
+    rows[1][name] = value
+    records.rewrite(copy / records.MEASUREMENTS, rows)
+    done = harness("run", copy, "--out", copy)
+    assert done.exit_code == 2
+    assert f"measurements.jsonl: line 2: {name}" in done.output
 
 
-@pytest.mark.parametrize("name", ["run/scenes/*.npz", "run/answers/*.npz"])
-def test_a_damaged_byte_of_an_array_is_seen(name: str, made: Path) -> None:
-    """By the CRC of the .npz."""
-    path = sorted(made.glob(name))[0]
-    content = bytearray(path.read_bytes())
-    content[content.index(records.read_arrays(path)["x"].tobytes()) + 3] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match=r"not a \.npz file"):
-        records.read_arrays(path)
+def test_text_among_the_arrays_of_a_scene_is_left_out(copy: Path) -> None:
+    (path,) = (copy / "scenes").iterdir()
+    np.savez(path, **{name: values.astype(str) for name, values in records.read_arrays(path).items()})
+    assert harness("report", copy).exit_code == 0
 
 
-def test_what_older_versions_wrote_is_accepted(made: Path) -> None:
+@pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*/suite.toml")), ids=lambda path: path.parent.name)
+def test_what_is_published_can_be_read(path: Path) -> None:
+    """Nothing that an older version wrote is taken for damage."""
+    assert read_written(path).solver
+    refuse_unreadable(path.parent)
+
+
+def test_what_older_versions_wrote_is_accepted(copy: Path) -> None:
     """With checksums of rows, objects and the suite."""
-    rows = made / "run" / records.MEASUREMENTS
-    before = records.read(rows)
-    rows.write_text("".join(records.to_line(row | {"crc32": "01234567"}) + "\n" for row in before))
-    suite, machine = made / "run" / "suite.toml", made / "run" / "machine.json"
+    before = rows_of(copy)
+    lines = [records.to_line(row | {"crc32": "01234567"}) + "\n" for row in before]
+    (copy / records.MEASUREMENTS).write_text("".join(lines))
+    suite, machine = copy / "suite.toml", copy / "machine.json"
     suite.write_text("# crc32 01234567 of the lines below\n\n" + suite.read_text())
     machine.write_text(machine.read_text().replace("{", '{"crc32": "01234567",', 1))
-    assert records.read(rows) == before
-    assert CliRunner().invoke(app, ["report", str(made / "run")]).exit_code == 0
+    assert rows_of(copy) == before
+    assert harness("report", copy).exit_code == 0
 
 
-@pytest.mark.parametrize("content", [b"[]", b"1", b"[" * 100_000, b"\xff", b'{"machine": 3}'])
+@pytest.mark.parametrize("content", [b"[]", NESTED, b"\xff", b'{"machine": 3}'])
 def test_a_damaged_machine_file_is_written_anew(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "machine.json").write_bytes(content)
     assert record_machine(tmp_path, {"machine": "mine", "cores": 2}) == "mine"
     assert json.loads((tmp_path / "machine.json").read_text()) == {"machine": "mine", "cores": 2}
-
-
-def test_fewer_cases_than_before_are_reported_as_that_many(made: Path) -> None:
-    """The rows of the other cases stay, for a longer series."""
-    out = made / "series"
-    facts = series_file.read_facts(out) or {}
-    series_file.write_fact(out, "series", json.dumps(facts | {"cases": 4}))
-    assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
-    assert re.search(r"solved +\| 4 of 4 cases", (out / "report" / "report.md").read_text())

@@ -1,6 +1,7 @@
 """Work on other processes: through a plain executor, and through Dask where it is installed."""
 
 import importlib.util
+import json
 import os
 import re
 import signal
@@ -18,8 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 import tiny
-from long import ASKED
 from rich.console import Console
+from runs import rows_of, said_by, series_rows
 from strip import write_strip
 
 from harness.measurement import scheduler
@@ -33,7 +34,6 @@ from harness.measurement.scheduler import (
 )
 from harness.planning.suite import read_suite
 from harness.results import series_file
-from harness.results.records import MEASUREMENTS, read
 from harness.series.on_worker import solve_on_worker
 from harness.series.run import run
 from harness.series.session import Job
@@ -199,14 +199,6 @@ def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
             pass
 
 
-def written(directory: Path) -> list[Any]:
-    """The rows, if the tables are there yet."""
-    try:
-        return list(series_file.rows(directory))
-    except InputError:
-        return []
-
-
 @needs_dask
 def test_a_worker_that_is_killed_costs_no_row(job: Job, tmp_path: Path, cluster: Any) -> None:
     """One of two workers dies in the middle: each case has one row, and gaps as if nothing had been."""
@@ -215,7 +207,7 @@ def test_a_worker_that_is_killed_costs_no_row(job: Job, tmp_path: Path, cluster:
     job = replace(job, solver="slow", plugin=slow)
     out = tmp_path / "out"
     victim = pids(cluster)[0]
-    with once(lambda: bool(written(out)), lambda: os.kill(victim, signal.SIGKILL)):
+    with once(lambda: bool(series_rows(out)), lambda: os.kill(victim, signal.SIGKILL)):
         assert run(job, {}, out, quiet(), cluster.scheduler_address) == 0
     assert victim not in pids(cluster)
     assert [row["case"] for row in series_file.rows(out)] == list(range(CASES))
@@ -243,42 +235,22 @@ def test_a_table_is_solved_on_workers_a_case_each_row(cluster: Any, tmp_path: Pa
 
 
 @needs_dask
-@pytest.mark.skipif(not ASKED, reason="long: RIVETBENCH_LONG=1")
-def test_a_suite_on_workers_one_of_which_is_killed(cluster: Any, tmp_path: Path) -> None:
-    """Rows and answers are those of a suite that is measured here; the lost measurement is made again."""
-    table = '[[solver]]\nname = "{}"\nforms = ["dual"]\n'
-    text = "".join(map(table.format, ("exact", "newton")))
-    suite = read_suite(str(tiny.write_suite(tmp_path, text, tolerances=[1e-8, 1e-10])))
-    slow = (tmp_path / "exact.py").read_text().replace("L = sla", "__import__('time').sleep(0.5); L = sla")
-    (tmp_path / "exact.py").write_text(slow)
-    out, here = tmp_path / "out", tmp_path / "here"
-    victim = pids(cluster)[0]
-    with once((out / MEASUREMENTS).exists, lambda: os.kill(victim, signal.SIGKILL)):
-        assert run_suite(suite, out, quiet(), cluster.scheduler_address) == 0
-    assert run_suite(suite, here, quiet()) == 0
-    rows, wanted = ({row["key"]: row for row in read(each / MEASUREMENTS)} for each in (out, here))
-    assert len(read(out / MEASUREMENTS)) == len(rows) == 4
-    assert rows.keys() == wanted.keys()
-    for key, row in rows.items():
-        assert (row["status"], row["verdict"]) == ("solved", "within")
-        for name in ("machine", "commit", "clean"):
-            assert row[name] == wanted[key][name]
-        with np.load(out / row["answer"]) as got, np.load(here / wanted[key]["answer"]) as expected:
-            np.testing.assert_allclose(got["x"], expected["x"], atol=1e-8)
-
-
-@needs_dask
 def test_a_measurement_that_kills_its_workers_is_left_and_said(cluster: Any, tmp_path: Path) -> None:
-    """Worker after worker dies of it (here: of a plugin that kills its parent); the others are measured."""
-    suite = read_suite(
-        str(tiny.write_suite(tmp_path, "".join(f'[[solver]]\nname = "{n}"\n' for n in ("newton", "exact"))))
-    )
+    """Worker after worker dies of it (here: of a plugin that kills its parent); the others are measured, and
+    their answers are brought here.
+    """
+    entries = '[[solver]]\nname = "newton"\n[[solver]]\nname = "exact"\n'
+    suite = read_suite(str(tiny.write_suite(tmp_path, entries)))
     killer = tiny.EXACT.replace("L = sla", "import os; os.kill(os.getppid(), 9); L = sla")
     (tmp_path / "exact.py").write_text(killer)
-    console = quiet()
-    assert run_suite(suite, tmp_path / "out", console, cluster.scheduler_address) == 1
-    (row,) = read(tmp_path / "out" / MEASUREMENTS)
-    assert row["solver"] == "newton"
-    said = console.file.getvalue()
+    code, said = said_by(
+        lambda console: run_suite(suite, tmp_path / "out", console, cluster.scheduler_address)
+    )
+    assert code == 1
+    (row,) = rows_of(tmp_path / "out")
+    assert (row["solver"], row["status"], row["verdict"]) == ("newton", "solved", "within")
+    assert (tmp_path / "out" / row["answer"]).is_file()
+    machine = json.loads((tmp_path / "out" / "machine.json").read_text())
+    assert machine["machine"] == row["machine"]
     assert re.search("tiny exact dual .*: not measured: KilledWorker", said)
     assert "Not measured: 1. Run the same command again." in said

@@ -5,7 +5,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,22 +13,23 @@ import numpy as np
 import pytest
 import tiny
 from commands import harness
+from runs import series_rows, wait_for
 from small import solve_by_nnls
 from strip import write_strip
 
 from harness.results import records, series_file
 from harness.results.schema import SERIES
 from harness.series import session as session_module
-from harness.series.session import Job, SeriesSession
+from harness.series.session import Job, Result, SeriesSession
 from problems.build import load_case, prepared
-from problems.errors import InputError
 from problems.forms.problem import Dual
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
+COMMAND = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
 SLOW = tiny.EXACT.replace("L = sla", "__import__('time').sleep(0.02); L = sla")
 
 
@@ -109,36 +109,18 @@ def test_another_series_is_refused(change: tuple[str, str]) -> None:
     assert len(rows_of("mine")) == 3
 
 
-@pytest.mark.parametrize("kept", [0.3, 0.9, 0.999])
-def test_a_file_that_was_cut_off_is_refused(kept: float) -> None:
-    out = f"cut-{kept}"
-    series("--cases", "30", "--out", out)
-    path = Path(out) / SERIES
-    os.truncate(path, int(kept * path.stat().st_size))
-    for ended in (series("--cases", "40", "--out", out, code=2), report(out)):
-        assert ended.exit_code == 2
-        assert SERIES in ended.output.replace("\n", "")
-
-
-def test_a_full_disk_leaves_whole_cases(monkeypatch: pytest.MonkeyPatch) -> None:
-    command = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1", "--cases", "900"]
-    command += ["--solver", "gi", "--check", "0", "--out", "full"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-
+def test_a_full_disk_leaves_whole_cases() -> None:
     def small() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (2**17, 2**17))
 
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, preexec_fn=small)
+    command = [*COMMAND, "--cases", "900", "--solver", "gi", "--check", "0", "--out", "full"]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, preexec_fn=small)
     assert done.returncode == 2
     assert SERIES in done.stderr
     assert "Traceback" not in done.stderr
     kept = rows_of("full")
     assert 0 < len(kept) == len(gaps_of("full")) < 900
-
-
-def report(directory: str) -> Any:
-    return harness("report", directory)
 
 
 def test_a_directory_holds_one_kind_of_result(tmp_path: Path) -> None:
@@ -171,58 +153,40 @@ def test_ctrl_c_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row["case"] for row in rows_of("stopped")] == list(range(60))
 
 
-def written(directory: str) -> list[dict[str, Any]]:
-    """The rows, if the tables are there yet."""
-    try:
-        return rows_of(directory)
-    except InputError:
-        return []
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_a_kill_loses_and_doubles_no_row() -> None:
-    command = [sys.executable, "-m", "harness", "series", "strip.toml", "--threads", "1", "--cases", "80"]
-    command += ["--solver", "slow", "--plugin", "slow.py", "--out", "killed"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
-    deadline = time.monotonic() + 60
-    while not written("killed"):
-        assert process.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
+    slow = ("--cases", "80", "--solver", "slow", "--plugin", "slow.py", "--out", "killed")
+    process = subprocess.Popen([*COMMAND, *slow], env=ENVIRONMENT, stdout=subprocess.DEVNULL)
+    wait_for(lambda: series_rows(Path("killed")))
+    assert process.poll() is None
+    process.kill()
     process.wait()
     kept = rows_of("killed")
     assert 0 < len(kept) < 80
-    series("--cases", "80", "--solver", "slow", "--plugin", "slow.py", "--out", "killed")
+    series(*slow)
     rows = rows_of("killed")
     assert rows[: len(kept)] == kept
     assert sorted(row["case"] for row in rows) == list(range(80))
 
 
-def test_a_table_with_a_bad_case_keeps_what_is_solved() -> None:
+def test_a_table_may_grow_and_not_change() -> None:
+    """A bad case, and one that has changed since, are named, and what is solved is kept."""
     gaps = np.random.default_rng(0).uniform(0, 0.5, (12, 45))
-    np.save("gaps.npy", gaps[:8])
-    series("--gaps", "gaps.npy", "--out", "table")
-    gaps[10, 3] = np.nan
-    np.save("gaps.npy", gaps)
-    ended = series("--gaps", "gaps.npy", "--out", "table", code=2)
-    assert "case 10, contact 3 = nan" in ended.output
+
+    def solved(rows: np.ndarray, code: int = 0) -> str:
+        np.save("gaps.npy", rows)
+        return str(series("--gaps", "gaps.npy", "--out", "table", code=code).output)
+
+    solved(gaps[:8])
+    bad, other = gaps.copy(), gaps.copy()
+    bad[10, 3] = np.nan
+    assert "case 10, contact 3 = nan" in solved(bad, 2)
+    other[4, 44] += 1e-12
+    said = solved(other, 2)
+    assert "case 4, gaps = " in said
+    assert said.count("name another directory") == 1
     assert len(rows_of("table")) == 8
-    gaps[10, 3] = 0.1
-    np.save("gaps.npy", gaps)
-    assert "12 cases, 8 already" in series("--gaps", "gaps.npy", "--out", "table").output
-
-
-def test_a_table_that_has_changed_since_is_refused_by_case() -> None:
-    gaps = np.random.default_rng(1).uniform(0, 0.5, (6, 45))
-    np.save("changed.npy", gaps)
-    series("--gaps", "changed.npy", "--out", "changed")
-    gaps[4, 44] += 1e-12
-    np.save("changed.npy", gaps)
-    ended = series("--gaps", "changed.npy", "--out", "changed", code=2)
-    assert "case 4, gaps = " in ended.output
-    assert ended.output.count("name another directory") == 1
+    assert "12 cases, 8 already" in solved(gaps)
 
 
 def test_a_sweep_starts_from_its_neighbour(tmp_path: Path) -> None:
@@ -255,26 +219,28 @@ def test_other_solvers_and_forms(solver: str, form: str) -> None:
     assert all(row["displacement_error_mm"] <= min(1e-7, row["bound_mm"]) for row in rows)
 
 
-@pytest.mark.parametrize("fault", ["nan", "raises"])
-def test_a_solver_that_fails_is_a_row(fault: str) -> None:
-    Path("faulty.py").write_text(tiny.FAULTY)
+def results_of(count: int, check: int, **solver: Any) -> list[Result]:
     scene = read_scene("strip.toml")
-    job = Job(scene, random_gaps(scene, 3, 0), "faulty", "dual", 1e-9, 1e-7, 0, 1,
-              {"fault": fault}, Path("faulty.py"))  # fmt: skip
-    (results,) = SeriesSession(job).solve([0, 1, 2])
-    assert [result.row["verdict"] for result in results] == ["no_answer"] * 3
-    assert all(result.gap is None for result in results)
-    if fault == "raises":
-        assert "ValueError: no step" in results[0].row["message"]
+    job = Job(scene, random_gaps(scene, count, 0), "faulty", "dual", 1e-9, 1e-7, check, 1, **solver)
+    return [result for results in SeriesSession(job).solve(range(count)) for result in results]
 
 
-def test_a_wrong_answer_is_not_vouched_for() -> None:
-    scene = read_scene("strip.toml")
+@pytest.mark.parametrize(
+    ("fault", "verdicts"),
+    [
+        ("nan", ["no_answer"] * 4),
+        ("raises", ["no_answer"] * 4),
+        ("big_details", ["outside", "cannot_be_judged"] * 2),  # its λ is zero; every second case is checked
+    ],
+)
+def test_a_solver_that_fails_is_a_row_and_its_answer_is_not_vouched_for(
+    fault: str, verdicts: list[str]
+) -> None:
     Path("faulty.py").write_text(tiny.FAULTY)
-    job = Job(scene, random_gaps(scene, 4, 0), "faulty", "dual", 1e-9, 1e-7, 2, 1,
-              {"fault": "big_details"}, Path("faulty.py"))  # fmt: skip
-    (results,) = SeriesSession(job).solve([0, 1, 2, 3])  # its λ is zero
-    assert [result.row["verdict"] for result in results] == ["outside", "cannot_be_judged"] * 2
+    results = results_of(4, 2, options={"fault": fault}, plugin=Path("faulty.py"))
+    assert [result.row["verdict"] for result in results] == verdicts
+    assert all((result.gap is None) == (result.row["verdict"] == "no_answer") for result in results)
+    assert fault != "raises" or "ValueError: no step" in results[0].row["message"]
 
 
 def test_what_p_has_lost_in_rounding_is_in_the_bound(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -309,11 +275,9 @@ def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault:
         return answers
 """
     )
-    Path("atonce.py").write_text(text)
-    scene, count = read_scene("strip.toml"), session_module.BLOCK + 5
-    job = Job(scene, random_gaps(scene, count, 0), "atonce", "dual", 1e-9, 1e-7, 0, 1,
-              {}, Path("atonce.py"))  # fmt: skip
-    rows = [result.row for results in SeriesSession(job).solve(range(count)) for result in results]
+    Path("faulty.py").write_text(text)
+    count = session_module.BLOCK + 5
+    rows = [result.row for result in results_of(count, 0, plugin=Path("faulty.py"))]
     assert [row["case"] for row in rows] == list(range(count))
     assert {row["status"] for row in rows} == {"solved"}
     assert [("setup_s" in row) for row in rows] == [False] * session_module.BLOCK + [True] * 5

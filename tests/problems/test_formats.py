@@ -17,7 +17,8 @@ from rich.console import Console
 from scipy.io import FortranFile
 from small import make_load, make_prepared, solve_by_nnls
 
-from harness.scene.exchange import export, import_, matrices
+from harness.scene.export import export, matrices
+from harness.scene.matrix_import import import_
 from harness.scene.solve import solve
 from problems import formats
 from problems.build import load_case, prepared

@@ -1,23 +1,20 @@
 """Runs among faults: whatever befalls the solvers, the disk or the harness, no finished row is lost."""
 
-import contextlib
 import os
 import resource
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from io import StringIO
 from itertools import count
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 import tiny
 from rich.console import Console
+from runs import rows_of, wait_for
 
 from harness.measurement import monitored
 from harness.measurement import row as rows_module
@@ -29,25 +26,13 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 
-#: What a solver may do beside what test_measure.py has, and what is said of it.
-FAULTS = {
-    **dict.fromkeys(("hang", "stop_itself", "fork_on_and_on"), "time_limit"),
-    **dict.fromkeys(("kill_itself", "abort", "close_everything"), "crashed"),
-    **{"recurse": "failed", "write_everywhere": "iteration_limit"},
-}
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("faults")
 
 
-@pytest.fixture(autouse=True)
-def _cache(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
-
-
-def suite_of(folder: Path, *faults: str, **keys: Any) -> Path:
+def suite_of(folder: Path, *faults: str) -> Path:
     """A suite with one measurement a fault, in their order."""
     entry = """
     [[solver]]
@@ -56,15 +41,11 @@ def suite_of(folder: Path, *faults: str, **keys: Any) -> Path:
     options = {{fault = "{1}"}}
     time_limit_s = {2}
     """
-    limits = [0.5 if FAULTS.get(fault) == "time_limit" else 50.0 for fault in faults]
+    limits = [0.5 if fault == "hang" else 50.0 for fault in faults]
     text = "".join(entry.format(k, *line) for k, line in enumerate(zip(faults, limits, strict=True)))
-    path = tiny.write_suite(folder, text, plugin="faulty.py", **keys)
+    path = tiny.write_suite(folder, text, plugin="faulty.py")
     (folder / "faulty.py").write_text(tiny.FAULTY)
     return path
-
-
-def rows_of(directory: Path) -> list[dict[str, Any]]:
-    return records.read(directory / records.MEASUREMENTS)
 
 
 def quietly(suite: Path, directory: Path) -> int:
@@ -73,38 +54,6 @@ def quietly(suite: Path, directory: Path) -> int:
 
 def command(suite: Path, directory: Path) -> list[str]:
     return [sys.executable, "-m", "harness", "run", str(suite), "--out", str(directory)]
-
-
-def wait_for(condition: Callable[[], Any]) -> Any:
-    deadline = time.monotonic() + 60
-    while not (found := condition()):
-        assert time.monotonic() < deadline, "waited too long"
-        time.sleep(0.01)
-    return found
-
-
-def test_a_run_goes_through_every_fault_of_its_solvers(folder: Path) -> None:
-    suite = suite_of(folder / "all", *FAULTS, memory_limit_mib=300)
-    out = folder / "all" / "out"
-    before = set(psutil.pids())
-    quietly(suite, out)
-    statuses = {row["variant"].split()[1]: row["status"] for row in rows_of(out)}
-    assert statuses == FAULTS
-    assert all(row["message"] for row in rows_of(out) if row["status"] in ("crashed", "failed"))
-    wait_for(lambda: not [p for p in set(psutil.pids()) - before if is_ours(p, folder)])
-    lines = (out / records.MEASUREMENTS).read_bytes()
-    quietly(suite, out)
-    assert (out / records.MEASUREMENTS).read_bytes() == lines
-
-
-def is_ours(pid: int, folder: Path) -> bool:
-    """Whether a process is a worker, or the child of one, of this test."""
-    try:
-        process = psutil.Process(pid)
-        ours = process.environ().get("RIVETBENCH_CACHE") == str(folder / "cache")
-        return ours and process.status() != psutil.STATUS_ZOMBIE
-    except psutil.Error:
-        return False
 
 
 def test_a_run_killed_again_and_again_ends_with_every_row_once(folder: Path) -> None:
@@ -121,26 +70,6 @@ def test_a_run_killed_again_and_again_ends_with_every_row_once(folder: Path) -> 
     quietly(suite, out)
     assert rows.read_bytes().startswith(seen)
     assert [row["variant"][0] for row in rows_of(out)] == ["0", "1", "2", "3"]
-
-
-def workers_of(driver: int) -> list[psutil.Process]:
-    """The workers among a driver's children, some of which may end while they are looked at."""
-    found = []
-    for child in psutil.Process(driver).children():
-        with contextlib.suppress(psutil.NoSuchProcess):
-            if "measure_here" in child.cmdline():
-                found.append(child)
-    return found
-
-
-def test_a_worker_that_something_else_kills_is_a_row(folder: Path) -> None:
-    suite = suite_of(folder / "worker", "sleep", "gives_up")
-    out = folder / "worker" / "out"
-    going = subprocess.Popen(command(suite, out), cwd=ROOT, stdout=subprocess.DEVNULL)
-    worker = wait_for(lambda: workers_of(going.pid))[0]
-    worker.send_signal(signal.SIGKILL)
-    assert going.wait(60) == 3  # nothing could be judged
-    assert [row["status"] for row in rows_of(out)] == ["crashed", "iteration_limit"]
 
 
 def test_files_that_may_not_grow_are_said_and_resumed(folder: Path) -> None:

@@ -1,7 +1,5 @@
 """Files that are damaged, foreign, missing or in the way: refused by name or mended, and nothing is lost."""
 
-import os
-import shutil
 from io import StringIO
 from itertools import permutations
 from pathlib import Path
@@ -10,35 +8,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import tiny
 from commands import harness
 from rich.console import Console
 from small import make_load, make_prepared
-from strip import write_strip
-from typer.testing import Result
 
-from harness.planning.suite import read_written
-from harness.results import records, series_file
-from harness.results.kinds import refuse_unreadable
-from harness.results.schema import SERIES
-from harness.scene.exchange import import_, matrices
+from harness.scene.export import matrices
+from harness.scene.matrix_import import import_
 from harness.verification.reference import reference
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti
 from problems.scene import read_scene
-from problems.storage import cache
 
 PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 QUIET = Console(file=StringIO())
-
-
-@pytest.fixture
-def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    root = tmp_path_factory.mktemp("cache")
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(root))
-    return root
 
 
 def own_matrices(**changes: Any) -> formats.Data:
@@ -46,12 +30,6 @@ def own_matrices(**changes: Any) -> formats.Data:
     data = make_prepared(3, 5, tools=2)
     found = matrices(data, make_load(3, data)[0])
     return found | {name: found[name].toarray() for name in "KA"} | changes
-
-
-def invoke(*words: object) -> Result:
-    done = harness(*words)
-    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-    return done
 
 
 # --- import and export --------------------------------------------------------------------------------
@@ -69,28 +47,27 @@ def test_a_refused_import_leaves_what_is_there(
     if not own:
         out.write_bytes(b"precious")
     before = out.read_bytes()
-    refused = invoke("import", bad, "--out", out)
+    refused = harness("import", bad, "--out", out)
     assert refused.exit_code == 2
     assert str(bad) in refused.output
     assert out.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
 
 
-def test_an_import_never_replaces_an_input(tmp_path: Path) -> None:
+def test_an_import_never_replaces_an_input_and_writes_a_scene_alone(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", **own_matrices())
     before = (tmp_path / "mine.npz").read_bytes()
     (tmp_path / "link.npz").symlink_to("mine.npz")
-    for name in ("mine.npz", "link.npz"):
-        assert "one of the files" in invoke("import", tmp_path / "mine.npz", "--out", tmp_path / name).output
+    for name, said in (
+        ("mine.npz", "one of the files"),
+        ("link.npz", "one of the files"),
+        ("noext", "must end in .npz"),
+    ):
+        done = harness("import", tmp_path / "mine.npz", "--out", tmp_path / name)
+        assert done.exit_code == 2
+        assert said in done.output
     assert (tmp_path / "mine.npz").read_bytes() == before
-
-
-def test_an_import_without_suffix_is_refused_before_it_writes(tmp_path: Path) -> None:
-    np.savez(tmp_path / "mine.npz", **own_matrices())
-    done = invoke("import", tmp_path / "mine.npz", "--out", tmp_path / "noext")
-    assert done.exit_code == 2
-    assert "must end in .npz" in done.output
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.npz"]
+    assert not (tmp_path / "noext").exists()
 
 
 @pytest.mark.parametrize("form", formats.FORMATS)
@@ -103,11 +80,11 @@ def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path
     formats.FORMATS["mtx"].write(folder, own_matrices())
     assert Path("/dev/null").is_char_device()
     for out in ("/dev/null", own):
-        done = invoke("export", own, "--format", form, "--out", out)
+        done = harness("export", own, "--format", form, "--out", out)
         assert done.exit_code == 2, done.output
         assert "--out" in done.output
     if form not in ("mtx", "abaqus"):
-        assert invoke("export", own, "--format", form, "--out", folder).exit_code == 2
+        assert harness("export", own, "--format", form, "--out", folder).exit_code == 2
     assert Path("/dev/null").is_char_device()
     assert own.read_bytes() == before
 
@@ -117,7 +94,7 @@ def test_an_export_into_the_folder_of_its_own_matrices_is_refused(tmp_path: Path
     scene = tmp_path / "scene.toml"
     scene.write_text("[matrices]\n" + "".join(f'{name} = "{name}.mtx"\n' for name in "KAfg"))
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert invoke("export", scene, "--format", "mtx", "--out", tmp_path).exit_code == 2
+    assert harness("export", scene, "--format", "mtx", "--out", tmp_path).exit_code == 2
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
@@ -181,25 +158,10 @@ def test_a_row_at_a_point_that_is_not_there_is_named(changed: Any, said: str, tm
 
 # --- the cache ----------------------------------------------------------------------------------------
 
-ENTRY = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
 
-
-def test_the_files_of_the_cache_are_read_only(own_cache: Path) -> None:
-    cache.store("key", ENTRY, {})
-    assert {path.stat().st_mode & 0o777 for path in (own_cache / "key").iterdir()} == {0o444}
-
-
-def test_a_foreign_file_of_the_same_size_is_named(own_cache: Path) -> None:
-    cache.store("key", ENTRY, {})
-    path = own_cache / "key" / "one.npy"
-    path.chmod(0o644)
-    path.write_bytes(b"x" * path.stat().st_size)
-    with pytest.raises(InputError, match=r"one\.npy.*delete"):
-        cache.load("key")
-
-
-def test_no_stage_of_a_scene_is_opened_cut_off(own_cache: Path) -> None:
+def test_no_stage_of_a_scene_is_opened_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every matrix, factor and reference that a scene has in the cache, one after another."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
     scene = read_scene("gallery/installed-fasteners")
 
     def open_all() -> None:
@@ -209,7 +171,8 @@ def test_no_stage_of_a_scene_is_opened_cut_off(own_cache: Path) -> None:
         reference(data, load_case(scene))
 
     open_all()
-    for path in sorted(own_cache.rglob("*.npy")):
+    assert {path.stat().st_mode & 0o777 for path in tmp_path.rglob("*.npy")} == {0o444}
+    for path in sorted(tmp_path.rglob("*.npy")):
         whole = path.read_bytes()
         path.chmod(0o644)
         path.write_bytes(whole[:-8])
@@ -247,187 +210,7 @@ def test_matrices_beyond_double_precision_are_refused(changes: Any, said: str, t
         ["import", path, "--out", tmp_path / "x.npz"],
         ["solve", path, "--out", tmp_path],
     ):
-        done = invoke(*words)
+        done = harness(*words)
         assert done.exit_code == 2
         assert said in done.output
         assert str(path) in done.output
-
-
-# --- a series -----------------------------------------------------------------------------------------
-
-COUNT = 12
-
-
-@pytest.fixture(scope="module")
-def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("series")
-    write_strip(folder)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("report.writers.series.write", lambda directory: directory)
-        assert solve_series(folder / "out").exit_code == 0
-    return folder
-
-
-@pytest.fixture
-def series(solved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The directory of a finished series of COUNT cases; its report is not drawn."""
-    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
-    return Path(shutil.copytree(solved, tmp_path / "copy")) / "out"
-
-
-def solve_series(out: Path, *more: object) -> Result:
-    words = ["series", out.parent / "strip.toml", "--threads", 1, "--check", 0, "--out", out]
-    return invoke(*words, *([] if "--cases" in more else ["--cases", COUNT]), *more)
-
-
-def changed(directory: Path, statement: str, *values: Any) -> None:
-    with series_file.connected(directory) as connection:
-        connection.execute(statement, values)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "content", [b"", b"[]", b"SQLite format 3\0", b"\xff" * 5000, b"SQLite format 3\0" + bytes(5000)]
-)
-def test_a_file_that_holds_no_series_is_named(content: bytes, series: Path) -> None:
-    (series / SERIES).write_bytes(content)
-    refused = invoke("report", series)
-    assert refused.exit_code == 2
-    assert SERIES in refused.output
-    assert solve_series(series).exit_code == (2 if content else 0)  # an empty file is a new database
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "statement",
-    [
-        *(f"UPDATE facts SET value = '{value}' WHERE name = 'series'" for value in ("[]", '{"identity": 1}')),
-        "DELETE FROM facts WHERE name = 'series'",
-        "DELETE FROM facts WHERE name = 'contacts'",
-        "UPDATE cases SET gap = NULL WHERE number = 3",
-        "UPDATE cases SET gap = substr(gap, 5) WHERE number = 3",
-        *(f"UPDATE cases SET row = '{row}' WHERE number = 3" for row in ("[]", "1", '{"case": 3}')),
-        "DROP TABLE cases",
-    ],
-)
-def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series: Path) -> None:
-    assert invoke("report", series).exit_code == 0
-    changed(series, statement)
-    refused = invoke("report", series)
-    assert refused.exit_code == 2, refused.output
-    assert SERIES in refused.output
-
-
-# --- a directory of results ---------------------------------------------------------------------------
-
-
-def measured(directory: Path) -> list[dict[str, Any]]:
-    return records.read(directory / records.MEASUREMENTS)
-
-
-@pytest.mark.slow
-def test_the_gate_does_not_pass_what_nobody_planned(copy: Path) -> None:
-    """Without suite.toml, and with the first row alone."""
-    assert invoke("gate", copy).exit_code == 0
-    (copy / "suite.toml").unlink()
-    records.rewrite(copy / records.MEASUREMENTS, measured(copy)[:1])
-    done = invoke("gate", copy)
-    assert done.exit_code == 1
-    assert "suite.toml" in done.output
-
-
-WRONG: list[tuple[str, Any]] = [
-    *(("limit_mm", value) for value in ("a", -1.0, True)),
-    *((name, 3) for name in ("key", "status", "answer", "scene")),
-    *(("gated", 1), ("series", {"cases": "a"}), ("case", "a"), ("solve_s", [1, 2])),
-]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "value"), WRONG)
-def test_a_field_of_another_kind_is_named_with_its_line(name: str, value: Any, copy: Path) -> None:
-    rows = measured(copy)
-    rows[1][name] = value
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    for command in ("gate", "report"):
-        done = invoke(command, copy)
-        if done.exit_code != 0 or command == "gate":
-            assert done.exit_code == 2, done.output
-            assert f"measurements.jsonl: line 2: {name}" in done.output
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "value"), [("key", None), ("time_limit_s", "a")])
-def test_a_run_names_the_row_that_it_cannot_continue(name: str, value: Any, copy: Path) -> None:
-    rows = measured(copy)
-    rows[1][name] = value
-    records.rewrite(copy / records.MEASUREMENTS, rows)
-    words = ["--scene", copy.parent / "tiny.npz", "--solver", "gi", "--out", copy]
-    tiny.write_problem(copy.parent / "tiny.npz")
-    done = invoke("run", "gate", *words)
-    assert done.exit_code == 2
-    assert f"measurements.jsonl: line 2: {name}" in done.output
-
-
-@pytest.mark.slow
-def test_a_nested_line_is_named(copy: Path) -> None:
-    path = copy / records.MEASUREMENTS
-    path.write_bytes(b"[" * 100_000 + b"\n" + path.read_bytes())
-    for command in ("gate", "report"):
-        done = invoke(command, copy)
-        assert done.exit_code == 2
-        assert "line 1" in done.output
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        *(
-            ("suite.toml", text)
-            for text in (b"solver = [3]", b"[[solver]]\nname = 1", b"\xff", b"scenes = 3")
-        ),
-        *(("problems.jsonl", text) for text in (b"[" * 100_000 + b"\n{}\n", b"{}\n", b'{"scene": 3}\n')),
-        ("problems.jsonl", b'{"scene": "tiny", "n": "many"}\n'),
-        *(("machine.json", text) for text in (b"[" * 100_000, b"1", b"\xff")),
-    ],
-)
-def test_a_damaged_file_beside_the_rows_is_named(name: str, content: bytes, copy: Path) -> None:
-    (copy / name).write_bytes(content)
-    done = invoke("report", copy)
-    assert done.exit_code in (0, 2), done.output
-    said = done.output if done.exit_code else (copy / "report" / "report.md").read_text()
-    assert name in said
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("values", [np.full(20, "1.0"), np.full(20, 1.0 + 2j), np.full((20, 2), 1.0)])
-def test_an_answer_of_another_kind_is_none(values: Any, copy: Path) -> None:
-    np.savez(copy / measured(copy)[0]["answer"], x=values, lam=np.zeros(10))
-    done = invoke("gate", copy)
-    assert done.exit_code == 1
-    assert "missing, damaged or not finite" in done.output
-
-
-@pytest.mark.slow
-def test_an_answer_that_is_a_pipe_is_none(copy: Path) -> None:
-    answer = copy / measured(copy)[0]["answer"]
-    answer.unlink()
-    os.mkfifo(answer)
-    assert invoke("gate", copy).exit_code == 1
-
-
-@pytest.mark.slow
-def test_text_among_the_arrays_of_a_scene_is_left_out(copy: Path) -> None:
-    (path,) = (copy / "scenes").iterdir()
-    with np.load(path) as file:
-        arrays = dict(file)
-    np.savez(path, **{name: values.astype(str) for name, values in arrays.items()})
-    assert invoke("report", copy).exit_code == 0
-
-
-@pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*/suite.toml")), ids=lambda path: path.parent.name)
-def test_what_is_published_can_be_read(path: Path) -> None:
-    """Nothing that an older version wrote is taken for damage."""
-    assert read_written(path).solver
-    refuse_unreadable(path.parent)

@@ -6,31 +6,21 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-import psutil
 import pytest
 import tiny
 from rich.console import Console
+from runs import all_end, processes, rows_of
 
 import harness.conformance.isolated as isolated
 import harness.measurement.describe as describing
 import harness.terminal.waiting as waiting_module
-from harness import InputError, own_matrices, solve, solve_series
-from harness.conformance.check import run as check_here
-from harness.conformance.known_problems import known_problems
-from harness.measurement.describe import describe
+from harness import InputError
+from harness.measurement.describe import describe, described
 from harness.planning.suite import read_suite
-from harness.results import records
-from harness.solving.answers import LARGEST_DETAILS, InvalidAnswer, checked
-from problems.forms.assembly import LoadCase
-from problems.forms.problem import in_form
-from solvers.base import Answer, Problem, Solver
 
 pytestmark = pytest.mark.slow
 
@@ -85,37 +75,14 @@ def harness(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str
         command(*arguments), cwd=ROOT, env=environment(folder), capture_output=True, text=True, timeout=120
     )
     assert "Traceback" not in done.stdout + done.stderr
-    assert all_end(folder)
+    assert all_end(folder / "cache")
     return done
-
-
-def all_end(folder: Path) -> bool:
-    """Whether no process is left; the killed ones take a moment."""
-    deadline = time.monotonic() + 5
-    while processes(folder) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    return not processes(folder)
-
-
-def processes(folder: Path) -> list[psutil.Process]:
-    """Those that run with the cache of this test."""
-    found = []
-    for process in psutil.process_iter():
-        try:
-            ours = process.environ().get("RIVETBENCH_CACHE") == str(folder / "cache")
-            if ours and process.status() != psutil.STATUS_ZOMBIE:
-                found.append(process)
-        except psutil.Error:
-            continue
-    return found
 
 
 @pytest.mark.parametrize(
     ("in_solve", "said"),
     [
         ("os._exit(0)", "ended with exit code 0 before its answer"),
-        ("raise KeyboardInterrupt", "raised KeyboardInterrupt"),
-        ("os.kill(os.getpid(), 11)", "killed by SIGSEGV"),
         ("while True: pass", "the test took more than 1 s"),
         ("held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(60)", "more than 700 MiB"),
     ],
@@ -155,7 +122,7 @@ def test_an_endless_import_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         describe(read_suite(str(suite)))
     with pytest.raises(InputError, match="took more than 1 s"):
         isolated.check("mine", plugin, 20, 1000)
-    assert len(processes(tmp_path)) <= 1  # this one
+    assert len(processes(tmp_path / "cache")) <= 1  # this one
 
 
 @pytest.mark.parametrize(
@@ -174,16 +141,13 @@ def test_threads_forks_and_exit_handlers_are_left_behind_by_no_command(
     suite = tiny.write_suite(tmp_path)
     done = harness(tmp_path, "run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
     assert done.returncode == 0
-    assert [row["verdict"] for row in records.read(tmp_path / "out" / records.MEASUREMENTS)] == ["within"]
+    assert [row["verdict"] for row in rows_of(tmp_path / "out")] == ["within"]
 
 
 def test_forms_that_there_are_not_are_bad_input(tmp_path: Path) -> None:
-    plugin = write(tmp_path)
-    plugin.write_text(plugin.read_text().replace('("dual",)', '"dual"'))
-    suite = tiny.write_suite(tmp_path)
-    done = harness(tmp_path, "run", suite, "--plugin", plugin, "--solver", "mine", "--out", tmp_path / "out")
-    assert done.returncode == 2
-    assert "forms" in done.stderr
+    (tmp_path / "mine.py").write_text(tiny.EXACT.replace('("dual",)', '"dual"'))
+    with pytest.raises(InputError, match="solver mine: forms"):
+        described([("mine", {})], tmp_path / "mine.py", "test")
 
 
 def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> None:
@@ -209,7 +173,7 @@ def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> Non
     assert going.returncode == 130
     assert "Interrupted" in said
     assert "Traceback" not in said
-    assert all_end(folder)
+    assert all_end(folder / "cache")
 
 
 @pytest.mark.parametrize("what", ["check", "run"])
@@ -233,102 +197,6 @@ def test_a_check_that_lasts_says_what_it_is_doing(tmp_path: Path, monkeypatch: p
     assert log.getvalue() == "mine: no faults\n"
 
 
-class Odd(Exception):
-    def __str__(self) -> str:
-        raise ValueError("no words")
-
-
-class Raising:
-    def __array__(self, *arguments: Any, **options: Any) -> Any:
-        raise Odd
-
-    def __repr__(self) -> str:
-        raise ValueError("no text")
-
-
-def nested(depth: int) -> list[Any]:
-    deep: list[Any] = []
-    for _ in range(depth):
-        deep = [deep]
-    return deep
-
-
-LAM = np.ones(1)
-#: What an answer may not hold, and what is said of it.
-WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "complex": ({"lam": LAM + 0j}, "wanted real numbers"),
-    "objects": ({"lam": LAM.astype(object)}, "wanted real numbers"),
-    "text": ({"lam": np.array(["1"])}, "wanted real numbers"),
-    "truth": ({"lam": LAM > 0}, "wanted real numbers"),
-    "dates": ({"lam": LAM.astype("m8[s]")}, "wanted real numbers"),
-    "masked": ({"lam": np.ma.masked_array(LAM, [True])}, "wanted real numbers"),
-    "ragged": ({"lam": [[1.0], [1.0, 2.0]]}, "no array"),
-    "scalar": ({"lam": 1.0}, "has shape ()"),
-    "column": ({"lam": LAM[:, None]}, "has shape (1, 1)"),
-    "empty": ({"lam": LAM[:0]}, "has shape (0,)"),
-    "complex x": ({"x": np.ones(2) + 1e-30j}, "wanted real numbers"),
-    "overflow": ({"lam": np.full(1, 1e4000, dtype=np.longdouble)}, "NaN or infinity"),
-    "status": ({"status": np.array(["solved", "solved"])}, "status array("),
-    "no status": ({"status": None}, "status None"),
-    "word": ({"iterations": "five"}, "iterations is 'five'"),
-    "fraction": ({"iterations": 1.5}, "iterations is 1.5"),
-    "NaN count": ({"inner_iterations": np.nan}, "inner_iterations is nan"),
-    "huge count": ({"iterations": 10**400}, "iterations is 1000"),
-    "unprintable": ({"iterations": 10**5000}, "iterations is a int"),
-    "negative": ({"inner_iterations": -1}, "inner_iterations is -1"),
-    "no repr": ({"iterations": Raising()}, "iterations is a Raising"),
-    "seconds": ({"reported_s": "fast"}, "reported_s is 'fast'"),
-    "NaN seconds": ({"reported_s": np.nan}, "reported_s is nan"),
-    "huge seconds": ({"reported_s": 10**400}, "reported_s is 1000"),
-    "list": ({"details": [1]}, "details is [1]"),
-    "deep": ({"details": {"a": nested(100_000)}}, "details is not JSON"),
-    "huge number": ({"details": {"a": 10**400}}, "an integer of 401 digits"),
-    "longer number": ({"details": {"a": 10**5000}}, "details is not JSON"),
-    "half a letter": ({"details": {"a": "\ud800"}}, "details is not JSON"),
-}
-
-
-def smallest() -> Problem:
-    return in_form(known_problems()[0].prepared, "dual")
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_an_answer_that_is_none_is_refused_by_the_gate_and_named_by_check(name: str) -> None:
-    change, said = WRONG[name]
-    with pytest.raises(InvalidAnswer, match=re.escape(said)):
-        checked(replace(Answer("solved", LAM), **change), smallest())
-
-    class Spoilt(Solver):
-        forms = ("dual",)
-
-        def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
-            return replace(Answer("solved", np.zeros(len(load.p))), **change)
-
-    words = "\n".join(map(str, check_here(Spoilt)))
-    assert {"dates": "lam is", "x": "x is"}.get(name, next(iter(change))) in words
-
-
-def test_an_array_whose_conversion_raises_is_refused() -> None:
-    with pytest.raises(ValueError, match="no words"):  # the exception itself cannot be shown
-        str(Odd())
-    with pytest.raises(InvalidAnswer, match="lam is no array"):
-        checked(Answer("solved", Raising()), smallest())  # type: ignore[arg-type]
-
-
-def test_the_gate_makes_plain_types_that_nobody_can_change() -> None:
-    lam = np.ones(1, dtype=np.float32)
-    given = Answer("solved", lam, [1, 2], np.int32(3), None, np.float32(0.5), {"a": np.ones(2)})  # type: ignore[arg-type]
-    found = checked(given, smallest())
-    assert [found.lam.dtype, found.x.dtype] == [np.float64] * 2
-    assert [type(found.iterations), type(found.reported_s), found.details] == [int, float, {"a": [1.0, 1.0]}]
-    lam[:] = 7
-    assert found.lam == [1]
-    with pytest.raises(ValueError, match="read-only"):
-        found.lam[0] = 7
-    large = checked(replace(given, details={"a": "x" * LARGEST_DETAILS}), smallest())
-    assert large.details.keys() == {"dropped"}
-
-
 #: What breaks the contract, and what is said of it; the last one spoils the cache.
 BREACHES = {
     "Answer('solved', lam + 1j)": "wanted real numbers",
@@ -348,25 +216,8 @@ def test_a_run_goes_on_after_a_solver_that_breaks_the_contract(tmp_path: Path) -
     done = harness(
         tmp_path, "run", tiny.write_suite(tmp_path, text, plugin="mine.py"), "--out", tmp_path / "out"
     )
-    rows = records.read(tmp_path / "out" / records.MEASUREMENTS)
+    rows = rows_of(tmp_path / "out")
     assert done.returncode == 3
     assert {(row["status"], row["verdict"]) for row in rows} == {("failed", "no_answer")}
     for row, said in zip(rows, BREACHES.values(), strict=True):
         assert said in row["message"]
-
-
-def test_the_api_refuses_what_the_gate_refuses(tmp_path: Path) -> None:
-    class Complex(Solver):
-        forms = ("dual",)
-
-        def solve(self, ready: Any, load: LoadCase, tolerance: float) -> Answer:
-            return Answer("solved", np.zeros(len(load.p)) + 1j)
-
-    with np.load(tiny.write_problem(tmp_path / "tiny.npz")) as given:
-        scene = own_matrices(**given)
-        case = LoadCase(given["f"], given["g"])
-    with pytest.raises(InputError, match="wanted real numbers"):
-        solve(scene, Complex())
-    (result,) = solve_series(scene, [case], Complex())
-    assert (result.row["status"], result.gap) == ("failed", None)
-    assert "wanted real numbers" in result.row["message"]

@@ -1,4 +1,4 @@
-"""A scene as a quadratic program for another program to read, with its solution and the accuracy to reach.
+"""A scene as files for other programs: K, A, f, g, or a quadratic program with the accuracy to reach.
 
     min ½zᵀPz + qᵀz   subject to   Gz ≤ h     primal: z = x, n displacements, mm; sparse: z = û, N unknowns
                                    z ≥ lb     dual: z = λ, m contact forces, N
@@ -21,9 +21,11 @@ from rich.console import Console
 from harness.planning.form_choice import chosen_form
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import opened, reference_problem
+from problems import formats
 from problems.errors import InputError
-from problems.formats import text
+from problems.forms.assembly import LoadCase
 from problems.forms.names import FORMS, Form
+from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.input import sparse_npz
 from problems.model.scene import MatricesScene, Scene
@@ -31,34 +33,68 @@ from problems.scene import read_scene
 
 from .atomic_output import atomic_output
 
-FORMATS = ("mtx", "npz")
+OF_A_PROGRAM = ("mtx", "npz")
 Arrays = dict[str, Any]
 
 
-def export_form(
+def places(sources: list[str], out: Path, format: str | None) -> list[tuple[str, Path]]:
+    """Each scene with the path to write it to: `out` itself, or one per scene inside it. Raises InputError if
+    two would have the same.
+    """
+    if len(sources) == 1:
+        return [(sources[0], out)]
+    suffix = formats.FORMATS[format].suffix if format in formats.FORMATS else ""
+    found: dict[Path, str] = {}
+    for source in sources:
+        path = out / (read_scene(source).name.replace("/", "_") + suffix)
+        if path in found:
+            raise InputError.one("SCENE", "name", source, f"{found[path]} would be written to {path} as well")
+        found[path] = source
+    return [(source, path) for path, source in found.items()]
+
+
+def export(
     source: str,
-    form: Form,
     format: str | None,
     out: Path,
     console: Console,
+    form: Form | None = None,
     with_reference: bool = False,
     reference_limit_s: float | None = None,
 ) -> None:
-    """Write a scene in a form, by default as .npz if `out` ends in that, else as Matrix Market files.
-
-    Raises InputError.
+    """Write K, A, f, g of a scene in a format of problems.formats; with a form, its quadratic program, by
+    default as .npz if `out` ends in that, else as Matrix Market files. Raises InputError.
     """
-    format = format or ("npz" if out.suffix == ".npz" else "mtx")
-    if format not in FORMATS:
-        allowed = f"{' or '.join(FORMATS)} with --form; other formats hold K, A, f, g"
+    if form is not None:
+        format = format or ("npz" if out.suffix == ".npz" else "mtx")
+    elif with_reference:
+        raise InputError.one("--with-reference", "form", None, "needs --form: primal, dual or sparse")
+    elif format is None:
+        raise InputError.one("export", "--format", None, "is needed without --form; see `list formats`")
+    if format not in (formats.FORMATS if form is None else OF_A_PROGRAM):
+        with_form = f"{' or '.join(OF_A_PROGRAM)} with --form; other formats hold K, A, f, g"
+        allowed = f"one of {', '.join(formats.FORMATS)}" if form is None else with_form
         raise InputError.one("--format", "format", format, allowed)
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
     with atomic_output(out, [Path(source), *own]) as new:
-        arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
-        (_write_npz if format == "npz" else _write_mtx)(new, arrays, about)
-    size = f"{len(arrays['q'])} unknowns, {about['m']} contacts"
-    console.print(f"{scene.name}, {form} form, {size}: {out}")
+        if form is None:
+            problem = opened(scene)
+            data = matrices(problem.prepared, problem.load)
+            formats.FORMATS[format].write(new, data)
+            said = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
+        else:
+            arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
+            (_write_npz if format == "npz" else _write_mtx)(new, arrays, about)
+            said = f"{form} form, {len(arrays['q'])} unknowns, {about['m']} contacts"
+    console.print(f"{out}: {scene.name}, {said}.")
+
+
+def matrices(data: Prepared, load: LoadCase) -> formats.Data:
+    """K, A, f, g of a problem, and its nodes if they are known."""
+    assembly = data.assembly
+    found = {"K": sp.csr_array(assembly.K.matrix), "A": sp.csc_array(assembly.A), "f": load.f, "g": load.g}
+    return found | ({} if assembly.nodes is None else {"nodes": np.array(assembly.nodes)})
 
 
 def _program(
@@ -95,5 +131,5 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
     path.mkdir()
     for name, M in arrays.items():
         matrix = M if sp.issparse(M) or M.ndim == 2 else M[:, None]
-        text.write_one(path / f"{name}.mtx", matrix, "general")
+        formats.text.write_one(path / f"{name}.mtx", matrix, "general")
     (path / "about.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")

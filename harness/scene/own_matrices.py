@@ -1,13 +1,23 @@
-"""How many digits a user's stiffness matrix seems to have, and the error if it was rounded to these."""
+"""What is said of a user's matrices: sizes, notes, and how many digits K seems to have."""
 
 from __future__ import annotations
 
 import scipy.sparse as sp
+from rich.console import Console
 
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from problems.forms.assembly import Assembly
 from problems.input.digits import DOUBLE, apparent_digits, expected_error
+
+
+def print_facts(name: str, assembly: Assembly, console: Console) -> None:
+    """Print the sizes, and what reading has changed. Raises InputError if K is not positive definite."""
+    _ = assembly.K.factors
+    blocks = ", ".join(str(K.shape[0]) for K in assembly.K.matrices)
+    console.print(f"{name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
+    for note in assembly.notes:
+        console.print(f"{note}.", style="yellow")
 
 
 def digits_of(assembly: Assembly) -> int:
