@@ -6,20 +6,21 @@ import sys
 from pathlib import Path
 
 from report.figures import style
+from report.writers.pages import emptied, written
 
 from . import claims, figures5_7, table1, table2, table3, table4
-from .page import Page
 from .rows import study
+
+TITLE = "The paper's claims, tables and figures, beside its published numbers"
 
 
 def write(directory: Path) -> Path:
     """Returns the path of the page. Raises FileNotFoundError, ValueError."""
     found = study(directory)
-    page = Page(directory / "study", "The paper's claims, tables and figures, beside its published numbers")
     with style.applied():
-        for part in (claims, table1, table2, table3, table4, figures5_7):
-            part.write(found, page)
-    return page.write()
+        made = [part.section(found) for part in (claims, table1, table2, table3, table4, figures5_7)]
+    target = emptied(directory / "study") / "study.md"
+    return written(target, TITLE, [section for section in made if section])
 
 
 if __name__ == "__main__":

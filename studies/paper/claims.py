@@ -8,10 +8,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from report.document.blocks import Section
+
 from . import systems_and_starts as one
 from . import table3
 from . import two_methods as two
-from .page import Page
+from .lines import table
 from .rows import FORMS, METHODS, Study
 from .times import Evidence
 
@@ -51,7 +53,7 @@ EVIDENCE: dict[str, Callable[[Study], Evidence]] = {
 }
 
 
-def write(study: Study, page: Page) -> None:
+def section(study: Study) -> Section:
     lines: list[dict[str, Any]] = []
     with CLAIMS.open(encoding="utf-8", newline="") as file:
         for number, claim in enumerate(csv.DictReader(file), start=1):
@@ -60,14 +62,13 @@ def write(study: Study, page: Page) -> None:
             lines.append({"": number, **claim, "here": here, "holds": holds(met for _, met, _ in cases)})
     words = [line["holds"] for line in lines]
     kinds = Counter("in part" if " of " in word else word.split(",")[0] for word in words)
-    page.text("## The paper's claims")
     about = (
         f"*Whether the paper's {len(lines)} claims hold here*: "
         + ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
         + ". A claim is judged in each case that the rows have: a scene, a size, a form. Open: the times are "
         "too close, or a run was stopped."
     )
-    page.table("claims", about, lines)
+    return Section("The paper's claims", [table("claims", about, lines)])
 
 
 def holds(cases: Iterable[bool | None]) -> str:

@@ -6,32 +6,35 @@ import math
 from itertools import pairwise
 
 import pandas as pd
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Drawing
 
+from report.analysis.standings import shown
+from report.document.blocks import Block, Figure, Section
 from report.figures import style
+from report.figures.lines import MARKS, against_contacts, entries
 
-from .page import Page
-from .rows import METHODS, Row, Study
+from .lines import table
+from .rows import METHODS, Study
 from .table3 import LOOKS
 
 FIGURES = {4386: 5, 6112: 6, 11308: 7}
 PAIRS = [(gi, ipm) for ipm in METHODS[:2] for gi in METHODS[2:]] + [("GI primal", "GI dual")]
-THICK = {"linewidth": 2.4, "markersize": 7.5}
-THIN = {"linewidth": 0.9, "markersize": 4.0}
+THICK = {"linewidth": 2.2, "markersize": 5.5, "zorder": 3}
+THIN = {"linewidth": 0.9, "markersize": 3.5}
 
 
-def write(study: Study, page: Page) -> None:
+def section(study: Study) -> Section | None:
     if not study.sizes:
-        return
-    page.text("## Figures 5 to 7: time against active contacts")
+        return None
+    blocks: list[Block] = []
     for n in study.sizes:
-        rows = [row for row in study.rows if row["n"] == n and row["method"]]
         about = (
             f"*Working time against the active contacts, n = {n}*: Figure {FIGURES.get(n, '–')} of the "
-            "paper. Seconds per load case, without data preparation. Thick: the paper's methods. Open "
-            "triangles: stopped at that time; crosses: an answer outside the limit."
+            "paper. Seconds per load case, without data preparation; thick: the paper's methods. "
+            f"{MARKS.format(limit='1e-7 mm')}"
         )
-        page.figure(f"figure-{n}", about, _drawn(rows))
+        rows = [row for row in study.rows if row["n"] == n and row["method"]]
+        blocks.append(Figure(f"figure-{n}", about, _drawn(shown(pd.DataFrame(rows)))))
     about = (
         "*Where one method overtakes the other* as more contacts close: linear interpolation of the "
         "logarithm of the seconds in the active share. Beside a stopped run, only the interval is known."
@@ -41,7 +44,9 @@ def write(study: Study, page: Page) -> None:
         for n in study.sizes
         for a, b in PAIRS
     ]
-    page.table("crossings", about, lines)
+    return Section(
+        "Figures 5 to 7: time against active contacts", [*blocks, table("crossings", about, lines)]
+    )
 
 
 def crossings(study: Study, n: int, first: str, second: str) -> str:
@@ -72,25 +77,11 @@ def crossings(study: Study, n: int, first: str, second: str) -> str:
     return "; ".join(words) + (f" ({lost} not comparable)" if lost else "")
 
 
-def _drawn(rows: list[Row]) -> Figure:
-    others = pd.DataFrame([row for row in rows if row["method"] not in METHODS])
-    looks = {name: look | THICK for name, look in LOOKS.items()}
-    looks |= {name: look | THIN for name, look in style.line_styles(others).items()} if len(others) else {}
-    drawing = style.figure(4.2)
-    axes = drawing.add_subplot()
-    for name, look in looks.items():
-        line = [row for row in rows if row["method"] == name]
-        known = [(row["active"], row["at_least"]) for row in line if not row["cut"]]
-        axes.plot([x for x, _ in known], [math.nan if y is None else y for _, y in known], **look)
-        for row in line:
-            if row["cut"]:
-                axes.plot(row["active"], row["at_least"], "^", color=look["color"], markerfacecolor="none")
-            elif row["verdict"] == "outside":
-                axes.plot(row["active"], row["load_case_s"], "x", color=look["color"], markersize=8)
-    axes.set(xlabel="active contacts", ylabel="working time, s", yscale="log")
-    style.plain_log(axes.yaxis)
-    style.percent_above(axes, rows[0]["m"])
-    occurring = {row["method"] for row in rows}
-    handles = style.legend_entries({name: looks[name] for name in looks if name in occurring})
-    drawing.legend(handles=handles, loc="outside right upper", handlelength=3.2)
+def _drawn(cells: pd.DataFrame) -> Drawing:
+    others = cells[~cells["method"].isin(METHODS)]
+    looks = {name: look | THICK for name, look in LOOKS.items() if name in set(cells["method"])}
+    looks |= {name: look | THIN for name, look in style.line_styles(others).items()}
+    drawing, (axes,) = style.panels(1, 3.8, entries(cells, looks))
+    against_contacts(axes, cells, looks)
+    axes.set(xlabel="active contacts", ylabel="working time, s")
     return drawing

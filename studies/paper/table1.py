@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Drawing
 
+from report.document.blocks import Figure, Section
 from report.document.numbers import tidy_power
 from report.figures import style
 
-from .page import Page
+from .lines import table
 from .printed import TABLE_1
 from .rows import SYSTEMS, Counts, Row, Study, counts
 
@@ -26,23 +27,24 @@ LOOKS = {
 }
 
 
-def write(study: Study, page: Page) -> None:
-    if base := [row for row in study.ipm(preconditioner="none").values() if row["n"] == N and counts(row)]:
-        page.text("## Table 1: CG iterations")
-        scene = base[len(base) // 2]  # by active contacts
-        ours = {name: counts(study.ipm(**SYSTEMS[name]).get(scene["scene"])) for name in SYSTEMS}
-        printed = {f"{name}, printed": found for name, found in PRINTED.items()}
-        lines = {name: found for name in LOOKS if (found := (printed | ours).get(name))}
-        totals = "; ".join(f"{name}: {found}" for name, found in lines.items())
-        about = (
-            f"*CG iterations of each outer iteration, predictor / corrector*, scene {scene['scene']} "
-            f"({scene['active']:.0f} of {scene['m']:.0f} active), to a relative residual of "
-            f"{tidy_power(scene['asked']['cg_tolerance'])} and ε_μ = {tidy_power(scene['tolerance'])} N·mm. "
-            "The paper does not state its load, order of the nodes and tolerances. Summed over the solve: "
-            f"{totals}. ≥: stopped there."
-        )
-        page.table("table1", about, _by_iteration(lines))
-        page.figure("table1", "*The same counts.* Dotted, with triangles: printed.", _drawn(lines))
+def section(study: Study) -> Section | None:
+    base = [row for row in study.ipm(preconditioner="none").values() if row["n"] == N and counts(row)]
+    if not base:
+        return None
+    scene = base[len(base) // 2]  # by active contacts
+    ours = {name: counts(study.ipm(**SYSTEMS[name]).get(scene["scene"])) for name in SYSTEMS}
+    printed = {f"{name}, printed": found for name, found in PRINTED.items()}
+    lines = {name: found for name in LOOKS if (found := (printed | ours).get(name))}
+    totals = "; ".join(f"{name}: {found}" for name, found in lines.items())
+    about = (
+        f"*CG iterations of each outer iteration, predictor / corrector*, scene {scene['scene']} "
+        f"({scene['active']:.0f} of {scene['m']:.0f} active), to a relative residual of "
+        f"{tidy_power(scene['asked']['cg_tolerance'])} and ε_μ = {tidy_power(scene['tolerance'])} N·mm. "
+        "The paper does not state its load, order of the nodes and tolerances. Summed over the solve: "
+        f"{totals}. ≥: stopped there."
+    )
+    figure = Figure("table1", "*The same counts.* Dotted, with triangles: printed.", _drawn(lines))
+    return Section("Table 1: CG iterations", [table("table1", about, _by_iteration(lines)), figure])
 
 
 def _by_iteration(lines: dict[str, Counts]) -> list[Row]:
@@ -58,7 +60,7 @@ def _by_iteration(lines: dict[str, Counts]) -> list[Row]:
     ]
 
 
-def _drawn(lines: dict[str, Counts]) -> Figure:
+def _drawn(lines: dict[str, Counts]) -> Drawing:
     drawing = style.figure(3.6)
     panels: list[Axes] = list(drawing.subplots(1, 2, sharey=True))
     for axes, kind in zip(panels, ("predictor", "corrector"), strict=True):

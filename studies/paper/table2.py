@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from report.document.blocks import Section
 from report.document.numbers import MISSING, significant, whole
 
-from .page import Page
+from .lines import table
 from .printed import TABLE_2
 from .rows import Row, Study
 
@@ -28,11 +29,10 @@ def iterations(row: Row | None) -> int | None:
     return int(row["iterations"]) if row and row["verdict"] != "no_answer" else None
 
 
-def write(study: Study, page: Page) -> None:
+def section(study: Study) -> Section | None:
     found = loads(study)
     if not any(rival in rows for rows in found.values() for rival in RIVALS):
-        return
-    page.text("## Table 2: starting points")
+        return None
     lines = []
     for active, rows in found.items():
         line: Row = {"active, printed": active}
@@ -47,7 +47,7 @@ def write(study: Study, page: Page) -> None:
         "printed ones on the paper's machine. The paper does not state its ε_μ. STP1 and STP2 are as read "
         "from a secondary source; Mehrotra's start is not in the paper."
     )
-    page.table("table2", about, lines)
+    return Section("Table 2: starting points", [table("table2", about, lines, keys=2)])
 
 
 def _beside(ours: str, printed: str) -> str:

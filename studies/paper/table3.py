@@ -6,13 +6,14 @@ import math
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Drawing
 
 from report.analysis.fit import Exponent, exponent
+from report.document.blocks import Figure, Section
 from report.document.numbers import MISSING
 from report.figures import style
 
-from .page import Page
+from .lines import table
 from .rows import METHODS, Row, Study
 
 SHORTEST_S = 1e-3  # a shorter time does not show how the work grows
@@ -69,11 +70,10 @@ def fitted(lines: list[Row], method: str, quantity: str) -> Exponent | None:
     return exponent([line["n"] for line in known], [line[quantity] for line in known])
 
 
-def write(study: Study, page: Page) -> None:
+def section(study: Study) -> Section | None:
     lines = quantities(study)
     if not lines:
-        return
-    page.text("## Table 3: complexity and memory")
+        return None
     about = (
         "*Measured exponents in n*, with the standard error of the fit: least squares in log–log over the "
         "scenes of one joint. Data preparation: the Cholesky factor of K, Q, and the solver's own. The "
@@ -85,17 +85,19 @@ def write(study: Study, page: Page) -> None:
         | {name: str(fitted(lines, name, quantity) or MISSING) for name in METHODS}
         for quantity, order in ORDERS.items()
     ]
-    page.table("table3", about, fits)
-    about = "*The data of the fits.* Working memory: the peak minus what was resident when the work began."
+    data_about = (
+        "*The data of the fits.* Working memory: the peak minus what was resident when the work began."
+    )
     columns = ("n", "active", "method", PREPARATION, OWN, "shown", OUTER, CG, PIVOTS, MEMORY)
     headings = {"shown": WORKING}
     data: list[Row] = [{headings.get(name, name): line.get(name) for name in columns} for line in lines]
-    page.table("scaling", about, [line | {"n × n matrix, MiB": 8 * line["n"] ** 2 / 2**20} for line in data])
-    about = "*The same on logarithmic axes*: a power of n is a straight line, its exponent the slope."
-    page.figure("table3", about, _drawn(lines))
+    data = [line | {"n × n matrix, MiB": 8 * line["n"] ** 2 / 2**20} for line in data]
+    drawn_about = "*The same on logarithmic axes*: a power of n is a straight line, its exponent the slope."
+    blocks = [table("table3", about, fits), table("scaling", data_about, data, keys=3)]
+    return Section("Table 3: complexity and memory", [*blocks, Figure("table3", drawn_about, _drawn(lines))])
 
 
-def _drawn(lines: list[Row]) -> Figure:
+def _drawn(lines: list[Row]) -> Drawing:
     per_step = "s per CG iteration or pivot"
     lines = [line | {per_step: line.get(PER_CG, line.get(PER_PIVOT))} for line in lines]
     drawing = style.figure(5.6)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from report.analysis.fit import Exponent
 from report.document.numbers import power, significant, whole
 
 from . import table3
@@ -22,34 +23,34 @@ AGREE_MM = 1e-7
 # Growth with n.
 
 
+def _fits(study: Study, quantity: str, methods: Iterable[str]) -> dict[str, Exponent]:
+    lines = table3.quantities(study)
+    found = {name: table3.fitted(lines, name, quantity) for name in methods}
+    return {name: fit for name, fit in found.items() if fit}
+
+
 def exponent_at_most(quantity: str, order: float, methods: Iterable[str]) -> Callable[[Study], Evidence]:
     """The fitted exponent, less two standard errors."""
 
     def evidence(study: Study) -> Evidence:
-        lines = table3.quantities(study)
-        for name in methods:
-            if fit := table3.fitted(lines, name, quantity):
-                yield name, fit.slope - 2 * fit.error <= order, f"n^{fit}"
+        for name, fit in _fits(study, quantity, methods).items():
+            yield name, fit.slope - 2 * fit.error <= order, f"n^{fit}"
 
     return evidence
 
 
 def iterations_below_root(study: Study) -> Evidence:
-    lines = table3.quantities(study)
-    for name in METHODS[:2]:
-        if fit := table3.fitted(lines, name, table3.OUTER):
-            known = abs(fit.slope - 0.5) > 2 * fit.error
-            yield name, fit.slope < 0.5 if known else None, f"n^{fit}"
+    for name, fit in _fits(study, table3.OUTER, METHODS[:2]).items():
+        known = abs(fit.slope - 0.5) > 2 * fit.error
+        yield name, fit.slope < 0.5 if known else None, f"n^{fit}"
 
 
 def preparation_of_one_order(study: Study) -> Evidence:
-    lines = table3.quantities(study)
-    for name in FORMS:
-        gi, ipm = (table3.fitted(lines, method, table3.PREPARATION) for method in (name, "IPM"))
-        if gi and ipm:
+    fits = _fits(study, table3.PREPARATION, ("IPM", *FORMS))
+    if ipm := fits.pop("IPM", None):
+        for name, gi in fits.items():
             spread = 2 * math.hypot(gi.error, ipm.error)
-            holds = abs(gi.slope - ipm.slope) <= max(CLOSE, spread)
-            yield name, holds, f"n^{gi} against n^{ipm}"
+            yield name, abs(gi.slope - ipm.slope) <= max(CLOSE, spread), f"n^{gi} against n^{ipm}"
 
 
 def gi_prepares_longer(study: Study) -> Evidence:

@@ -181,8 +181,8 @@ def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> 
     cells = read(write_rows(tmp_path, rows)).cells
     upper, lower = scoreboard(cells, standings(cells)).axes
     assert [[tick.get_text() for tick in axes.get_yticklabels()] for axes in (upper, lower)] == [
-        ["a (dual)", "b (dual)"],
-        ["a (dual)"],
+        ["a (dual)   26 of 26", "b (dual)   1 of 1"],
+        ["a (dual)   26 of 26"],
     ]
     assert [len(axes.patches) for axes in (upper, lower)] == [13, 14]
     boxes = [[t.get_window_extent() for t in axes.get_xticklabels()] for axes in (upper, lower)]
