@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 
-from .block_pivoting import SIGN_UNCERTAINTY, Set, TrialSolution
+from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
 
 
 @dataclass
@@ -27,13 +27,13 @@ class OpenFactor:
     M: BandedInverse
     last: BandFactor | None = None
 
-    def __call__(self, N: Set) -> BandFactor:
+    def __call__(self, N: Mask) -> BandFactor:
         if self.last is None or (self.last.S ^ N).any():
             self.last = self.M.factor(N)
         return self.last
 
 
-def banded_set(factor: OpenFactor, start: TrialSolution, C: Set) -> TrialSolution:
+def banded_set(factor: OpenFactor, start: TrialSolution, C: Mask) -> TrialSolution:
     """λ⁺ and y⁺ of the set C; all vectors are in the order of M, `start.rounding` is |y_C| at the point."""
     M, lam, y = factor.M, start.lam, start.y
     y_C = np.where(C, y, 0.0)

@@ -22,18 +22,19 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from problems.forms.assembly import Mask
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
 from solvers.base import LoadCase
 
-from .block_pivoting import SIGN_UNCERTAINTY, Set, TrialSolution
+from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
 PASSES = 2
 GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
 
 
-def factored_set(prepared: Prepared, start: TrialSolution, C: Set) -> TrialSolution:
+def factored_set(prepared: Prepared, start: TrialSolution, C: Mask) -> TrialSolution:
     """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
     A, lam, y = prepared.assembly.A, start.lam, start.y
     rho = STIFFER * stiffest_contact(prepared)
@@ -44,7 +45,7 @@ def factored_set(prepared: Prepared, start: TrialSolution, C: Set) -> TrialSolut
     return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
 
 
-def penalty_continuation(prepared: Prepared, load: LoadCase) -> Set:
+def penalty_continuation(prepared: Prepared, load: LoadCase) -> Mask:
     """(m,) the contacts that overlap with springs as stiff as K. load : with p."""
     A, overlap = prepared.assembly.A, np.maximum(load.p, 0.0)
     C = overlap > 0
@@ -57,7 +58,7 @@ def penalty_continuation(prepared: Prepared, load: LoadCase) -> Set:
     return C
 
 
-def with_springs(prepared: Prepared, rho: float, C: Set) -> Stiffness:
+def with_springs(prepared: Prepared, rho: float, C: Mask) -> Stiffness:
     """K + ρ A_C A_Cᵀ."""
     assembly = prepared.assembly
     A_C = assembly.A[:, np.flatnonzero(C)]

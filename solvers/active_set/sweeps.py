@@ -25,13 +25,13 @@ from functools import partial
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
 from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
 
 from .banded_sets import OpenFactor, banded_set
-from .block_pivoting import ROUNDING_FACTOR, Set, TrialSolution, block_pivoting, wrong_signs
+from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
 from .factored_sets import factored_set, penalty_continuation
 
 MAX_SWEEPS = 200
@@ -53,7 +53,7 @@ class Case:
     """
 
     load: LoadCase
-    C: Set
+    C: Mask
     trial: TrialSolution
     factor: OpenFactor | None = None
     before: tuple[Vector, Vector] | None = None
@@ -94,7 +94,7 @@ class Sweeps:
         return [self.answer(case, tolerance) for case in self.last]
 
     def solved(
-        self, load: LoadCase, tolerance: float, start: WarmStart | None = None, C: Set | None = None
+        self, load: LoadCase, tolerance: float, start: WarmStart | None = None, C: Mask | None = None
     ) -> Case:
         """The case of a load with p, from nothing or from a solved one. C : its first set, if it is known."""
         order = self.order
@@ -174,7 +174,7 @@ class Sweeps:
         """λ (m,) of the case with Q replaced by M⁻¹, and whether its set is the one before; on such a set it
         is conjugate to the last step.
         """
-        at: Callable[[Set], TrialSolution]
+        at: Callable[[Mask], TrialSolution]
         if self.M is None:
             at = partial(factored_set, self.prepared, case.trial)
         else:

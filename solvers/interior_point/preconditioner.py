@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import NDArray
 from scipy.linalg import blas
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Indices, Matrix, Vector
 
 from .conjugate_gradients import Solved, conjugate_gradients
 from .newton_system import Direct, NewtonSystem
@@ -60,7 +59,7 @@ class CholeskyFactor(Preconditioned):
     order : (m,) the order in which the nodes are eliminated; as they are numbered if None.
     """
 
-    def __init__(self, Q: Matrix, order: NDArray[np.intp] | None = None) -> None:
+    def __init__(self, Q: Matrix, order: Indices | None = None) -> None:
         super().__init__(Q)
         self.order = np.arange(len(Q)) if order is None else order
         permuted = Q if order is None else Q[np.ix_(order, order)]
