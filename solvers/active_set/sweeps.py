@@ -30,9 +30,8 @@ from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
 from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
 
-from .banded_sets import OpenFactor, banded_set
 from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
-from .factored_sets import factored_set, penalty_continuation
+from .contact_sets import OpenFactor, banded_set, factored_set, penalty_continuation
 
 MAX_SWEEPS = 200
 FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
@@ -67,8 +66,8 @@ class Case:
 
 @dataclass
 class Sweeps:
-    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; without M, factorisations of K take its place in every
-    set (see `factored_sets`). last : the cases solved last, from which the next ones start.
+    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; factorisations of K where there is no M. last : the cases
+    solved last, from which the next ones start.
 
     A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ), ρ the rounding of
     Qλ − p (`kkt.largest_rounding`), and r = max(|y_C|, max(−y)) is at most 0.02 tolerance; or does not halve

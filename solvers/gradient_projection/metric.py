@@ -21,8 +21,8 @@ import numpy as np
 
 from problems.forms.assembly import Mask, Vector
 from problems.forms.compliance import Compliance
-from solvers.active_set.banded_sets import OpenFactor, banded_set
 from solvers.active_set.block_pivoting import TrialSolution, block_pivoting
+from solvers.active_set.contact_sets import OpenFactor, banded_set
 
 STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
 POWER_STEPS = 30  # products for λmax, once per assembly

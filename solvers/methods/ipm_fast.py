@@ -14,8 +14,7 @@ import numpy as np
 
 from solvers.active_set.sweeps import Sweeps
 from solvers.base import Answer, LoadCase, Problem, failed
-from solvers.interior_point.banded import Banded
-from solvers.interior_point.newton_system import Direct, NewtonSystem
+from solvers.interior_point.newton_system import Banded, Direct, NewtonSystem
 from solvers.interior_point.schemes import NewtonSteps, mehrotra
 from solvers.interior_point.start import algorithm_5, stp2
 from solvers.method import Method, State
