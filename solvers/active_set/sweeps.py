@@ -66,8 +66,9 @@ class Case:
 
 @dataclass
 class Sweeps:
-    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; factorisations of K where there is no M. last : the cases
-    solved last, from which the next ones start.
+    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; factorisations of K where there is no M.
+
+    last : the cases solved last, from which the next ones start.
 
     A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ), ρ the rounding of
     Qλ − p (`kkt.largest_rounding`), and r = max(|y_C|, max(−y)) is at most 0.02 tolerance; or does not halve
