@@ -23,23 +23,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
-from problems.forms.assembly import LoadCase, Vector
-from problems.forms.names import DENSE_FORMS, FORMS, Form
-from problems.forms.problem import Problem
-
-__all__ = [
-    "DENSE_FORMS",
-    "FORMS",
-    "Answer",
-    "Batch",
-    "Form",
-    "LoadCase",
-    "Problem",
-    "Solver",
-    "Status",
-    "WarmStart",
-    "failed",
-]
+from problems.forms.assembly import LoadCase as LoadCase
+from problems.forms.assembly import Vector
+from problems.forms.names import DENSE_FORMS as DENSE_FORMS
+from problems.forms.names import FORMS as FORMS
+from problems.forms.names import Form as Form
+from problems.forms.problem import Problem as Problem
 
 #: A solver's report on its own answer.
 Status = Literal["solved", "inaccurate", "iteration_limit", "failed"]

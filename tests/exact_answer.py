@@ -1,10 +1,57 @@
-"""Whether a manufactured problem's answer satisfies the optimality conditions, without any rounding."""
+"""Answers without any rounding: that of a small problem, and whether a manufactured one's is optimal."""
 
+from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from problems.forms.assembly import Assembly, LoadCase, Mask, Vector
 from problems.forms.manufactured_problem import ManufacturedProblem
+
+Exact = list[Fraction]
+
+
+def exactly(v: Vector) -> Exact:
+    return [Fraction(float(value)) for value in v]
+
+
+def solve_exactly(M: list[Exact], b: Exact) -> Exact:
+    """M x = b in rational numbers, M regular."""
+    rows = [[*row, value] for row, value in zip(M, b, strict=True)]
+    for j in range(len(rows)):
+        pivot = next(i for i in range(j, len(rows)) if rows[i][j])
+        rows[j], rows[pivot] = rows[pivot], rows[j]
+        for i in range(len(rows)):
+            if i != j and rows[i][j]:
+                factor = rows[i][j] / rows[j][j]
+                rows[i] = [a - factor * c for a, c in zip(rows[i], rows[j], strict=True)]
+    return [row[-1] / row[j] for j, row in enumerate(rows)]
+
+
+def exact_solution(assembly: Assembly, load: LoadCase, active: Mask) -> tuple[Exact, Exact, Exact]:
+    """x, λ_C and the open gaps of the contact set, all exact for the given floating-point data."""
+    K, A = assembly.K.matrix.toarray(), assembly.A.toarray()
+    A_C = A[:, active]
+    zero = np.zeros((A_C.shape[1],) * 2)
+    M = [exactly(row) for row in np.block([[K, A_C], [A_C.T, zero]])]
+    solution = solve_exactly(M, exactly(np.append(load.f, load.g[active])))
+    x, lam = solution[: len(K)], solution[len(K) :]
+    gaps = [
+        Fraction(float(load.g[j])) - sum(a * b for a, b in zip(exactly(A[:, j]), x, strict=True))
+        for j in np.flatnonzero(~active)
+    ]
+    return x, lam, gaps
+
+
+def exact_optimum(assembly: Assembly, load: LoadCase, *first: Mask) -> tuple[Exact, Mask, Exact]:
+    """x, the contact set and its λ: of `first`, or of all sets the first that is optimal."""
+    every = map(np.array, product((False, True), repeat=assembly.m))
+    for active in (*first, *every):
+        x, lam, gaps = exact_solution(assembly, load, active.astype(bool))
+        if min([*lam, *gaps], default=0) >= 0:
+            return x, active.astype(bool), lam
+    raise AssertionError("a strictly convex problem has an answer")
 
 
 def whole(values: Any, one: int) -> Any:

@@ -9,7 +9,7 @@ import scipy.optimize
 import scipy.sparse as sp
 
 from harness.conformance.known_problems import contact_rows, stiffness
-from problems.forms.assembly import Assembly, LoadCase, Vector
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
 
@@ -39,11 +39,23 @@ def make_load(seed: int, prepared: Prepared, force: float = 500.0) -> tuple[Load
 
 def solve_by_nnls(prepared: Prepared, case: LoadCase) -> tuple[Vector, Vector]:
     """x and λ, polished once on the active set that NNLS found."""
-    U = sla.cholesky(prepared.Q)
     p = prepared.dual_load(case)
-    lam = scipy.optimize.nnls(U, sla.solve_triangular(U, p, trans="T"), maxiter=10_000)[0]
+    lam = by_nnls(prepared.Q, p)
     closed = lam > 0
     lam[closed] = np.linalg.solve(prepared.Q[np.ix_(closed, closed)], p[closed])
     # Not Prepared.recover, so that the expectation has nothing in common with it.
     K = sla.block_diag(*prepared.assembly.K.matrices)
     return np.linalg.solve(K, case.f - sp.csr_array(prepared.assembly.A) @ lam), lam
+
+
+def definite(size: int, seed: int, condition: float = 1e4) -> Matrix:
+    """Q of any contacts: each acts on all others alike, whatever their distance."""
+    W, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((size, size)))
+    Q = (W * np.geomspace(1.0, condition, size)) @ W.T
+    return np.asfortranarray((Q + Q.T) / 2)
+
+
+def by_nnls(Q: Matrix, p: Vector) -> Vector:
+    """λ ≥ 0 with y = Qλ − p ≥ 0 and λᵀy = 0."""
+    U = sla.cholesky(Q)
+    return scipy.optimize.nnls(U, sla.solve_triangular(U, p, trans="T"), maxiter=10_000)[0]

@@ -23,10 +23,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.results.schema import Verdict
-from problems.forms.assembly import LoadCase, Vector
+from problems.forms.assembly import LoadCase, Mask, Vector
 from problems.forms.prepared import Prepared
 
 #: The required accuracy: max-norm of the displacement error, mm.
@@ -45,7 +44,7 @@ class Reference:
 
     x: Vector
     lam: Vector
-    active: NDArray[np.bool_]
+    active: Mask
     bound_mm: float
     route: str
     unit_mm: Vector | float = 1.0

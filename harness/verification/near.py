@@ -6,15 +6,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
 
 MAX_SETS = 10  # tried with M for one load case
-
-Contacts = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,7 @@ class Near:
         u[self.M.order] = self.M.product((v / self.R)[self.M.order])
         return u / self.R
 
-    def factor(self, N: Contacts) -> BandFactor | None:
+    def factor(self, N: Mask) -> BandFactor | None:
         """Of M_NN; None without M, or if rounding makes it indefinite."""
         if self.M is not None:
             with suppress(np.linalg.LinAlgError):

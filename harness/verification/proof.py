@@ -32,9 +32,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.forms.assembly import LoadCase, Mask, Matrix, Vector
 from problems.forms.prepared import Prepared
 from problems.stiffness.rounding import gamma
 
@@ -47,8 +46,6 @@ MAX_WORSE = 2  # passes in a row that do not halve the bound
 MAX_PRODUCTS = 60  # of conjugate gradients in a pass
 REDUCTION = 1e-6  # of y_C in a pass
 AT_ROUNDING = 1.5  # of the rounding of x to float64: a bound that no further pass improves
-
-Contacts = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ class Proven:
     bound_mm: float
 
     @property
-    def active(self) -> Contacts:
+    def active(self) -> Mask:
         return self.lam.hi > 0
 
 

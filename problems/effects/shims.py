@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 from problems.input.bounded import Finite, Positive
 from problems.model.effect import ContactEffect, GapEffect, at_contacts
 from problems.model.joint import Joint
@@ -32,7 +31,7 @@ class Shims(ContactEffect, GapEffect):
             allowed = f"ranges that contain a node; nodes are spaced {hx:g} × {hy:g} mm from (0, 0)"
             yield "x, y", [list(self.x), list(self.y)], allowed
 
-    def _covered(self, joint: Joint) -> NDArray[np.bool_]:
+    def _covered(self, joint: Joint) -> Mask:
         at_x, at_y = joint.nodes.T
         return (self.x[0] <= at_x) & (at_x <= self.x[1]) & (self.y[0] <= at_y) & (at_y <= self.y[1])
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from problems.stiffness.block import Matrix as Matrix
-from problems.stiffness.block import Vector as Vector
+from problems.stiffness.arrays import Indices as Indices
+from problems.stiffness.arrays import Mask as Mask
+from problems.stiffness.arrays import Matrix as Matrix
+from problems.stiffness.arrays import Vector as Vector
 from problems.stiffness.operator import Stiffness
 
 
@@ -35,7 +36,7 @@ class Assembly:
     nodes: Matrix | None = None
     parts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    junction: NDArray[np.intp] | None = None
+    junction: Indices | None = None
 
     @property
     def n(self) -> int:

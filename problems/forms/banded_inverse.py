@@ -14,14 +14,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
 from problems.stiffness.band_solve import band_cholesky
 
-from .assembly import Matrix, Vector
-
-Contacts = NDArray[np.intp]
+from .assembly import Indices, Mask, Matrix, Vector
 
 WINDOW_LINES = 4  # lines of contacts across the joint in a window, before the current one
 DEFAULT_LINE = 16  # contacts per line if coordinates are unknown
@@ -35,14 +32,14 @@ class BandedInverse:
     band : (b + 2, m) column-major, M[j + d, j] in row d, the last row zero.
     """
 
-    order: NDArray[np.intp]
+    order: Indices
     band: Matrix
 
     def product(self, v: Vector) -> Vector:
         """M v."""
         return blas.dsbmv(len(self.band) - 1, 1.0, self.band, v, lower=1)
 
-    def factor(self, S: NDArray[np.bool_]) -> BandFactor:
+    def factor(self, S: Mask) -> BandFactor:
         """The Cholesky factor of M_SS. Raises LinAlgError if rounding makes it indefinite."""
         rows, width = np.flatnonzero(S), len(self.band) - 1
         nearer = np.arange(len(rows)) - np.searchsorted(rows, rows - width)
@@ -73,12 +70,12 @@ class BandedInverse:
 class BandFactor:
     """M_SS = LLᵀ, rows : the indices in S."""
 
-    S: NDArray[np.bool_]
-    rows: NDArray[np.intp]
+    S: Mask
+    rows: Indices
     L: Matrix
 
     @classmethod
-    def of(cls, S: NDArray[np.bool_], rows: NDArray[np.intp], band: Matrix) -> BandFactor:
+    def of(cls, S: Mask, rows: Indices, band: Matrix) -> BandFactor:
         """band : of M_SS, column-major; overwritten. Raises LinAlgError if it is not positive definite."""
         L, info = band_cholesky(band) if rows.size else (band, 0)
         if info:
@@ -102,7 +99,7 @@ def banded_inverse(Q: Matrix, nodes: Matrix | None) -> BandedInverse:
     return of_windows(Windows.of(nodes, len(Q)), lambda window: rows[np.ix_(window, window)].T)
 
 
-def of_windows(windows: Windows, Q_WW: Callable[[Contacts], Matrix]) -> BandedInverse:
+def of_windows(windows: Windows, Q_WW: Callable[[Indices], Matrix]) -> BandedInverse:
     """Q_WW : a window's principal submatrix of Q as a new array, stored by columns; it is overwritten.
 
     Raises LinAlgError if one is not positive definite.
@@ -128,7 +125,7 @@ def of_windows(windows: Windows, Q_WW: Callable[[Contacts], Matrix]) -> BandedIn
 class Windows:
     """order : (m,) the contacts along the joint. across : contacts per line across it."""
 
-    order: Contacts
+    order: Indices
     across: int
 
     @classmethod
@@ -160,6 +157,6 @@ class Windows:
         sizes = ((stop - first, stop - start) for first, start, stop in self.ranges())
         return float(sum(window**3 / 3 + 2 * window**2 * line for window, line in sizes))
 
-    def contacts(self) -> list[Contacts]:
+    def contacts(self) -> list[Indices]:
         """The contacts of each window."""
         return [self.order[first:stop] for first, _, stop in self.ranges()]

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from problems.stiffness.operator import Stiffness
 
-from .assembly import Matrix
+from .assembly import Indices, Matrix
 from .product import product
 
-Rows = NDArray[np.intp]
 #: A window of contacts → its principal submatrix of Q, stored by columns, which may be overwritten.
-Local = Callable[[Rows], Matrix]
+Local = Callable[[Indices], Matrix]
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class ComplianceProducts:
         product: Matrix = self.A.T @ self.K.solve(self.A @ lam)
         return product
 
-    def submatrix(self, rows: Rows) -> ComplianceProducts:
+    def submatrix(self, rows: Indices) -> ComplianceProducts:
         """The principal submatrix of some contacts."""
         return ComplianceProducts(self.K, self.A[:, rows])
 
@@ -39,7 +37,7 @@ class ComplianceProducts:
         """The matrix, by columns."""
         return self.K.compliance(self.A)
 
-    def local(self, windows: Sequence[Rows], single: bool) -> Local | None:
+    def local(self, windows: Sequence[Indices], single: bool) -> Local | None:
         """Principal submatrices of windows of contacts near each other, in single precision to about four
         digits; None where they cost too much.
         """
@@ -55,13 +53,13 @@ class DenseCompliance:
     def __matmul__(self, lam: Matrix) -> Matrix:
         return product(self.Q, lam)
 
-    def submatrix(self, rows: Rows) -> DenseCompliance:
+    def submatrix(self, rows: Indices) -> DenseCompliance:
         return DenseCompliance(self.Q[np.ix_(rows, rows)].T)
 
     def toarray(self) -> Matrix:
         return self.Q
 
-    def local(self, windows: Sequence[Rows], single: bool) -> Local:
+    def local(self, windows: Sequence[Indices], single: bool) -> Local:
         rows = np.asarray(self.Q).T  # no memory map, whose views cost more than their copies
         return lambda window: rows[np.ix_(window, window)].T
 

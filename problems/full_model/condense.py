@@ -18,8 +18,8 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from scipy.linalg import lapack
 
-from problems.forms.assembly import Matrix, Vector
-from problems.model.part import PartLoadEffect, PartModel, Unknowns
+from problems.forms.assembly import Indices, Matrix, Vector
+from problems.model.part import PartLoadEffect, PartModel
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
@@ -120,7 +120,7 @@ def _condensed(part: PartModel, progress: Callable[[float], None]) -> Matrix:
 
 
 def condensed_load(
-    effect: PartLoadEffect, part: PartModel, interior: Callable[[], tuple[Unknowns, SparseBlock]]
+    effect: PartLoadEffect, part: PartModel, interior: Callable[[], tuple[Indices, SparseBlock]]
 ) -> Vector:
     """(node_count,) forces in N on the junction nodes: f_j − K_ji K_ii⁻¹ f_i, j the deflections there.
 

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.assembly import Assembly, Indices, LoadCase, Matrix, Vector
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
 from problems.model.effect import Effect, ForceEffect, GapEffect, SpringEffect
@@ -31,7 +31,7 @@ from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
 from .graded import graded
-from .numbering import Numbering, Unknowns
+from .numbering import Numbering
 
 CODE = ("problems/fem", "problems/model", "problems/effects", "problems/full_model")
 WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
@@ -125,7 +125,7 @@ class JointModel:
         return Numbering.of(self.parts, self.tied)
 
     @cached_property
-    def junction(self) -> Unknowns:
+    def junction(self) -> Indices:
         """(n,) the numbers of the junction's deflections, in the order of x."""
         places = zip(self.numbering.places, self.parts, strict=True)
         return np.concatenate([place[part.deflections] for place, part in places])
@@ -183,7 +183,7 @@ class JointModel:
             nodes[place[place >= 0]] = np.column_stack([plate.x[ix], plate.y[iy]])[place >= 0]
         return nodes
 
-    def interior(self, k: int) -> tuple[Unknowns, SparseBlock]:
+    def interior(self, k: int) -> tuple[Indices, SparseBlock]:
         """The unknowns i of a part that condensation eliminates, in the order of a narrow band, and K_ii."""
         if k not in self._interiors:
             part = self.parts[k]
@@ -192,7 +192,7 @@ class JointModel:
         return self._interiors[k]
 
     @cached_property
-    def _interiors(self) -> dict[int, tuple[Unknowns, SparseBlock]]:
+    def _interiors(self) -> dict[int, tuple[Indices, SparseBlock]]:
         return {}
 
     def dense(self, progress: Progress = silent) -> DensePrepared:

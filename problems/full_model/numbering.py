@@ -11,11 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from problems.forms.assembly import Indices
 from problems.model.part import PartModel
-
-Unknowns = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class Numbering:
     sizes : the number of unknowns of each diagonal block of K̂.
     """
 
-    places: tuple[Unknowns, ...]
+    places: tuple[Indices, ...]
     sizes: tuple[int, ...]
 
     @classmethod
@@ -53,12 +51,12 @@ class Numbering:
         return sum(self.sizes)
 
 
-def free_unknowns(model: PartModel) -> Unknowns:
+def free_unknowns(model: PartModel) -> Indices:
     """The unknowns of a part's plate that are not built in."""
     return np.concatenate([model.plate.line_dofs(line) for line in model.free_lines])
 
 
-def _grid_lines(model: PartModel, unknowns: Unknowns) -> tuple[Unknowns, Unknowns]:
+def _grid_lines(model: PartModel, unknowns: Indices) -> tuple[Indices, Indices]:
     """The number of the grid line x = const, and that of y = const, on which each unknown lies."""
     nx, ny = len(model.plate.x), len(model.plate.y)
     iy, _, ix, _ = np.unravel_index(unknowns, (ny, 2, nx, 2))
@@ -66,6 +64,6 @@ def _grid_lines(model: PartModel, unknowns: Unknowns) -> tuple[Unknowns, Unknown
     return ix, iy - model.junction.start
 
 
-def _widest(lines: Unknowns) -> int:
+def _widest(lines: Indices) -> int:
     """The most unknowns on a line of these numbers."""
     return int(np.bincount(lines - lines.min()).max())

@@ -9,9 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
+from problems.forms.assembly import Assembly, Indices, LoadCase, Matrix, Vector
 from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
 from problems.model.scene import ManufacturedScene, PrintedOptimum
 from problems.stiffness.operator import Stiffness
@@ -43,7 +42,7 @@ def nodes(x: Vector, y: Vector) -> Matrix:
 
 
 def bounded(
-    K: sp.csc_array, f: Vector, at: Matrix, sign: float, bound: Vector, held: NDArray[np.intp] | None = None
+    K: sp.csc_array, f: Vector, at: Matrix, sign: float, bound: Vector, held: Indices | None = None
 ) -> ManufacturedProblem:
     """±u ≤ ±`bound` at the unknowns `held`, by default all: a contact each."""
     rows = np.arange(f.size) if held is None else held

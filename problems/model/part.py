@@ -14,15 +14,12 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from problems.fem.plate import Plate
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Indices, Vector
 
 from .effect import PartEffect, Range, StiffnessEffect
 from .joint import Joint, Part
-
-Unknowns = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -70,12 +67,12 @@ class PartModel:
         return [line for line in range(len(self.plate.y)) if line not in self.clamped]
 
     @property
-    def deflections(self) -> Unknowns:
+    def deflections(self) -> Indices:
         """The deflections at the junction nodes, x running fastest: what condensation keeps."""
         return np.concatenate([self.plate.deflection_dofs(line) for line in self.junction])
 
     @property
-    def others(self) -> Unknowns:
+    def others(self) -> Indices:
         """The free unknowns that condensation eliminates."""
         held = np.zeros(self.plate.size, dtype=bool)
         held[self.deflections] = True

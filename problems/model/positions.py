@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, model_validator
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Indices, Matrix, Vector
 from problems.input.bounded import Finite, NotNegative
 from problems.input.csv_table import rows_from_file
 
@@ -64,7 +63,7 @@ class Positions(ForceEffect):
             if not (0 <= x <= length and 0 <= y <= width):
                 yield f"points[{k}]", [x, y], allowed
 
-    def nearest_nodes(self, joint: Joint) -> NDArray[np.intp]:
+    def nearest_nodes(self, joint: Joint) -> Indices:
         """The junction node nearest to each point, at most half a node spacing away along x and y."""
         nx, _ = joint.junction.nodes
         positions = self.marks(joint)

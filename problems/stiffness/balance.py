@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .block import Vector
+from .arrays import Vector
 
 POWER_STEPS = 5
 

@@ -15,7 +15,7 @@ import numpy as np
 import threadpoolctl
 from scipy.linalg import blas, lapack
 
-from .block import Matrix
+from .arrays import Matrix
 
 PANEL = 64  # rows; a narrower band is solved by dpbtrs
 FEW = 2  # right-hand sides, for which dpbtrs is as fast

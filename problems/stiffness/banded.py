@@ -11,10 +11,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import blas
 
+from .arrays import Indices, Matrix, Vector
 from .band_solve import band_cholesky, band_solve
-from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector, scaled
+from .block import NotPositiveDefinite, SparseBlock, scaled
 from .rounding import U, gamma
-from .selected_inverse import BlockPart, Rows, band_blocks
+from .selected_inverse import BlockPart, band_blocks
 
 COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
 
@@ -22,7 +23,7 @@ COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
 class BandedBlock(SparseBlock):
     """order : the unknowns in the order of the band; None as they are. width : the half-bandwidth b then."""
 
-    def __init__(self, matrix: sp.csc_array, width: int, order: Rows | None = None) -> None:
+    def __init__(self, matrix: sp.csc_array, width: int, order: Indices | None = None) -> None:
         super().__init__(matrix)
         self.width, self.order = width, order
 
@@ -44,7 +45,7 @@ class BandedBlock(SparseBlock):
         return [self.L]
 
     @property
-    def band(self) -> tuple[int, Rows | None]:
+    def band(self) -> tuple[int, Indices | None]:
         return self.width, self.order
 
     @property
@@ -98,7 +99,7 @@ class BandedBlock(SparseBlock):
         Q[np.ix_(order, order)] = found
         return Q
 
-    def local_compliance(self, A: sp.csc_array, windows: Sequence[Rows], single: bool) -> BlockPart | None:
+    def local_compliance(self, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
         return BlockPart.of(self.L, self._rows(A), windows, single)
 
     def _rows(self, A: sp.csc_array) -> sp.csc_array:

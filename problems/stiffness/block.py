@@ -10,10 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .selected_inverse import BlockPart, Rows
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from .arrays import Indices, Matrix, Vector
+from .selected_inverse import BlockPart
 
 ENTRIES_AT_A_TIME = 2**15  # of a sparse block: a panel stays in the processor's cache
 
@@ -48,7 +46,7 @@ class Block(ABC):
         return found
 
     @property
-    def band(self) -> tuple[int, Rows | None] | None:
+    def band(self) -> tuple[int, Indices | None] | None:
         """The half-bandwidth, and the unknowns in the order of the band (None: as they are); None without."""
         return None
 
@@ -90,7 +88,7 @@ class Block(ABC):
     def compliance(self, A: sp.csc_array) -> Matrix:
         """AᵀK⁻¹A, (m, m) mm/N, for A (size, m)."""
 
-    def local_compliance(self, A: sp.csc_array, windows: Sequence[Rows], single: bool) -> BlockPart | None:
+    def local_compliance(self, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
         """AᵀK⁻¹A for contacts that share a window; None where the factor does not give them cheaply."""
         return None
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from .block import ENTRIES_AT_A_TIME, Block, Matrix, NotPositiveDefinite, Vector
+from .arrays import Matrix, Vector
+from .block import ENTRIES_AT_A_TIME, Block, NotPositiveDefinite
 from .rounding import SAFE, gamma
 from .rounding import U as ROUNDING
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from .block import Matrix, NotPositiveDefinite, SparseBlock, Vector, scaled
+from .arrays import Matrix, Vector
+from .block import NotPositiveDefinite, SparseBlock, scaled
 from .rounding import U as ROUNDING
 from .rounding import gamma
 

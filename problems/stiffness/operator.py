@@ -12,10 +12,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from .arrays import Indices, Matrix, Vector
 from .balance import POWER_STEPS, balanced_units, least_eigenvalue
-from .block import Block, Matrix, NotPositiveDefinite, Vector
+from .block import Block, NotPositiveDefinite
 from .dense import DenseBlock
-from .selected_inverse import BlockPart, Rows
+from .selected_inverse import BlockPart
 from .sparse import sparse_block
 
 DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
@@ -173,8 +174,8 @@ class Stiffness:
         return np.asfortranarray((Q + Q.T) / 2)
 
     def local_compliance(
-        self, A: sp.csc_array, windows: Sequence[Rows], single: bool = True
-    ) -> Callable[[Rows], Matrix] | None:
+        self, A: sp.csc_array, windows: Sequence[Indices], single: bool = True
+    ) -> Callable[[Indices], Matrix] | None:
         """Q_WW (k, k) mm/N, by columns, of windows W of contacts, in single precision to four digits, for a
         preconditioner; None unless every block has a band along which those of a window are near each other.
         """
@@ -186,7 +187,7 @@ class Stiffness:
                 return None
             parts.append(part)
 
-        def local(contacts: Rows) -> Matrix:
+        def local(contacts: Indices) -> Matrix:
             Q = np.zeros((len(contacts), len(contacts)), order="F")
             for part in parts:
                 part.add_to(Q, contacts)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from .block import Matrix, Vector, scaled
+from .arrays import Matrix, Vector
+from .block import scaled
 from .operator import Stiffness
 
 

@@ -23,12 +23,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
+from .arrays import Indices, Matrix
+
 UNBLOCKED = 64  # LAPACK's inverse of a triangle is slower than products beyond that
 FURTHEST = 20  # half-bandwidths between the contacts of a window
 SMALL = 2000  # unknowns between them that are never too many
 
-Rows = NDArray[np.intp]
-Matrix = NDArray[np.float64]
 Entries = NDArray[np.floating[Any]]
 
 
@@ -40,8 +40,8 @@ class SelectedInverse:
     panels : for each block, its rows of K⁻¹ at its own and the following blocks' unknowns.
     """
 
-    rows: Rows
-    starts: Rows
+    rows: Indices
+    starts: Indices
     panels: tuple[Entries, ...]
 
     def submatrix(self, start: int, stop: int) -> Entries:
@@ -59,7 +59,7 @@ class SelectedInverse:
         return Z
 
 
-def selected_inverse(L: NDArray[np.float64], rows: Rows, reach: int, single: bool = True) -> SelectedInverse:
+def selected_inverse(L: Matrix, rows: Indices, reach: int, single: bool = True) -> SelectedInverse:
     """K⁻¹ at pairs of `rows`, ascending, that are at most `reach` unknowns apart. single : the precision."""
     dtype = np.dtype(np.float32 if single else np.float64)
     trmm = blas.strmm if single else blas.dtrmm
@@ -91,7 +91,7 @@ def selected_inverse(L: NDArray[np.float64], rows: Rows, reach: int, single: boo
 
 
 def band_blocks(
-    L: NDArray[np.float64], start: int, stop: int, width: int, dtype: np.dtype[Any]
+    L: Matrix, start: int, stop: int, width: int, dtype: np.dtype[Any]
 ) -> tuple[Entries, Entries]:
     """L_ii, lower triangular, and L_{i+1,i} (upper triangular, as many rows as there are)."""
     wide, after = stop - start, min(stop + width, L.shape[1]) - stop
@@ -131,11 +131,11 @@ class BlockPart:
     """
 
     inverse: SelectedInverse
-    places: Rows
+    places: Indices
     values: Matrix
 
     @classmethod
-    def of(cls, L: Matrix, A: sp.csc_array, windows: Sequence[Rows], single: bool) -> BlockPart | None:
+    def of(cls, L: Matrix, A: sp.csc_array, windows: Sequence[Indices], single: bool) -> BlockPart | None:
         """From the band factor K = LLᵀ, for the contacts in each window; in single or double precision.
 
         None if those of a window are too far apart in the numbering of the band.
@@ -150,7 +150,7 @@ class BlockPart:
         rows = np.unique(A.indices).astype(np.intp)
         return cls(selected_inverse(L, rows, reach, single), np.searchsorted(rows, places), values)
 
-    def add_to(self, Q: Matrix, contacts: Rows) -> None:
+    def add_to(self, Q: Matrix, contacts: Indices) -> None:
         places, values = self.places[:, contacts], self.values[:, contacts]
         used = values != 0
         if not used.any():
@@ -163,7 +163,7 @@ class BlockPart:
                 Q += left[:, None] * Z[np.ix_(row, column)] * right
 
 
-def _padded(A: sp.csc_array) -> tuple[Rows, Matrix]:
+def _padded(A: sp.csc_array) -> tuple[Indices, Matrix]:
     """(s, m) row numbers and values of the entries of each column, s the most that one has."""
     counts = np.diff(A.indptr)
     slots = int(counts.max(initial=0))

@@ -12,10 +12,10 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
+from .arrays import Indices, Matrix
 from .banded import BandedBlock, half_bandwidth
-from .block import Matrix, SparseBlock
+from .block import SparseBlock
 from .general import GeneralBlock
-from .selected_inverse import Rows
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 
@@ -34,7 +34,7 @@ def sparse_block(K: sp.csc_array, nodes: Matrix | None = None) -> SparseBlock:
     return GeneralBlock(K, least)
 
 
-def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Rows]:
+def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Indices]:
     if nodes is not None:
         longer, shorter = np.argsort(-np.ptp(nodes, axis=0))
         body = connected_components(K, directed=False)[1]

@@ -6,15 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 
 MAX_STALE_PASSES = 10  # passes without a new smallest count of wrong signs, before steps of descent
 ROUNDING_FACTOR = 10.0  # times the observed rounding: a value closer to zero has no wrong sign
 SIGN_UNCERTAINTY = 1e-5  # of |y_C| where a change starts: smaller values have no reliable sign
-
-Set = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -30,21 +27,21 @@ class TrialSolution:
 class PivotingResult:
     """The contact set, its λ and y, the sets tried, the steps of descent, and whether every sign is right."""
 
-    C: Set
+    C: Mask
     trial: TrialSolution
     passes: int
     descents: int
     converged: bool
 
 
-def wrong_signs(C: Set, trial: TrialSolution, compliance: Vector, tolerance: float) -> Set:
+def wrong_signs(C: Mask, trial: TrialSolution, compliance: Vector, tolerance: float) -> Mask:
     """i in C with q_ii λ_i < −δ or off C with y_i < −δ, mm; δ = max(tolerance, 10 × observed rounding)."""
     floor = max(tolerance, ROUNDING_FACTOR * trial.rounding)
     return np.where(C, trial.lam * compliance, trial.y) < -floor
 
 
 def block_pivoting(
-    at: Callable[[Set], TrialSolution], C: Set, compliance: Vector, tolerance: float, passes: int
+    at: Callable[[Mask], TrialSolution], C: Mask, compliance: Vector, tolerance: float, passes: int
 ) -> PivotingResult:
     """Start from C and try at most `passes` sets.
 
@@ -75,7 +72,7 @@ def block_pivoting(
     return PivotingResult(C, trial, k, descents, not count)
 
 
-def _towards(aim: Vector, lam: Vector, negative: Set) -> Vector:
+def _towards(aim: Vector, lam: Vector, negative: Mask) -> Vector:
     """From λ ≥ 0 towards `aim` until the first of its negative entries is zero, exactly."""
     share = np.full(len(lam), np.inf)
     share[negative] = lam[negative] / (lam - aim)[negative]

@@ -13,14 +13,11 @@ products with a few columns instead of two solves with R.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Indices, Matrix, Vector
 
 from .growing_factor import GrowingFactor
-
-Indices = NDArray[np.intp]
 
 
 class Border:

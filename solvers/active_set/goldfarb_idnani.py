@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import NDArray
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Indices, Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Status
 
@@ -36,7 +35,7 @@ class GiResult:
 
     status: Status
     u: Vector
-    active: NDArray[np.intp]
+    active: Indices
     factor: GrowingFactor
     pivots: int
     drops: int
@@ -129,7 +128,7 @@ class _State:
             worst = violated[np.argsort(s[violated])[:CANDIDATES]]
             self.pivot_among(worst, s[worst], limit[worst])
 
-    def pivot_among(self, worst: NDArray[np.intp], s: Vector, limit: Vector) -> None:
+    def pivot_among(self, worst: Indices, s: Vector, limit: Vector) -> None:
         """Add the most violated of these constraints, with the slacks s, as long as there is one."""
         border = Border(self.G, np.array(self.C, dtype=np.intp), self.factor, worst)
         while self.pivots < self.max_pivots and len(border.removed) < len(worst):

@@ -15,9 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import NDArray
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Indices, Matrix, Vector
 from problems.forms.product import product
 from solvers.kkt import EPS, rounding_of
 
@@ -34,7 +33,7 @@ class ParametricPath:
     positive definite.
     """
 
-    def __init__(self, Q: Matrix, p: Vector, d: Vector, t: float, C: NDArray[np.intp]) -> None:
+    def __init__(self, Q: Matrix, p: Vector, d: Vector, t: float, C: Indices) -> None:
         self.Q, self.p, self.d, self.t, self.C = Q, p, d, t, C
         self.diagonal = np.diag(Q)
         self.factor = GrowingFactor(len(p))

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as sla
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Mask, Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Answer
 from solvers.kkt import judged, kkt_status, rounding_of
 
-from .block_pivoting import Set, TrialSolution, block_pivoting
+from .block_pivoting import TrialSolution, block_pivoting
 
 MAX_SETS = 1000
 
 
-def solve_from(C: Set, Q: Matrix, p: Vector, tolerance: float) -> Answer:
+def solve_from(C: Mask, Q: Matrix, p: Vector, tolerance: float) -> Answer:
     """Block principal pivoting from C with a Cholesky factorisation of Q_CC for each set.
 
     A sign is wrong beyond ten times the rounding of y = Qλ − p. See `kkt.kkt_status` for "solved" and
@@ -32,7 +32,7 @@ def solve_from(C: Set, Q: Matrix, p: Vector, tolerance: float) -> Answer:
     return judged(status, lam, residual, {"closed": int(found.C.sum())}, limit, iterations=found.passes)
 
 
-def forces_on(C: Set, Q: Matrix, p: Vector) -> TrialSolution:
+def forces_on(C: Mask, Q: Matrix, p: Vector) -> TrialSolution:
     """Q_CC λ_C = p_C, refined until |y_C| no longer halves."""
     rows = np.flatnonzero(C)
     factor = sla.cho_factor(Q[np.ix_(rows, rows)], check_finite=False)

@@ -25,14 +25,13 @@ from functools import partial
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 from problems.forms.prepared import Prepared
 from solvers.base import Answer, LoadCase, Status, WarmStart
 from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
 
-from .banded_sets import OpenFactor, banded_set
-from .block_pivoting import ROUNDING_FACTOR, Set, TrialSolution, block_pivoting, wrong_signs
-from .factored_sets import factored_set, penalty_continuation
+from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
+from .contact_sets import OpenFactor, banded_set, factored_set, penalty_continuation
 
 MAX_SWEEPS = 200
 FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
@@ -53,7 +52,7 @@ class Case:
     """
 
     load: LoadCase
-    C: Set
+    C: Mask
     trial: TrialSolution
     factor: OpenFactor | None = None
     before: tuple[Vector, Vector] | None = None
@@ -67,8 +66,9 @@ class Case:
 
 @dataclass
 class Sweeps:
-    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; without M, factorisations of K take its place in every
-    set (see `factored_sets`). last : the cases solved last, from which the next ones start.
+    """M ≈ Q⁻¹ and about the diagonal of Q (m,) mm/N; factorisations of K where there is no M.
+
+    last : the cases solved last, from which the next ones start.
 
     A case is settled when no q_ii λ_i on C and no y_i off it is below −max(10 |y_C|, ρ), ρ the rounding of
     Qλ − p (`kkt.largest_rounding`), and r = max(|y_C|, max(−y)) is at most 0.02 tolerance; or does not halve
@@ -94,7 +94,7 @@ class Sweeps:
         return [self.answer(case, tolerance) for case in self.last]
 
     def solved(
-        self, load: LoadCase, tolerance: float, start: WarmStart | None = None, C: Set | None = None
+        self, load: LoadCase, tolerance: float, start: WarmStart | None = None, C: Mask | None = None
     ) -> Case:
         """The case of a load with p, from nothing or from a solved one. C : its first set, if it is known."""
         order = self.order
@@ -174,7 +174,7 @@ class Sweeps:
         """λ (m,) of the case with Q replaced by M⁻¹, and whether its set is the one before; on such a set it
         is conjugate to the last step.
         """
-        at: Callable[[Set], TrialSolution]
+        at: Callable[[Mask], TrialSolution]
         if self.M is None:
             at = partial(factored_set, self.prepared, case.trial)
         else:

@@ -19,10 +19,10 @@ from functools import partial
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 from problems.forms.compliance import Compliance
-from solvers.active_set.banded_sets import OpenFactor, banded_set
-from solvers.active_set.block_pivoting import Set, TrialSolution, block_pivoting
+from solvers.active_set.block_pivoting import TrialSolution, block_pivoting
+from solvers.active_set.contact_sets import OpenFactor, banded_set
 
 STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
 POWER_STEPS = 30  # products for λmax, once per assembly
@@ -38,7 +38,7 @@ class Diagonal:
     alpha: float
     sets: int = field(default=0, init=False)
 
-    def precondition(self, F: Set, r: Vector) -> Vector:
+    def precondition(self, F: Mask, r: Vector) -> Vector:
         """B_FF⁻¹ r_F, zero off F."""
         return np.where(F, r, 0.0) / self.diagonal
 
@@ -55,7 +55,7 @@ class Face(Diagonal):
 
     factor: OpenFactor
 
-    def precondition(self, F: Set, r: Vector) -> Vector:
+    def precondition(self, F: Mask, r: Vector) -> Vector:
         M = self.factor.M
         v = M.product(np.where(F, r, 0.0)[M.order])
         z = np.empty_like(r)

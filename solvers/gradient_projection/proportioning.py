@@ -20,9 +20,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Mask, Vector
 from problems.forms.compliance import Compliance
-from solvers.active_set.block_pivoting import Set
 from solvers.kkt import kkt_residual, rounding_of
 
 from .metric import Diagonal
@@ -49,7 +48,7 @@ class Proportioning:
     y: Vector
     products: int = 0
     steps: dict[str, int] = field(default_factory=lambda: {"cg": 0, "expansion": 0, "proportioning": 0})
-    before: tuple[Vector, Vector, Set] | None = None
+    before: tuple[Vector, Vector, Mask] | None = None
 
     def solve(self, tolerance: float, max_products: int) -> bool:
         """Until the KKT residual is at most max(tolerance/10, rounding) mm, or rounding leaves no more; False
@@ -84,12 +83,12 @@ class Proportioning:
         self.steps["expansion" if proportional else "proportioning"] += 1
         return self._project(self.metric.projection(self.lam, self.y, proportional))
 
-    def _is_proportional(self, F: Set) -> bool:
+    def _is_proportional(self, F: Mask) -> bool:
         free, chopped = self.y[F], np.minimum(self.y[~F], 0.0)
         reduced = np.minimum(free, self.diagonal[F] * self.lam[F] / self.metric.alpha)
         return bool(chopped @ (chopped / self.diagonal[~F]) <= reduced @ (free / self.diagonal[F]))
 
-    def _conjugate_gradients(self, F: Set) -> bool:
+    def _conjugate_gradients(self, F: Mask) -> bool:
         """A step on the face; False if it had to end at the boundary."""
         d = -self.metric.precondition(F, self.y)
         if self.before is not None and not (self.before[2] ^ F).any():

@@ -5,18 +5,15 @@ The paper's is V = U + √D (eq. 15) with Q = UᵀU; the others are there for co
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import NDArray
 from scipy.linalg import blas
 
-from problems.forms.assembly import Matrix, Vector
+from problems.forms.assembly import Indices, Matrix, Vector
 
-from .conjugate_gradients import Solved, conjugate_gradients
-from .newton_system import Direct, NewtonSystem
+from .newton_system import Direct, NewtonSystem, Solved, conjugate_gradients
 
 #: CG iterations after which a factorisation in a new order pays off. A Cholesky factorisation takes m³/3
 #: operations on data in cache, a CG iteration 2m² on data in memory.
@@ -24,7 +21,7 @@ REORDER_AFTER = 25
 
 
 class Preconditioned(NewtonSystem):
-    """Conjugate gradients until ‖V⁻ᵀ(b − Hv)‖₂ ≤ tolerance · ‖V⁻ᵀb‖₂."""
+    """Conjugate gradients until ‖V⁻ᵀ(b − Hv)‖₂ ≤ tolerance · ‖V⁻ᵀb‖₂; here V = I: no preconditioning."""
 
     def solve(self, D: Vector, b: Vector, tolerance: float, limit: int) -> Solved:
         self.take(D)
@@ -35,22 +32,12 @@ class Preconditioned(NewtonSystem):
         """V⁻ᵀHV⁻¹ z."""
         return self.to_transformed(self.times_H(self.from_transformed(z)))
 
-    @abstractmethod
     def to_transformed(self, b: Vector) -> Vector:
         """V⁻ᵀ b."""
-
-    @abstractmethod
-    def from_transformed(self, z: Vector) -> Vector:
-        """V⁻¹ z."""
-
-
-class Identity(Preconditioned):
-    """V = I: no preconditioning."""
-
-    def to_transformed(self, b: Vector) -> Vector:
         return b
 
     def from_transformed(self, z: Vector) -> Vector:
+        """V⁻¹ z."""
         return z
 
 
@@ -60,7 +47,7 @@ class CholeskyFactor(Preconditioned):
     order : (m,) the order in which the nodes are eliminated; as they are numbered if None.
     """
 
-    def __init__(self, Q: Matrix, order: NDArray[np.intp] | None = None) -> None:
+    def __init__(self, Q: Matrix, order: Indices | None = None) -> None:
         super().__init__(Q)
         self.order = np.arange(len(Q)) if order is None else order
         permuted = Q if order is None else Q[np.ix_(order, order)]
@@ -159,7 +146,7 @@ class Splitting(Preconditioned):
 SYSTEMS: dict[str, type[NewtonSystem]] = {
     "V": CholeskyPlusRoot,
     "U": CholeskyFactor,
-    "none": Identity,
+    "none": Preconditioned,
     "splitting": Splitting,
     "direct": Direct,
 }

@@ -26,7 +26,7 @@ STATUS: dict[Any, Status] = {
 class Piqp(Library):
     """backend : "dense" or "sparse" Cholesky; None: as the blocks of P are. Where they are dense, dense is
     several times faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal
-    form. kkt_solver : of the sparse form, with or without the rows. settings : PIQP's own, as rho_init = 1e-8.
+    form. kkt_solver : of the sparse form, with or without the rows. settings : PIQP's own.
     """
 
     choices: ClassVar[dict[str, tuple[str | None, ...]]] = {

@@ -14,8 +14,7 @@ import numpy as np
 
 from problems.forms.banded_inverse import banded_inverse
 from solvers.base import Answer, LoadCase, Problem, Status
-from solvers.interior_point.banded import Banded
-from solvers.interior_point.newton_system import NewtonSystem
+from solvers.interior_point.newton_system import Banded, NewtonSystem
 from solvers.interior_point.preconditioner import SYSTEMS, OpenLast
 from solvers.interior_point.schemes import SCHEMES, CgExhausted, NewtonSteps, Point
 from solvers.interior_point.start import NoStart, Start, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2

@@ -14,10 +14,8 @@ import numpy as np
 
 from solvers.active_set.sweeps import Sweeps
 from solvers.base import Answer, LoadCase, Problem, failed
-from solvers.interior_point.banded import Banded
-from solvers.interior_point.newton_system import Direct, NewtonSystem
+from solvers.interior_point.newton_system import Banded, Direct, NewtonSystem
 from solvers.interior_point.schemes import NewtonSteps, mehrotra
-from solvers.interior_point.single_precision import SinglePrecision
 from solvers.interior_point.start import algorithm_5, stp2
 from solvers.method import Method, State
 from solvers.settings import one_of, require
@@ -50,13 +48,11 @@ class FastIpm(Method):
 
     Options
     -------
-    finish, single, start_at_gaps, band : false switches off the finish, single precision, the start STP2,
-        which Algorithm 5's then replaces, or the banded M in the Newton systems, which a factorisation of
-        each then replaces; only this uses single precision.
+    finish, start_at_gaps, band : false switches off the finish, the start STP2, which Algorithm 5's then
+        replaces, or the banded M in the Newton systems, which a factorisation of each then replaces.
     """
 
     finish: bool = True
-    single: bool = True
     start_at_gaps: bool = True
     band: bool = True
 
@@ -67,9 +63,7 @@ class FastIpm(Method):
     def state(self, problem: Problem) -> _State:
         """M, and what the systems need."""
         finish = Sweeps(problem.prepared)
-        if self.band and finish.M:
-            return _State(problem=problem, system=Banded(problem.Q, finish.M), finish=finish)
-        system = (SinglePrecision if self.single else Direct)(problem.Q)
+        system = Banded(problem.Q, finish.M) if self.band and finish.M else Direct(problem.Q)
         return _State(problem=problem, system=system, finish=finish)
 
     def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:

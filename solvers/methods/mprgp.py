@@ -16,7 +16,7 @@ from typing import ClassVar
 
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
-from solvers.active_set.banded_sets import OpenFactor
+from solvers.active_set.contact_sets import OpenFactor
 from solvers.base import Answer, Form, LoadCase, Problem, failed
 from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
 from solvers.gradient_projection.proportioning import Proportioning

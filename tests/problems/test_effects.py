@@ -95,26 +95,6 @@ def test_pressure_sums_to_value_times_area() -> None:
     assert grid[-1, -1] == pytest.approx(cell / 4)
 
 
-def test_random_gap_has_its_mean_deviation_and_correlation() -> None:
-    """2000 fields: the mean, the deviation at every node, and exp(−r² / 2ℓ²) along x, y and both."""
-    nodes = (9, 5)
-    joint = make_joint(PART, PART | {"name": "b"}, nodes=nodes)
-    samples = np.array([field_of(seed, joint, length=100.0) for seed in range(2000)])
-    assert samples.mean() == pytest.approx(0.6, abs=0.01)
-    deviation = samples.std(axis=0)
-    assert deviation.min() > 0.2 * 0.92
-    assert deviation.max() < 0.2 * 1.08
-    grid = ((samples - 0.6) / 0.2).reshape(len(samples), nodes[1], nodes[0])
-    along_x, along_y = (nodes[0] - 1) // 4, (nodes[1] - 1) // 2  # 100 mm and 60 mm
-    pairs = [
-        (grid[:, :, :-along_x], grid[:, :, along_x:], 100.0),
-        (grid[:, :-along_y], grid[:, along_y:], 60.0),
-        (grid[:, :-along_y, :-along_x], grid[:, along_y:, along_x:], np.hypot(100.0, 60.0)),
-    ]
-    for one, other, distance in pairs:
-        assert (one * other).mean() == pytest.approx(np.exp(-((distance / 100) ** 2) / 2), abs=0.03)
-
-
 @pytest.mark.parametrize("length", [30.0, 800.0])
 def test_rounding_does_not_change_a_random_gap(length: float) -> None:
     """A grid and its mirror image, whose rounding differs: of one field the gaps differ by some 1e-10 of its

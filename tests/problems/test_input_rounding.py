@@ -4,13 +4,13 @@ that results is the one that is proven.
 
 from collections.abc import Callable
 from fractions import Fraction
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from exact_answer import exact_optimum, exactly
 
 from harness import own_matrices, solve
 from harness.verification.reference import UNPROVEN, best_of_candidates
@@ -26,45 +26,10 @@ EXTENDED = np.finfo(np.longdouble).nmant > 53
 N = 4
 
 
-def rational(values: Any) -> list[Any]:
-    """Nested lists of the same numbers as fractions."""
-    if np.ndim(values):
-        return [rational(row) for row in values]
-    return Fraction(*values.as_integer_ratio()) if isinstance(values, np.floating) else Fraction(int(values))
-
-
-def solution(K: list[Any], A: list[Any], f: list[Any], g: list[Any]) -> list[Fraction]:
-    """x of Kx + Aλ = f, Aᵀx ≤ g, λ ≥ 0, λᵀ(g − Aᵀx) = 0, exactly, by trying the contact sets."""
-    n, m = len(f), len(g)
-    for closed in product([False, True], repeat=m):
-        C = [j for j in range(m) if closed[j]]
-        rows = [[*K[i], *(A[i][j] for j in C), f[i]] for i in range(n)]
-        rows += [[*(A[i][j] for i in range(n)), *(Fraction(0) for _ in C), g[j]] for j in C]
-        found = eliminated(rows)
-        x, lam = found[:n], found[n:]
-        s = [g[j] - sum(A[i][j] * x[i] for i in range(n)) for j in range(m)]
-        if min([*s, *lam]) >= 0:
-            return x
-    raise AssertionError("a positive definite problem has an answer")
-
-
-def eliminated(rows: list[list[Fraction]]) -> list[Fraction]:
-    size = len(rows)
-    for k in range(size):
-        pivot = next(i for i in range(k, size) if rows[i][k] != 0)
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        for i in range(size):
-            if i != k and rows[i][k] != 0:
-                factor = rows[i][k] / rows[k][k]
-                rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
-    return [row[-1] / row[k] for k, row in enumerate(rows)]
-
-
 def error_of(x: Any, assembly: Assembly, load: LoadCase) -> Fraction:
     """max|x − x*|, exactly, x* the answer to the problem as it was taken."""
-    K = assembly.K.matrix.toarray()
-    exact = solution(*map(rational, (K, assembly.A.toarray(), load.f, load.g)))
-    return max(abs(Fraction(float(a)) - b) for a, b in zip(x, exact, strict=True))
+    exact, _, _ = exact_optimum(assembly, load)
+    return max(abs(a - b) for a, b in zip(exactly(x), exact, strict=True))
 
 
 def conditioned(seed: int, condition: float) -> dict[str, Any]:

@@ -181,16 +181,6 @@ def test_several_wrong_shapes_at_once(tmp_path: Path) -> None:
     assert [fault.key for fault in error.value.faults] == ["K.shape", "f.shape", "g"]
 
 
-@pytest.mark.parametrize("size", [0, 3, 300, -40, -1])
-def test_truncated_npz(tmp_path: Path, size: int) -> None:
-    path = write_npz(tmp_path)
-    path.write_bytes(path.read_bytes()[:size])
-    with pytest.raises(InputError) as error:
-        opened(path)
-    assert len(error.value.faults) == 1
-    assert str(path) in str(error.value)
-
-
 @pytest.mark.parametrize("content", [b"", b"no matrix\n1 2 3\n", bytes(range(256)), None])
 def test_unreadable_matrix_market(tmp_path: Path, content: bytes | None) -> None:
     path = write_mtx(tmp_path)

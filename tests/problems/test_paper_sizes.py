@@ -13,15 +13,6 @@ TABLE_4 = {4386: (2193, 2.63e6), 6112: (3056, 1.11e7), 11308: (5654, 1.77e7)}
 
 
 @pytest.mark.parametrize("n", TABLE_4)
-def test_sizes(n: int) -> None:
-    for name in scene_names():
-        if name.startswith(f"{n}/"):
-            scene = read_scene(name)
-            assert scene.expected_size == (n, TABLE_4[n][0])
-            assert scene.joint.contact_matrix().shape == (n, TABLE_4[n][0])
-
-
-@pytest.mark.parametrize("n", TABLE_4)
 def test_every_size_has_from_few_to_many_active_constraints(n: int) -> None:
     """The paper's ten at the smallest size and one with nearly all contacts closed; else six and more, none
     far from the next, over 5 … 95 % of m."""

@@ -4,23 +4,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints import dof, make_joint, make_scene
+from joints import make_joint, make_scene
 from numpy.typing import NDArray
-from scipy.sparse.linalg import spsolve
 
 from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.effects.local_thickness import LocalThickness
-from problems.effects.ribs import Ribs
 from problems.effects.self_weight import SelfWeight
 from problems.effects.support_shift import SupportShift
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
 from problems.forms.prepared import Prepared
 from problems.full_model.joint_model import JointModel
-from problems.model.effect import Effect, StiffnessEffect
+from problems.model.effect import Effect
 from problems.model.joint import Joint
-from problems.model.part import PartLoadEffect, PartModel
 
 E, T = 70e3, 6.0
 #: A strip along y, clamped at y = −200, free at y = 150, bending like a beam since ν = 0.
@@ -108,48 +105,6 @@ def test_three_shifted_supports_move_the_part_as_a_plane() -> None:
     x, _ = solved(FREE_JOINT, HELD, *shifts)
     at_x, at_y = FREE_JOINT.nodes.T
     np.testing.assert_allclose(x, 1.0 - 1.5 * at_x / 400 - 0.75 * at_y / 120, atol=1e-9)
-
-
-LOADS: list[PartLoadEffect] = [
-    SelfWeight(kind="self_weight", part="a"),
-    ThermalBending(kind="thermal_bending", part="a", difference=12.0),
-    SupportShift(kind="support_shift", part="a", points=((33.0, -200.0),), shift=0.7),
-]
-SIDES: list[dict[str, Any]] = [
-    OVERHANG,
-    OVERHANG | {"clamped": ["south"]},
-    OVERHANG | {"clamped": ["south", "north"]},
-    {"north": OVERHANG["north"], "clamped": ["north"]},
-]
-
-
-@pytest.mark.parametrize("load", LOADS, ids=lambda load: load.kind)
-@pytest.mark.parametrize("part", SIDES, ids=lambda part: "-".join(part))
-def test_junction_moves_as_in_the_whole_plate(load: PartLoadEffect, part: dict[str, Any]) -> None:
-    """Against one solution of all unknowns, with nothing condensed."""
-    joint = make_joint(part, contacts=[["a", "tool"]])
-    points = (*THREE, (33.0, -200.0)) if "south" in part else THREE
-    stiff: list[StiffnessEffect] = [
-        Supports(kind="supports", part="a", points=points, stiffness_per_point=3e3),
-        Ribs(kind="ribs", part="a", lines=(160.0,), I=2e4, J=1e3),
-        LocalThickness(kind="local_thickness", part="a", thickness=8.0, x=(11, 120), y=(30, 171)),
-    ]
-    x, _ = solved(joint, *stiff, load)
-
-    plate = joint.plate(joint.part[0])
-    K = plate.stiffness() + sum(effect.stiffness(plate) for effect in stiff)  # type: ignore[operator]
-    f = load.load(PartModel(plate, tuple(stiff), range(0)))
-    held = {"south": 0, "north": len(plate.y) - 1}
-    clamped = [held[edge] for edge in part.get("clamped", [])]
-    lines = [iy for iy in range(len(plate.y)) if iy not in clamped]
-    free = np.concatenate([plate.line_dofs(iy) for iy in lines])
-    w = np.zeros(plate.size)
-    w[free] = spsolve(K[free][:, free].tocsc(), f[free])
-    rows = [iy for iy, y in enumerate(plate.y) if -1e-6 < y < 120 + 1e-6]
-    expected = np.array([w[dof(5, ix, iy)] for iy in rows for ix in range(5)])
-    if load.kind != "support_shift" or "south" in part:
-        assert abs(expected).max() > 1e-4
-    np.testing.assert_allclose(x, expected, atol=1e-10 * max(1.0, abs(expected).max()))
 
 
 def test_a_condensed_load_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

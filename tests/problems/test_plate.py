@@ -1,6 +1,7 @@
 """The plate element against closed forms, beam theory and another code."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -178,31 +179,24 @@ def cubic(x: float, y: float) -> tuple[float, float, float, float]:
     )
 
 
-def test_energy_of_stringers_that_end_between_grid_lines() -> None:
-    plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
-    w = degrees(plate.x, plate.y, cubic)
-    effect = Stringers(kind="stringers", part="a", pitch=130.0, start=-60.0, stop=42.0, I=3e4, J=2e3)
-    expected = 0.0
-    for x in (0.0, 130.0, 260.0):
-        bend = Polynomial([2 * x**2, 12 * x]) * 1e-6  # w_yy
-        twist = Polynomial([0, 4 * x, 6]) * 1e-6  # w_xy
-        for stiffness, rate in [(70e3 * 3e4, bend), (70e3 / (2 * 1.33) * 2e3, twist)]:
-            integral = (rate**2).integ()
-            expected += stiffness * (integral(42.0) - integral(-60.0))
-    assert w @ (effect.stiffness(plate) @ w) == pytest.approx(expected, rel=1e-10)
+STRINGERS = Stringers(kind="stringers", part="a", pitch=130.0, start=-60.0, stop=42.0, I=3e4, J=2e3)
+RIBS = Ribs(kind="ribs", part="a", lines=(-20.0, 40.0), I=5e4, J=1e3)
 
 
-def test_energy_of_ribs_between_grid_lines() -> None:
+@pytest.mark.parametrize(
+    ("effect", "at", "rates", "ends"),
+    [  # where the beams lie, w_ss and w_xy along them, and from where to where
+        (STRINGERS, (0.0, 130.0, 260.0), lambda x: ([2 * x**2, 12 * x], [0, 4 * x, 6]), (-60.0, 42.0)),
+        (RIBS, (-20.0, 40.0), lambda y: ([2 * y**2, -6], [6 * y**2, 4 * y]), (0.0, 300.0)),
+    ],
+)
+def test_energy_of_beams_between_grid_lines(effect: Any, at: Any, rates: Any, ends: Any) -> None:
     plate = Plate(UNEVEN_X, UNEVEN_Y, 6.0, 70e3, 0.33)
-    w = degrees(plate.x, plate.y, cubic)
-    expected = 0.0
-    for y in (-20.0, 40.0):
-        bend = Polynomial([2 * y**2, -6]) * 1e-6  # w_xx
-        twist = Polynomial([6 * y**2, 4 * y]) * 1e-6
-        for stiffness, rate in [(70e3 * 5e4, bend), (70e3 / (2 * 1.33) * 1e3, twist)]:
-            integral = (rate**2).integ()
-            expected += stiffness * (integral(300.0) - integral(0.0))
-    effect = Ribs(kind="ribs", part="a", lines=(-20.0, 40.0), I=5e4, J=1e3)
+    w, expected = degrees(plate.x, plate.y, cubic), 0.0
+    for place in at:
+        for stiffness, rate in zip((effect.I, effect.J / (2 * 1.33)), rates(place), strict=True):
+            integral = (Polynomial(rate) ** 2).integ() * 70e3 * stiffness * 1e-12
+            expected += integral(ends[1]) - integral(ends[0])
     assert w @ (effect.stiffness(plate) @ w) == pytest.approx(expected, rel=1e-10)
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
 from problems.forms.assembly import Assembly, Matrix
 from problems.full_model.joint_model import JointModel
+from problems.model.effect import effect_class
 from problems.model.scene import JointScene
 from problems.scene import read_scene, scene_names
 from problems.stiffness.banded import half_bandwidth
@@ -124,3 +126,31 @@ def test_what_is_built_in_is_left_out(turned: bool, clamped: list[str]) -> None:
     assert [K.shape[0] for K in model.K.matrices] == [4 * nodes[0] * count for count in lines]
     np.testing.assert_array_equal(model.nodes[model.junction], np.tile(scene.joint.nodes, (2, 1)))
     check_same(scene)
+
+
+SHORT, LONG = {"length": 90.0, "elements": 2}, {"length": 250.0, "elements": 4}
+SHAPES: list[dict[str, Any]] = [
+    {"south": SHORT, "clamped": ["south"]},
+    {"south": LONG, "north": SHORT, "clamped": ["north"]},
+    {"south": SHORT, "north": LONG, "clamped": ["south", "north"]},
+    {"south": LONG},
+    {},
+]
+
+
+@pytest.mark.parametrize("part", SHAPES, ids=str)
+def test_parts_of_any_shape(part: dict[str, Any]) -> None:
+    points = [(30.0, 20.0), (350.0, 35.0), (170.0, 110.0), (399.0, 3.0)]
+    tables = {
+        "supports": {"points": points, "stiffness_per_point": 4e3},
+        "stringers": {"pitch": 130.0, "start": -50.0, "stop": 95.0, "I": 2e4, "J": 3e3},
+        "local_thickness": {"thickness": 8.0, "x": (11.0, 120.0), "y": (30.0, 101.0)},
+        "thermal_bending": {"difference": 12.0},
+        "self_weight": {},
+        **({"ribs": {"lines": (-15.0,), "I": 1e5, "J": 1e4}} if "south" in part else {}),
+    }
+    effects = [
+        effect_class(kind).model_validate({"kind": kind, "part": "a"} | table)
+        for kind, table in tables.items()
+    ]
+    check_same(make_scene(make_joint(part, contacts=[("a", "tool")]), *effects))

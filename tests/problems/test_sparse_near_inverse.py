@@ -39,12 +39,6 @@ def test_the_inverse_near_the_diagonal(half: int, seed: int) -> None:
                 assert (abs(error) <= SINGLE * np.outer(scale[here], scale[here])).all()
 
 
-def test_it_is_symmetric_to_the_last_bit() -> None:
-    K = band_matrix(np.random.default_rng(5), 40, 4)
-    Z = selected_inverse(BandedBlock(K, half_bandwidth(K)).L, np.arange(40), 40).submatrix(0, 40)
-    np.testing.assert_allclose(Z, Z.T, rtol=0, atol=SINGLE * abs(Z).max())
-
-
 def contacts(random: np.random.Generator, n: int, m: int) -> sp.csc_array:
     """Each contact on one to four unknowns within twelve of each other, with coefficients of any size."""
     A = np.zeros((n, m))

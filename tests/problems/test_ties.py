@@ -6,7 +6,6 @@ import scipy.linalg as sla
 from joints import make_joint, make_scene, untied
 
 from problems.build import load_case, prepared
-from problems.effects.fasteners import Fasteners
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.pressure import Pressure
 from problems.effects.supports import Supports
@@ -88,15 +87,3 @@ def test_installing_a_fastener_condenses_nothing_again(monkeypatch: pytest.Monke
     assert all(isinstance(value, float) for value in seconds.values())
     more = prepared(make_scene(TWO, effect, fastener((100.0, 0.0), (300.0, 0.0))))
     assert abs(more.Q - first.Q).max() > 1e-6
-
-
-def test_a_hole_holds_one_element() -> None:
-    tie = fastener((100.0, 0.0), (300.0, 80.0))
-    temporary = Fasteners(kind="fasteners", preload=5.0, points=((110.0, 3.0),))
-    ((key, where, allowed),) = tie.conflicts([temporary], TWO)
-    assert (key, where) == ("points", [[100.0, 0.0]])
-    assert "fasteners" in allowed
-    elsewhere = Fasteners(kind="fasteners", preload=5.0, points=((200.0, 0.0),))
-    assert not list(tie.conflicts([elsewhere], TWO))
-    on_another_contact = temporary.model_copy(update={"between": ("c", "d")})
-    assert not list(fastener((100.0, 0.0), between=["a", "b"]).conflicts([on_another_contact], FOUR))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from exact_answer import exactly
 
 from harness.verification.balanced import Balanced
 from harness.verification.enclosure import DoubleDouble, Enclosure, Residual, length, two_sum
@@ -16,10 +17,6 @@ from problems.stiffness.rounding import gamma
 
 ETA = 2.0**-1074
 WHOLE = slice(None)
-
-
-def exactly(v: np.ndarray) -> list[Fraction]:
-    return [Fraction(float(value)) for value in v]
 
 
 def missed(found: Enclosure, column: int, wanted: list[Fraction]) -> list[Fraction]:

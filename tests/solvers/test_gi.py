@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.linalg as sla
 import scipy.sparse as sp
-from scipy.optimize import nnls
-from small import make_load, make_prepared, solve_by_nnls
+from small import by_nnls, definite, make_load, make_prepared, solve_by_nnls
 
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
@@ -17,12 +15,6 @@ from solvers.active_set.goldfarb_idnani import goldfarb_idnani
 from solvers.active_set.growing_factor import GrowingFactor
 from solvers.base import Answer, Form
 from solvers.methods.gi import GoldfarbIdnani
-
-
-def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    W, _ = np.linalg.qr(rng.standard_normal((size, size)))
-    return (W * np.geomspace(1.0, condition, size)) @ W.T
 
 
 def grow(G: np.ndarray, members: list[int]) -> GrowingFactor:
@@ -61,12 +53,6 @@ def test_members_come_and_go_many_times() -> None:
     assert_is_factor(factor, G, members)
 
 
-def by_nnls(G: np.ndarray, s0: np.ndarray) -> np.ndarray:
-    """u ≥ 0 with s0 + Gu ≥ 0 and uᵀ(s0 + Gu) = 0 minimises ½uᵀGu + s0ᵀu = ½‖Uu + U⁻ᵀs0‖² + const."""
-    U = sla.cholesky(G)
-    return nnls(U, -sla.solve_triangular(U, s0, trans=1))[0]
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_pivots_lead_to_the_solution(seed: int) -> None:
     size = [3, 40, 150][seed % 3]
@@ -80,7 +66,7 @@ def test_pivots_lead_to_the_solution(seed: int) -> None:
     assert (result.u >= 0).all()
     assert s.min() >= -1e-10
     assert abs(s[result.active]).max(initial=0) <= 1e-10
-    np.testing.assert_allclose(result.u, by_nnls(G, s0), atol=1e-9)
+    np.testing.assert_allclose(result.u, by_nnls(G, -s0), atol=1e-9)
     assert result.pivots == len(result.active) + 2 * result.drops
 
 

@@ -14,7 +14,7 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.scene import read_scene
 from solvers.active_set import parametric_path
-from solvers.active_set.banded_sets import OpenFactor
+from solvers.active_set.contact_sets import OpenFactor
 from solvers.active_set.parametric_path import ParametricPath
 from solvers.base import Answer, WarmStart
 from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length

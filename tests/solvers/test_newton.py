@@ -2,23 +2,11 @@
 
 import numpy as np
 import pytest
-import scipy.linalg as sla
-from scipy.optimize import nnls
+from small import by_nnls, definite
 
 from problems.forms.product import product
 from solvers.active_set.block_pivoting import MAX_STALE_PASSES, _towards, block_pivoting
 from solvers.active_set.principal_sets import forces_on
-
-
-def definite(size: int, seed: int, condition: float = 1e4) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    W, _ = np.linalg.qr(rng.standard_normal((size, size)))
-    G = (W * np.geomspace(1.0, condition, size)) @ W.T
-    return np.asfortranarray((G + G.T) / 2)
-
-
-def subset(rng: np.random.Generator, size: int, share: float) -> np.ndarray:
-    return rng.random(size) < share
 
 
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.5, 0.8, 1.0])
@@ -27,7 +15,7 @@ def test_the_forces_and_gaps_of_a_set(share: float) -> None:
     size, rng = 50, np.random.default_rng(3)
     Q, p = definite(size, seed=4), rng.standard_normal(50)
     for _ in range(5):
-        C = subset(rng, size, share)
+        C = rng.random(size) < share
         trial = forces_on(C, Q, p)
         assert not trial.lam[~C].any()
         assert abs(trial.y[C]).max(initial=0) <= 1e-10
@@ -49,12 +37,11 @@ def test_pivoting_ends_where_full_exchanges_cycle(stale: int, monkeypatch: pytes
     size, descended = 20, 0
     bending = np.diff(np.eye(size + 4), 2, axis=0)[:, 2:-2]
     Q = np.asfortranarray(bending.T @ bending)
-    U = sla.cholesky(Q)
     for seed in range(60):
         p = np.random.default_rng(seed).standard_normal(size)
         found = block_pivoting(lambda C, p=p: forces_on(C, Q, p), p > 0, np.diag(Q), 1e-12, 10_000)
         assert found.converged
-        wanted = nnls(U, sla.solve_triangular(U, p, trans=1))[0]
+        wanted = by_nnls(Q, p)
         np.testing.assert_allclose(found.trial.lam, wanted, atol=1e-8 * max(1.0, wanted.max()))
         descended += found.descents > 0
     assert descended > 3

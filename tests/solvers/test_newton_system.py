@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 from long import seeds
-from test_gi import definite
+from small import definite
 
-from solvers.interior_point.conjugate_gradients import conjugate_gradients
+from solvers.interior_point.newton_system import conjugate_gradients
 from solvers.interior_point.preconditioner import (
     REORDER_AFTER,
     SYSTEMS,

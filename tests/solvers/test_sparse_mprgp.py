@@ -69,13 +69,6 @@ def test_a_scene_in_a_few_products(name: str) -> None:
     assert answer.details["products"] <= 20
 
 
-def test_a_limit_on_the_products_is_said() -> None:
-    dense, data = strips()
-    answer = session_of(data, preconditioner="none", max_products=3).next(make_load(3, dense)[0], None)
-    assert answer.status == "iteration_limit"
-    assert "max_products = 3" in answer.details["cause"]
-
-
 def test_contacts_all_over_an_area_are_refused_with_the_reason() -> None:
     """For them M would take longer than some factorisations of K; newton solves them with those."""
     scene = read_scene("outside/obstacle/80")

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from small import make_load, make_prepared
-from test_gi import definite
+from small import definite, make_load, make_prepared
 
 from solvers.interior_point.start import NoStart, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
 

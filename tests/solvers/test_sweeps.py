@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from small import make_load, make_prepared, solve_by_nnls
+from small import definite, make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
 from harness.conformance.known_problems import contact_rows
@@ -47,13 +47,6 @@ def decaying() -> np.ndarray:
     nodes = np.array([(i, j) for i in range(LINES) for j in range(ACROSS)], dtype=float)
     distance = np.linalg.norm(nodes[:, None] - nodes[None], axis=2)
     return np.asfortranarray(1 / (1 + distance / 2) + 0.01 * np.eye(LINES * ACROSS))
-
-
-def rotated(m: int, condition: float, seed: int) -> np.ndarray:
-    """Every contact acts on all others alike, whatever their distance."""
-    W, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((m, m)))
-    Q = (W * np.geomspace(1.0, condition, m)) @ W.T
-    return np.asfortranarray((Q + Q.T) / 2)
 
 
 def session_of(data: Prepared, form: str, tolerance: float = TOLERANCE) -> SolverSession:
@@ -115,7 +108,7 @@ def test_a_band_factor_solves_with_the_principal_submatrix(share: float, tmp_pat
 def test_m_has_a_narrow_band_where_q_decays_alone() -> None:
     Q = decaying()
     v = np.random.default_rng(2).standard_normal(len(Q))
-    for given, narrow in ((Q, True), (rotated(len(Q), 1e4, 1), False), (Q + 100 * np.outer(v, v), False)):
+    for given, narrow in ((Q, True), (definite(len(Q), 1), False), (Q + 100 * np.outer(v, v), False)):
         M = of_dense(DenseCompliance(np.asfortranarray(given)), None).M
         assert (len(M.band) < len(Q) / 4) == narrow
         if not narrow:
@@ -136,7 +129,7 @@ def test_an_indefinite_q_fails(name: str) -> None:
 
 def far(m: int = 120) -> Prepared:
     """A dense K whose contacts all depend on one another."""
-    return Prepared(Assembly(Stiffness.of(rotated(m, 1e4, 5)), contact_rows(0, m)))
+    return Prepared(Assembly(Stiffness.of(definite(m, 5)), contact_rows(0, m)))
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
@@ -241,7 +234,7 @@ def test_nearly_degenerate_sets(size: float) -> None:
 def test_where_exchanges_circle_the_sets_settle(seed: int) -> None:
     """Loads of many sizes on a Q without locality: block exchanges alone do not end, descent does."""
     rng = np.random.default_rng(seed)
-    Q, p = rotated(100, 3e9, seed), 10 ** rng.uniform(-12, 0, 100) * rng.choice([-1, 1], 100)
+    Q, p = definite(100, seed, 3e9), 10 ** rng.uniform(-12, 0, 100) * rng.choice([-1, 1], 100)
     answer = solved(Q, p)
     assert answer.status == "solved"
     assert answer.iterations <= 40

@@ -76,15 +76,3 @@ def test_a_warm_start_is_taken(name: str, form: Form) -> None:
         answer = solver.solve(ready, load, TOLERANCE)
         taken[id(near)] = answer.inner_iterations or answer.iterations
     assert taken[id(case)] < taken[id(other)]
-
-
-def test_newton_begins_with_a_near_answer() -> None:
-    """From its own answer, one product and one set."""
-    prepared = make_prepared(7, 60)
-    case, load = make_load(8, prepared)
-    solver, state = started("newton", {}, prepared, "dual")
-    cold = solver.solve(state, load, TOLERANCE)
-    near = near_of(prepared, case, "dual")
-    warm = solver.solve(solver.update(state, state, load, TOLERANCE, near), load, TOLERANCE)
-    assert (warm.iterations, warm.inner_iterations) == (1, 1)
-    assert cold.inner_iterations > 1

@@ -1,6 +1,13 @@
-"""Contact sets by factorisations of K, where there is no M ≈ Q⁻¹: no band, or contacts all over an area.
+"""The solution of one contact set after another, with M ≈ Q⁻¹ or with factorisations of K in place of Q⁻¹.
 
-From (λ, y), y exact, to the point of a set C, λ⁺ zero off it and y⁺ on it, it is a change
+From a point (λ, y) with y exact, the problem with Q replaced by M⁻¹ has λ⁺ = λ + Mz with z = y⁺ − y. For a
+set C, N the other contacts, y⁺_C = 0 and λ⁺_N = 0, so that
+
+    z_C = −y_C,    M_NN z_N = (M y_C)_N − λ_N.
+
+In terms of the change z, rounding shrinks with what is left to correct.
+
+Where there is no M, as K has no band or contacts lie all over an area, the change is
 
     [ K    A_C ] [ dx  ]   [ A_N λ_N ]
     [ A_Cᵀ  0  ] [ dλ_C ] = [ y_C     ]
@@ -11,29 +18,51 @@ Appl. 4:303–320, 1969),
     (K + ρ A_C A_Cᵀ) dx = A_N λ_N + A_C (ρ y_C − dλ_C),        dλ_C ← dλ_C + ρ (A_Cᵀdx − y_C).
 
 Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; what is left is for the next product with Q.
-
-The first set is found with springs alone, ever stiffer: an edge of contact moves as far as they give way,
-however fine the mesh, where pivoting moves it by a row of contacts per set (Hintermüller and Kunisch, SIAM J.
-Optim. 17:159–187, 2006). One step of Newton's method per ρ, from the stiffness of the body to that of K.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 
+from problems.forms.assembly import Mask, Vector
+from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
 from solvers.base import LoadCase
 
-from .block_pivoting import SIGN_UNCERTAINTY, Set, TrialSolution
+from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
 
 STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
 PASSES = 2
 GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
 
 
-def factored_set(prepared: Prepared, start: TrialSolution, C: Set) -> TrialSolution:
+@dataclass
+class OpenFactor:
+    """M, and its Cholesky factor on an open set, kept until another one is asked for."""
+
+    M: BandedInverse
+    last: BandFactor | None = None
+
+    def __call__(self, N: Mask) -> BandFactor:
+        if self.last is None or (self.last.S ^ N).any():
+            self.last = self.M.factor(N)
+        return self.last
+
+
+def banded_set(factor: OpenFactor, start: TrialSolution, C: Mask) -> TrialSolution:
+    """λ⁺ and y⁺ of the set C; all vectors are in the order of M, `start.rounding` is |y_C| at the point."""
+    M, lam, y = factor.M, start.lam, start.y
+    y_C = np.where(C, y, 0.0)
+    z: Vector = factor(~C).solve(M.product(y_C) - lam) - y_C
+    new = np.where(C, lam + M.product(z), 0.0)
+    return TrialSolution(new, np.where(C, 0.0, y + z), SIGN_UNCERTAINTY * start.rounding)
+
+
+def factored_set(prepared: Prepared, start: TrialSolution, C: Mask) -> TrialSolution:
     """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
     A, lam, y = prepared.assembly.A, start.lam, start.y
     rho = STIFFER * stiffest_contact(prepared)
@@ -44,8 +73,13 @@ def factored_set(prepared: Prepared, start: TrialSolution, C: Set) -> TrialSolut
     return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
 
 
-def penalty_continuation(prepared: Prepared, load: LoadCase) -> Set:
-    """(m,) the contacts that overlap with springs as stiff as K. load : with p."""
+def penalty_continuation(prepared: Prepared, load: LoadCase) -> Mask:
+    """(m,) the contacts that overlap with springs as stiff as K: a first set. load : with p.
+
+    Springs alone, ever stiffer, one step of Newton's method per ρ from the stiffness of the body to that of
+    K: an edge of contact moves as far as they give way, however fine the mesh, where pivoting moves it by a
+    row of contacts per set (Hintermüller and Kunisch, SIAM J. Optim. 17:159–187, 2006).
+    """
     A, overlap = prepared.assembly.A, np.maximum(load.p, 0.0)
     C = overlap > 0
     if not C.any():
@@ -57,7 +91,7 @@ def penalty_continuation(prepared: Prepared, load: LoadCase) -> Set:
     return C
 
 
-def with_springs(prepared: Prepared, rho: float, C: Set) -> Stiffness:
+def with_springs(prepared: Prepared, rho: float, C: Mask) -> Stiffness:
     """K + ρ A_C A_Cᵀ."""
     assembly = prepared.assembly
     A_C = assembly.A[:, np.flatnonzero(C)]
