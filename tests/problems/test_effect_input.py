@@ -66,6 +66,7 @@ ALONE = [
     ),
     ('kind = "fasteners"\npreload = "much"\npoints = [[1, 1]]', "preload", "number; in N"),
     ('kind = "pressure"\npart = "a"\nvalue = inf', "value", "in N/mm²"),
+    ('kind = "stringers"\npart = "a"\npitch = 9\nstart = 40\nstop = 20\nI = 1', "start, stop", "0 … 90 mm"),
 ]
 
 
