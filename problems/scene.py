@@ -125,9 +125,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     joint = _joint(joint_path, joint_data, effects, faults)
     if joint is not None:
         for table in tables:
-            faults += table.misfits(joint)
-        for k, table in enumerate(tables):
-            faults += table.conflicts(tables[:k] + tables[k + 1 :], joint)
+            faults += table.misfits(joint, tables)
         if len(effects) == len(tables):
             faults += _floating(joint_path, joint, effects)
     if faults or joint is None:

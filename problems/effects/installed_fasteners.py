@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
 from problems.model.effect import ContactEffect, Effect, Pair, SpringEffect
-from problems.model.joint import TOOL, Joint
+from problems.model.joint import TOOL, Faults, Joint
 from problems.model.positions import Positions
 
 
@@ -27,13 +27,11 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
     stiffness: Annotated[Positive, "N/mm"] = 1e5
     approach: Annotated[Finite, "mm"] = 0.0
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         if joint.pairs and not self._tied(joint):
             yield "between", self.between, "a contact of two parts; a fastener cannot tie a part to the tool"
-
-    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """A hole holds one element: no two ties, nor a tie and a preload, at one node of one contact."""
+        # A hole holds one element: no two ties, nor a tie and a preload, at one node of one contact.
         mine = set(self.nearest_nodes(joint))
         for other in others:
             if isinstance(other, Positions):

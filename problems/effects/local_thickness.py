@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated
 
 import scipy.sparse as sp
 
-from problems.fem.hermite import line_matrices
-from problems.fem.plate import Plate
+from problems.fem.plate import Plate, Range
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import Effect, Range, StiffnessEffect
-from problems.model.joint import Joint
+from problems.model.effect import Effect, StiffnessEffect
+from problems.model.joint import Faults, Joint
 
 
 class LocalThickness(StiffnessEffect):
@@ -29,12 +28,13 @@ class LocalThickness(StiffnessEffect):
     def pad(self) -> tuple[float, Range, Range]:
         return self.thickness, self.x, self.y
 
-    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+    def misfits(self, plate: Plate) -> Faults:
         for key, (start, stop), grid in (("x", self.x, plate.x), ("y", self.y, plate.y)):
             if not grid[0] <= start < stop <= grid[-1]:
                 yield key, [start, stop], f"start < stop on the part, {grid[0]:g} … {grid[-1]:g} mm"
 
-    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         for other in others:
             if (
                 isinstance(other, LocalThickness)
@@ -46,13 +46,5 @@ class LocalThickness(StiffnessEffect):
                 yield "x, y", [list(self.x), list(self.y)], allowed
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
-        nu = plate.poisson
-        X, Y = line_matrices(plate.x, *self.x), line_matrices(plate.y, *self.y)
-        bending = (
-            sp.kron(Y.M, X.H)
-            + sp.kron(Y.H, X.M)
-            + nu * (sp.kron(Y.B, X.B.T) + sp.kron(Y.B.T, X.B))
-            + 2 * (1 - nu) * sp.kron(Y.G, X.G)
-        )
-        change = replace(plate, thickness=self.thickness).rigidity - plate.rigidity
-        return (change * bending).tocsr()
+        share = replace(plate, thickness=self.thickness).rigidity / plate.rigidity - 1
+        return share * plate.stiffness(self.x, self.y)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,8 +12,8 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.input.csv_table import rows_from_file
-from problems.model.effect import ContactEffect, GapEffect, at_contacts
-from problems.model.joint import Joint
+from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
+from problems.model.joint import Faults, Joint
 
 
 class MeasuredGap(ContactEffect, GapEffect):
@@ -30,16 +30,14 @@ class MeasuredGap(ContactEffect, GapEffect):
     def _from_file(cls, data: Any, info: ValidationInfo) -> Any:
         return rows_from_file(data, info, "points", ("x", "y", "gap"))
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         places = np.array(self.points)[:, :2]
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=1e-9 * np.ptp(places)) < 2:
             yield "points", "all on one line", "at least three points off a line"
         _, first, count = np.unique(places, axis=0, return_index=True, return_counts=True)
         for k in first[count > 1]:
             yield f"points[{k}]", list(self.points[k]), "one gap per point; this point appears twice"
-
-    def conflicts(self, others: Any, joint: Joint) -> Iterator[tuple[str, object, str]]:
         for other in others:
             if isinstance(other, MeasuredGap) and set(self.pairs(joint)) & set(other.pairs(joint)):
                 yield "between", self.between, "one measured_gap per contact: another one covers this contact"

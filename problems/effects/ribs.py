@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated
 
 import scipy.sparse as sp
@@ -11,6 +10,7 @@ from pydantic import Field
 from problems.fem.plate import Plate
 from problems.input.bounded import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
+from problems.model.joint import Faults
 
 
 class Ribs(StiffnessEffect):
@@ -20,7 +20,7 @@ class Ribs(StiffnessEffect):
     I: Annotated[Positive, "mm⁴"]  # noqa: E741
     J: Annotated[NotNegative, "mm⁴"] = 0.0
 
-    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+    def misfits(self, plate: Plate) -> Faults:
         south, north = plate.y[[0, -1]]
         for k, line in enumerate(self.lines):
             if not south <= line <= north:
@@ -28,5 +28,4 @@ class Ribs(StiffnessEffect):
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J
-        beams = (plate.beam_along_x(y, EI, GJ) for y in self.lines)
-        return sum(beams, start=sp.csr_array((plate.size, plate.size)))
+        return plate.beams(self.lines, EI, GJ, along_x=True)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.model.effect import Effect, GapEffect, Pair, PartEffect, at_contacts
-from problems.model.joint import TOOL, Joint
+from problems.model.joint import TOOL, Faults, Joint
 
 
 class RigidTool(PartEffect, GapEffect):
@@ -28,7 +28,8 @@ class RigidTool(PartEffect, GapEffect):
     def contacts(self) -> tuple[Pair, ...]:
         return ((self.part, TOOL),)
 
-    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         if any(isinstance(other, RigidTool) and other.part == self.part for other in others):
             yield "part", self.part, "one rigid_tool per part: another one faces this part"
 

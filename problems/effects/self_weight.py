@@ -6,7 +6,6 @@ from typing import Annotated
 
 import numpy as np
 
-from problems.fem.hermite import line_loads
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
 from problems.model.part import PartLoadEffect, PartModel
@@ -27,8 +26,6 @@ class SelfWeight(PartLoadEffect):
     def load(self, model: PartModel) -> Vector:
         weight = self.density * self.gravity * KG_PER_M3_TIMES_M_PER_S2
         f = np.zeros(model.plate.size)
-        for sign, thickness, x, y in model.areas():
-            along_x, _ = line_loads(model.plate.x, *x)
-            along_y, _ = line_loads(model.plate.y, *y)
-            f += sign * weight * thickness * np.kron(along_y, along_x)
+        for sign, thickness, (x, _), (y, _) in model.areas():
+            f += sign * weight * thickness * np.kron(y, x)
         return f

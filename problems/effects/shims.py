@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 
 from problems.forms.assembly import Mask, Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import ContactEffect, GapEffect, at_contacts
-from problems.model.joint import Joint
+from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
+from problems.model.joint import Faults, Joint
 
 
 class Shims(ContactEffect, GapEffect):
@@ -24,8 +24,8 @@ class Shims(ContactEffect, GapEffect):
     x: Annotated[tuple[Finite, Finite], "mm"]
     y: Annotated[tuple[Finite, Finite], "mm"]
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         if not self._covered(joint).any():
             hx, hy = joint.x[1] - joint.x[0], joint.y[1] - joint.y[0]
             allowed = f"ranges that contain a node; nodes are spaced {hx:g} × {hy:g} mm from (0, 0)"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
@@ -11,6 +10,7 @@ import scipy.sparse as sp
 from problems.fem.plate import Plate
 from problems.input.bounded import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
+from problems.model.joint import Faults
 
 
 class Stringers(StiffnessEffect):
@@ -25,7 +25,7 @@ class Stringers(StiffnessEffect):
     I: Annotated[Positive, "mm⁴"]  # noqa: E741
     J: Annotated[NotNegative, "mm⁴"] = 0.0
 
-    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+    def misfits(self, plate: Plate) -> Faults:
         south, north = plate.y[[0, -1]]
         if max(self.start, south) >= min(self.stop, north):
             allowed = f"a length on the part, {south:g} … {north:g} mm"
@@ -34,4 +34,5 @@ class Stringers(StiffnessEffect):
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J
         positions = np.arange(0.0, plate.x[-1] + 1e-9 * self.pitch, self.pitch)
-        return plate.beams_along_y(np.minimum(positions, plate.x[-1]).tolist(), EI, GJ, self.start, self.stop)
+        lines = np.minimum(positions, plate.x[-1]).tolist()
+        return plate.beams(lines, EI, GJ, along_x=False, ends=(self.start, self.stop))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +11,7 @@ from pydantic import Field
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.model.effect import Effect
-from problems.model.joint import Joint
+from problems.model.joint import Faults, Joint
 from problems.model.part import PartLoadEffect, PartModel
 
 from .supports import Supports
@@ -26,7 +26,9 @@ class SupportShift(PartLoadEffect):
     points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), "mm"]
     shift: Annotated[Finite, "mm"]
 
-    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
+
         def points(kind: type[SupportShift | Supports]) -> list[tuple[float, float]]:
             mine = [other for other in others if isinstance(other, kind) and other.part == self.part]
             return [point for other in mine for point in other.points]

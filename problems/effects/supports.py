@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated
 
 import scipy.sparse as sp
@@ -11,6 +10,7 @@ from pydantic import Field
 from problems.fem.plate import Plate
 from problems.input.bounded import Finite, Positive
 from problems.model.effect import StiffnessEffect
+from problems.model.joint import Faults
 
 
 class Supports(StiffnessEffect):
@@ -26,7 +26,7 @@ class Supports(StiffnessEffect):
     def held_points(self) -> tuple[tuple[float, float], ...]:
         return self.points
 
-    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
+    def misfits(self, plate: Plate) -> Faults:
         length, (south, north) = plate.x[-1], plate.y[[0, -1]]
         for k, (x, y) in enumerate(self.points):
             if not (0 <= x <= length and south <= y <= north):

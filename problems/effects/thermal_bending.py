@@ -7,7 +7,6 @@ from typing import Annotated
 
 import numpy as np
 
-from problems.fem.hermite import line_loads
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
 from problems.model.part import PartLoadEffect, PartModel
@@ -27,10 +26,8 @@ class ThermalBending(PartLoadEffect):
     def load(self, model: PartModel) -> Vector:
         plate = model.plate
         f = np.zeros(plate.size)
-        for sign, thickness, x, y in model.areas():
+        for sign, thickness, (x, x_bend), (y, y_bend) in model.areas():
             kappa = self.expansion * self.difference / thickness
             moment = replace(plate, thickness=thickness).rigidity * (1 + plate.poisson) * kappa
-            x_value, x_bend = line_loads(plate.x, *x)
-            y_value, y_bend = line_loads(plate.y, *y)
-            f -= sign * moment * (np.kron(y_value, x_bend) + np.kron(y_bend, x_value))
+            f -= sign * moment * (np.kron(y, x_bend) + np.kron(y_bend, x))
         return f

@@ -12,6 +12,8 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
 
+LineLoads = tuple[Vector, Vector]
+
 
 @dataclass(frozen=True)
 class LineMatrices:
@@ -79,7 +81,7 @@ def evaluate(grid: Vector, at: float, derivative: int = 0) -> sp.csr_array:
     return sp.csr_array((values[keep], (np.zeros_like(keep), 2 * element + keep)), shape=(1, 2 * len(grid)))
 
 
-def line_loads(grid: Vector, start: float, stop: float) -> tuple[Vector, Vector]:
+def line_loads(grid: Vector, start: float, stop: float) -> LineLoads:
     """∫φ and ∫φ'' over [start, stop], each (2N,): M and B applied to the function 1."""
     line = line_matrices(grid, start, stop)
     one = np.tile([1.0, 0.0], len(grid))

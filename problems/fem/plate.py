@@ -20,6 +20,9 @@ from problems.forms.assembly import Vector
 
 from .hermite import evaluate, line_matrices
 
+Range = tuple[float, float]
+WHOLE: Range = -np.inf, np.inf
+
 
 @dataclass(frozen=True)
 class Plate:
@@ -50,14 +53,14 @@ class Plate:
         """G = E / 2(1 + ν), N/mm²."""
         return self.young / (2 * (1 + self.poisson))
 
-    def stiffness(self) -> sp.csr_array:
-        """(size, size), N/mm and N: the bending stiffness of the free plate.
+    def stiffness(self, x: Range = WHOLE, y: Range = WHOLE) -> sp.csr_array:
+        """(size, size), N/mm and N: the bending stiffness of the free plate, of what lies in the ranges.
 
         All terms have the same nonzero entries, those of nodes of a common element, so that their sum is
         formed on the values alone, an entry of a one-dimensional matrix along y at a time; it is symmetric to
         the last bit.
         """
-        X, Y = line_matrices(self.x), line_matrices(self.y)
+        X, Y = line_matrices(self.x, *x), line_matrices(self.y, *y)
         D, nu = self.rigidity, self.poisson
         x_B, y_B = X.B.data, Y.B.data
         x_Bt, y_Bt = (sp.csr_array(B.T).data for B in (X.B, Y.B))
@@ -83,19 +86,17 @@ class Plate:
         """Row vector (1, size) that gives the deflection, or a derivative of it, at a point."""
         return sp.kron(evaluate(self.y, y, dy), evaluate(self.x, x, dx)).tocsr()
 
-    def beams_along_y(
-        self, x: Sequence[float], EI: float, GJ: float, start: float, stop: float
+    def beams(
+        self, lines: Sequence[float], EI: float, GJ: float, along_x: bool, ends: Range = WHOLE
     ) -> sp.csr_array:
-        """Stiffness of a beam at each x between y = start and stop: Σ EI ∫w_yy² + GJ ∫w_xy², N·mm²."""
-        line = line_matrices(self.y, start, stop)
-        e, slope = (sp.vstack([evaluate(self.x, each, d) for each in x]) for d in (0, 1))
-        return (EI * sp.kron(line.H, e.T @ e) + GJ * sp.kron(line.G, slope.T @ slope)).tocsr()
-
-    def beam_along_x(self, y: float, EI: float, GJ: float) -> sp.csr_array:
-        """Stiffness of a beam at y over the full length: EI ∫w_xx² + GJ ∫w_xy², N·mm²."""
-        line = line_matrices(self.x)
-        e, slope = evaluate(self.y, y), evaluate(self.y, y, 1)
-        return (EI * sp.kron(e.T @ e, line.H) + GJ * sp.kron(slope.T @ slope, line.G)).tocsr()
+        """Stiffness of beams along x, or y, at each of the lines between two ends: Σ EI ∫w_ss² + GJ ∫w_xy²,
+        N·mm², s along the beam.
+        """
+        own, other = (self.x, self.y) if along_x else (self.y, self.x)
+        line = line_matrices(own, *ends)
+        e, slope = (sp.vstack([evaluate(other, each, d) for each in lines]) for d in (0, 1))
+        terms = (EI, (e.T @ e, line.H)), (GJ, (slope.T @ slope, line.G))
+        return sum(factor * sp.kron(*(pair if along_x else pair[::-1])) for factor, pair in terms).tocsr()
 
     def line_dofs(self, line: int) -> np.ndarray:
         """The 4 nx degrees of freedom on the grid line y[line]."""

@@ -18,20 +18,19 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
 
-from problems.fem.plate import Plate
+from problems.fem.plate import Plate, Range
 from problems.forms.assembly import Matrix, Vector
 
-from .joint import TOOL, Joint, Table
+from .joint import TOOL, Faults, Joint, Table
 
 Pair = tuple[str, str]
-Range = tuple[float, float]
 
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
@@ -61,12 +60,8 @@ class Effect(Table):
         """The contacts that this effect adds."""
         return ()
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """(key, value, what is allowed) for each parameter that does not fit the joint."""
-        yield from ()
-
-    def conflicts(self, others: Sequence[Effect], joint: Joint) -> Iterator[tuple[str, object, str]]:
-        """The same for each contradiction to the other effects of the scene."""
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        """Of parameters that do not fit the joint, or contradict the other effects of the scene."""
         yield from ()
 
 
@@ -75,8 +70,8 @@ class PartEffect(Effect):
 
     part: str
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         yield from unknown_part(self.part, joint)
 
 
@@ -89,8 +84,8 @@ class ContactEffect(Effect):
         """The contacts that it acts on."""
         return joint.pairs if self.between is None else (self.between,)
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         if not joint.pairs:
             needs = f"needs a contact, but {joint.part[0].name} is the only part"
             yield "between", self.between, f'{needs}: add a part, a rigid_tool or "tool" in contacts'
@@ -115,14 +110,14 @@ class StiffnessEffect(PartEffect):
     def stiffness(self, plate: Plate) -> sp.csr_array:
         """(plate.size, plate.size) term in N/mm, coupling only neighbouring grid lines y = const."""
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         for part in joint.part:
             if part.name == self.part:
                 yield from self.misfits(joint.plate(part))
 
-    def misfits(self, plate: Plate) -> Iterator[tuple[str, object, str]]:
-        """(key, value, what is allowed) for each parameter that does not fit the part."""
+    def misfits(self, plate: Plate) -> Faults:
+        """Of parameters that do not fit the part."""
         yield from ()
 
 
@@ -178,7 +173,7 @@ def pressing_forces(nodal: Vector, pairs: Sequence[Pair], joint: Joint) -> Vecto
     return f
 
 
-def unknown_part(part: str, joint: Joint) -> Iterator[tuple[str, object, str]]:
+def unknown_part(part: str, joint: Joint) -> Faults:
     names = [p.name for p in joint.part]
     if part not in names:
         yield "part", part, f"one of {names}"

@@ -14,7 +14,7 @@ from problems.errors import Fault
 from problems.input.validation import unknown, validation_faults
 
 from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
-from .joint import Joint
+from .joint import Faults, Joint
 
 if TYPE_CHECKING:
     from problems.input.csv_table import Rows  # imported by the effects that read a file
@@ -54,27 +54,22 @@ class EffectTable:
         for rows in self.files:
             yield from rows.faults
 
-    def misfits(self, joint: Joint) -> Iterator[Fault]:
-        """The faults with respect to the joint."""
-        found: Iterator[tuple[str, object, str]] = iter(())
+    def misfits(self, joint: Joint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
+        """The faults with respect to the joint and to the effects of the other tables."""
+        found: Faults = iter(())
         if self.effect is not None:
-            found = self.effect.faults(joint)
+            others = [table.effect for table in tables if table.effect is not None and table is not self]
+            found = self.effect.faults(joint, others)
         elif isinstance(part := self.content.get("part"), str):
             found = unknown_part(part, joint)
         yield from self._faults(found)
-
-    def conflicts(self, others: Sequence[EffectTable], joint: Joint) -> Iterator[Fault]:
-        """The contradictions to the other effects."""
-        if self.effect is not None:
-            effects = [other.effect for other in others if other.effect is not None]
-            yield from self._faults(self.effect.conflicts(effects, joint))
 
     @property
     def _name(self) -> str:
         kind = self.content.get("kind")
         return f"effect[{self.index}]" + (f" ({kind})" if kind else "")
 
-    def _faults(self, found: Iterator[tuple[str, object, str]]) -> Iterator[Fault]:
+    def _faults(self, found: Faults) -> Iterator[Fault]:
         """The faults of parameters; those of a file's rows are located by line."""
         for key, value, allowed in found:
             lines = [line for rows in self.files if (line := rows.line(key))]

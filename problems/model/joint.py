@@ -27,6 +27,8 @@ from problems.input.bounded import Name, Positive
 MOST = 100_000  # grid lines; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]
 TOOL = "tool"  # the second of a contact pair: a rigid surface
+#: (key, value, what is allowed)
+Faults = Iterator[tuple[str, object, str]]
 
 
 class Table(BaseModel):
@@ -135,8 +137,8 @@ class Joint(Table):
             y.append(np.linspace(self.junction.width, end, part.north.elements + 1)[1:])
         return Plate(self.x, np.concatenate(y), part.thickness, part.young, part.poisson)
 
-    def faults(self) -> Iterator[tuple[str, object, str]]:
-        """(key, value, what is allowed) for every fault that the types cannot catch."""
+    def faults(self) -> Faults:
+        """Those that the types cannot catch."""
         names = [part.name for part in self.part]
         if len(set(names)) < len(names) or TOOL in names:
             yield "part.name", names, f'each part needs a unique name other than "{TOOL}"'

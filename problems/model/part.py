@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from problems.fem.plate import Plate
+from problems.fem.hermite import LineLoads, line_loads
+from problems.fem.plate import WHOLE, Plate
 from problems.forms.assembly import Indices, Vector
 
-from .effect import PartEffect, Range, StiffnessEffect
+from .effect import PartEffect, StiffnessEffect
 from .joint import Joint, Part
 
 
@@ -80,15 +81,14 @@ class PartModel:
             held[self.plate.line_dofs(line)] = True
         return np.flatnonzero(~held)
 
-    def areas(self) -> Iterator[tuple[float, float, Range, Range]]:
-        """(sign, thickness, range of x, range of y) whose sum is the part with its pads."""
-        x, y = ((float(grid[0]), float(grid[-1])) for grid in (self.plate.x, self.plate.y))
-        yield 1.0, self.plate.thickness, x, y
-        for effect in self.effects:
-            if effect.pad:
-                thickness, x, y = effect.pad
-                yield 1.0, thickness, x, y
-                yield -1.0, self.plate.thickness, x, y
+    def areas(self) -> Iterator[tuple[float, float, LineLoads, LineLoads]]:
+        """(sign, thickness, loads along x, loads along y), whose sum is the part with its pads."""
+        plate = self.plate
+        areas = [(1.0, plate.thickness, WHOLE, WHOLE)]
+        for thickness, x, y in (effect.pad for effect in self.effects if effect.pad):
+            areas += [(1.0, thickness, x, y), (-1.0, plate.thickness, x, y)]
+        for sign, thickness, x, y in areas:
+            yield sign, thickness, line_loads(plate.x, *x), line_loads(plate.y, *y)
 
 
 class PartLoadEffect(PartEffect):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,8 +12,8 @@ from problems.forms.assembly import Indices, Matrix, Vector
 from problems.input.bounded import Finite, NotNegative
 from problems.input.csv_table import rows_from_file
 
-from .effect import ForceEffect
-from .joint import Joint, Table
+from .effect import Effect, ForceEffect
+from .joint import Faults, Joint, Table
 
 
 class Pattern(Table):
@@ -50,8 +50,8 @@ class Positions(ForceEffect):
         X, Y = np.meshgrid(x, y)
         return np.column_stack([X.ravel(), Y.ravel()])
 
-    def faults(self, joint: Joint) -> Iterator[tuple[str, object, str]]:
-        yield from super().faults(joint)
+    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
         length, width = joint.junction.length, joint.junction.width
         if pattern := self.pattern:
             spread = [size for size, n in ((length, pattern.columns), (width, pattern.rows)) if n > 1]

@@ -66,6 +66,7 @@ ALONE = [
     ),
     ('kind = "fasteners"\npreload = "much"\npoints = [[1, 1]]', "preload", "number; in N"),
     ('kind = "pressure"\npart = "a"\nvalue = inf', "value", "in N/mm²"),
+    ('kind = "stringers"\npart = "a"\npitch = 9\nstart = 40\nstop = 20\nI = 1', "start, stop", "0 … 90 mm"),
 ]
 
 
@@ -126,10 +127,10 @@ def test_everything_wrong_in_a_file_is_said_in_one_go(tmp_path: Path) -> None:
         "effect[2] (local_thickness).thickness",
         "effect[4].kind",
         "effect[5] (clamps).radius",
-        "effect[2] (local_thickness).part",
-        "effect[3] (shims).between",
         "effect[0] (rigid_tool).part",
         "effect[1] (rigid_tool).part",
+        "effect[2] (local_thickness).part",
+        "effect[3] (shims).between",
     ]
 
 

@@ -13,7 +13,6 @@ from commands import harness
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
-from scipy.io import FortranFile
 from small import make_load, make_prepared, solve_by_nnls
 
 from harness.scene.export import export, matrices
@@ -61,7 +60,9 @@ def test_a_round_trip_is_bit_for_bit(form: str, tmp_path: Path) -> None:
 
 
 def test_dmig_keeps_ten_digits(tmp_path: Path) -> None:
+    """pyyeti sets how numpy prints when it is imported, and tables would lose their last digits."""
     wanted, found = there_and_back("dmig", tmp_path)
+    assert str(np.float64(1 / 3)) == repr(1 / 3)
     np.testing.assert_allclose(found["K"], wanted["K"].toarray(), rtol=1e-9)
     np.testing.assert_array_equal(found["A"], wanted["A"].toarray())
     np.testing.assert_allclose(found["f"], wanted["f"], rtol=1e-9)
@@ -89,25 +90,6 @@ def test_dmig_cards_by_their_columns(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read, rounded(dense, 10))
 
 
-def test_op4_by_its_records(tmp_path: Path) -> None:
-    """Fortran records: columns, rows, form (6: symmetric), type (2: double) and name; then each column."""
-    data = matrices(*small())
-    formats.FORMATS["op4"].write(tmp_path / "p.op4", data)
-    wanted = {"K": data["K"].toarray(), "A": data["A"].toarray(), "F": data["f"], "G": data["g"]}
-    with FortranFile(tmp_path / "p.op4") as file:
-        for name, matrix in wanted.items():
-            dense = matrix.reshape(len(matrix), -1)
-            header = file.read_record("<i4")
-            assert header[:2].tolist() == [dense.shape[1], len(dense)]
-            assert header[2:4].tolist() == [6 if name == "K" else 2, 2]
-            assert header[4:].tobytes().decode().strip() == name
-            read = np.zeros(dense.shape)
-            while (record := file.read_record("<i4"))[0] <= dense.shape[1]:
-                column, row, words = record[:3]
-                read[row - 1 : row - 1 + words // 2, column - 1] = record[3:].view("<f8")
-            np.testing.assert_array_equal(read, dense)
-
-
 def test_a_stiffness_that_nastran_calls_otherwise(tmp_path: Path) -> None:
     """KAAX of two grid points with the component 3, written by hand."""
     cards = [
@@ -127,12 +109,6 @@ def test_a_stiffness_that_nastran_calls_otherwise(tmp_path: Path) -> None:
         import_([str(stiffness), *others], tmp_path / "out.npz", QUIET)
     import_([f"K={stiffness}", *others], tmp_path / "out.npz", QUIET)
     np.testing.assert_array_equal(np.load(tmp_path / "out.npz")["K"], K)
-
-
-def test_nastrans_reader_leaves_numbers_their_digits(tmp_path: Path) -> None:
-    """pyyeti sets how numpy prints when it is imported, and tables would lose their last digits."""
-    formats.FORMATS["op4"].write(tmp_path / "p.op4", matrices(*small()))
-    assert str(np.float64(1 / 3)) == repr(1 / 3)
 
 
 @pytest.mark.parametrize("shape", ["lower", "upper", "both"])
