@@ -26,8 +26,8 @@ from .plugin import load_plugin, own_files, solver_class
 from .settings import require
 
 #: Who stands behind a solver.
-Group = Literal["ours", "textbook", "library"]
-PACKAGES: dict[Group, str] = {
+Owner = Literal["ours", "textbook", "library"]
+PACKAGES: dict[Owner, str] = {
     "ours": "solvers.methods",
     "textbook": "solvers.textbook",
     "library": "solvers.libraries",
@@ -47,10 +47,10 @@ def modules() -> dict[str, str]:
     return found
 
 
-def group_of(name: str) -> Group:
-    """The group of a solver; a plug-in, and what only qpsolvers finds, stands among the libraries."""
+def owner_of(name: str) -> Owner:
+    """Who stands behind a solver; a plug-in, and what only qpsolvers finds, stands among the libraries."""
     module = modules().get(name, "")
-    return next((group for group, package in PACKAGES.items() if module.startswith(package)), "library")
+    return next((owner for owner, package in PACKAGES.items() if module.startswith(package)), "library")
 
 
 def solver_names() -> list[str]:
@@ -87,7 +87,7 @@ def solver_version(name: str, plugin: Path | None = None) -> str:
         return "sha256:" + hashlib.sha256(b"".join(contents)).hexdigest()[:12]
     if name in modules():
         distribution = _class_of(name).distribution
-        if distribution is None and group_of(name) != "library":
+        if distribution is None and owner_of(name) != "library":
             return __version__
     else:
         from .libraries.qpsolvers import DISTRIBUTIONS

@@ -7,7 +7,7 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer, Form
-from solvers.registry import group_of, make_solver, modules, solver_names
+from solvers.registry import make_solver, modules, owner_of, solver_names
 
 #: Those of the project and of its extra `extra-solvers`: what else is installed decides about no test.
 TESTED = [
@@ -16,7 +16,7 @@ TESTED = [
 CASES: list[tuple[str, Form]] = [(name, form) for name in TESTED for form in make_solver(name, {}).forms]
 #: Its steps grow with cond(Q): it may give up, but must not be wrong.
 SLOW = ("projected-gauss-seidel",)
-IN_HOUSE = [(name, form) for name, form in CASES if group_of(name) == "ours"]
+IN_HOUSE = [(name, form) for name, form in CASES if owner_of(name) == "ours"]
 
 #: The textbook methods written here.
 WRITTEN_HERE = (*SLOW, "textbook-active-set")
@@ -25,7 +25,7 @@ WRITTEN_HERE = (*SLOW, "textbook-active-set")
 TOLERANCES = {
     name: 1e-14 if name == "ipm" else 1e-10
     for name in modules()
-    if group_of(name) == "ours" or name in WRITTEN_HERE
+    if owner_of(name) == "ours" or name in WRITTEN_HERE
 }
 
 #: These end with the right contact set and solve its equations: no tolerance is left in their answer.

@@ -41,7 +41,7 @@ def row(scene: str = "4386/0052", solver: str = "ipm", form: str = "dual", **fig
         "duality_gap": 1e-10, "peak_rss_mib": 512.0, "machine": "Made-up CPU, 2 cores", "form_s": 0.05,
         "kernels": "openblas SkylakeX", "threads_asked": 2, "solver_version": "1.0", "message": None,
         "rivetbench_version": "0.1.0", "recorded_at": "2025-01-01T00:00:00Z", "time_limit_s": 60.0,
-        "group": "ours" if solver in ("ipm", "gi", "newton", "ipm-fast") else "library",
+        "owner": "ours" if solver in ("ipm", "gi", "newton", "ipm-fast") else "library",
         "stages": "K factors Q",
     } | figures  # fmt: skip
 

@@ -29,7 +29,7 @@ IMPORT_MIB = 8192
 @dataclass(frozen=True)
 class Description:
     """What rows say of a solver: its forms, the version of its library, a hash of this project's code for it,
-    and its group (`solvers.registry.group_of`).
+    and its owner (`solvers.registry.owner_of`).
 
     failure : why the version asked for cannot be used, "" if it can.
     """
@@ -37,7 +37,7 @@ class Description:
     forms: list[Form]
     version: str
     code: str
-    group: str = "library"
+    owner: str = "library"
     failure: str = ""
 
     @property
@@ -102,7 +102,7 @@ def describe_here(
     job: tuple[list[tuple[str, dict[str, Any]]], Path | None, Sequence[str]], events: Events
 ) -> Row:
     """The descriptions; in the process of its own. Raises InputError, all faults at once."""
-    from solvers.registry import group_of, make_solver, solver_version
+    from solvers.registry import make_solver, owner_of, solver_version
 
     solvers, plugin, requirements = job
     found: list[Description] = []
@@ -117,7 +117,7 @@ def describe_here(
                     f"solver {name}", "forms", shown(forms), f"a tuple of {', '.join(FORMS)}"
                 )
             version, code = solver_version(name, plugin), code_of(solver)
-            found.append(Description(list(forms), version, code, group_of(name)))
+            found.append(Description(list(forms), version, code, owner_of(name)))
         except InputError as error:
             faults += error.faults
     if faults:

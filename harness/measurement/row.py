@@ -87,7 +87,7 @@ def rows_of(
     shared = {
         **origin,
         "scene_key": problem.scene.key,
-        "group": task.solver.group,
+        "owner": task.solver.owner,
         "solver_version": task.solver.version,
         "solver_code": task.solver.code,
         "rivetbench_version": installed_version("rivetbench"),

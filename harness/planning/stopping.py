@@ -21,7 +21,7 @@ def stopped_at(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
     others = [
         (sum(row[step] or 0.0 for step in STEPS), f"{row['solver']} {row['form']}")
         for row in rows
-        if row["scene"] == m.scene and row["group"] == "library" and row["solver"] != m.solver
+        if row["scene"] == m.scene and row["owner"] == "library" and row["solver"] != m.solver
         if row["verdict"] == "within" and row["repeat"] == 0
     ]
     if m.stop_at_times_fastest is None or not others:

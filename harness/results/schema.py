@@ -52,13 +52,13 @@ def _fields(kind: Kind, names: str) -> dict[str, Kind]:
 
 
 #: Who stands behind a solver, in the order of every table.
-GROUPS = ("ours", "textbook", "library")
+OWNERS = ("ours", "textbook", "library")
 
-#: What was requested. group : of GROUPS; older rows have `in_house` instead.
+#: What was requested. owner : of OWNERS; older rows have `in_house` instead.
 #: stop : why time_limit_s is tighter than the suite's. searched : the tolerance is one of those tried for the
 #: loosest that suffices.
 ASKED: dict[str, Kind] = {
-    **_fields("text", "key suite scene source solver group form variant stop"),
+    **_fields("text", "key suite scene source solver owner form variant stop"),
     **_fields("number", "tolerance threads_asked repeat case time_limit_s memory_limit_mib"),
     **_fields("number", "limit_mm limit_asked_mm"),
     **_fields("object", "options series"),

@@ -58,7 +58,7 @@ def _built(cell: Mapping[str, Any], problem: Mapping[str, Any]) -> dict[str, flo
     seconds, sizes = _known(problem.get("build_s")), _known(problem.get("stored_mib"))
     stages = [stage for stage in str(cell["stages"]).split() if stage in BUILDING]
     if not stages:  # a run that was stopped does not say
-        stages = ["K", "factors", "Q"] if cell["form"] == "dual" or cell["group"] != "library" else ["K"]
+        stages = ["K", "factors", "Q"] if cell["form"] == "dual" or cell["owner"] != "library" else ["K"]
     for stage in stages:
         first, *others = (seconds.get(step, np.nan) for step in BUILDING[stage])
         found[f"{stage}_s"] = first + float(np.nansum(others))  # springs between parts, if there are any

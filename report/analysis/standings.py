@@ -88,7 +88,7 @@ def fastest_first(
     known = cells[good & (cells[seconds] > 0)]
     known = known[known.groupby(name)["scene"].transform("nunique") == cells["scene"].nunique()]
     means = np.exp(np.log(known[seconds]).groupby(known[name]).mean()).rename("seconds")
-    lines = known.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "group"]]
+    lines = known.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "owner"]]
     return lines.assign(seconds=means).sort_values("seconds", ignore_index=True)
 
 
@@ -110,8 +110,8 @@ def recommended(
     best = lines.iloc[0]
     others = (lines[["solver", "form"]] != best[["solver", "form"]]).any(axis=1)
     line |= {"use": best["label"], "seconds": best["seconds"]}
-    groups = {name: lines["group"] == name for name in ("textbook", "library")}
-    for name, among in {"next": others, **groups}.items():
+    opponents = {name: lines["owner"] == name for name in ("textbook", "library")}
+    for name, among in {"next": others, **opponents}.items():
         if among.any():
             other = lines[among].iloc[0]
             line |= {name: other["label"], f"to_{name}": other["seconds"] / best["seconds"]}

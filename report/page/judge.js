@@ -46,7 +46,7 @@ const FILTERS = {
   form: ["form", () => ascending("form"), (cell, value) => cell.form === value],
   threads: ["threads", () => ascending("threads"), (cell, value) => cell.threads === Number(value)],
   owner: ["solvers", () => [["ours", "ours"], ["textbook", "textbook"], ["library", "libraries"]],
-    (cell, value) => cell.group === value],
+    (cell, value) => cell.owner === value],
   tolerance: ["tolerance", () => distinct("tolerance").sort(d3.descending).map(value => [String(value), tidy(value)]),
     (cell, value) => cell.tolerance === Number(value)],
   ladder: ["ladder", () => distinct("ladder").map(name => [name, name]), (cell, value) => cell.ladder === value],

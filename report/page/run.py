@@ -35,7 +35,7 @@ TEXTS = (
         "method",
         "label",
         "solver",
-        "group",
+        "owner",
         "form",
         "variant",
         "status",

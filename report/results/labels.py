@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from harness.results.schema import FORMS, GROUPS
+from harness.results.schema import FORMS, OWNERS
 from report.document.numbers import counted, tidy_power
 
 
@@ -25,13 +25,13 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
 
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
     """The labels (or method, or solvers) of some cells in the one order used everywhere: in the
-    order of GROUPS, then by name, and the forms of a solver in the order of FORMS.
+    order of OWNERS, then by name, and the forms of a solver in the order of FORMS.
     """
     lines = cells.drop_duplicates(name)
     places = [
-        (GROUPS.index(group), solver, form_place(form), str(label))
-        for group, solver, form, label in zip(
-            lines["group"], lines["solver"], lines["form"], lines[name], strict=True
+        (OWNERS.index(owner), solver, form_place(form), str(label))
+        for owner, solver, form, label in zip(
+            lines["owner"], lines["solver"], lines["form"], lines[name], strict=True
         )
     ]
     return [label for *_, label in sorted(places)]

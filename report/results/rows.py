@@ -18,7 +18,7 @@ CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
     """The rows with every field of the schema as a column of one type, the last of equal measurements.
 
-    Flags are 1.0, 0.0 or missing. A row without a `group` has that of its flag `in_house`. Adds
+    Flags are 1.0, 0.0 or missing. A row without a `owner` has that of its flag `in_house`. Adds
     `working_mib`, what the solver needs on top of the data. The size and the limits of a row that lacks them
     are those of its scene, of `problems` and of the suite.
     """
@@ -30,7 +30,7 @@ def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str
         column = rows[name] if name in rows else pd.Series(None, index=rows.index, dtype=object)
         rows[name] = column.map(_text)
     of_flag = np.where(rows["in_house"] == 1.0, "ours", "library")
-    rows["group"] = rows["group"].where(rows["group"] != "", of_flag)
+    rows["owner"] = rows["owner"].where(rows["owner"] != "", of_flag)
     if "scene" in problems:
         known = problems.drop_duplicates("scene", keep="last").set_index("scene")
         for name in {"n", "m", "active"} & set(known):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from harness.results.schema import GROUPS, LADDERS
+from harness.results.schema import LADDERS, OWNERS
 from report.analysis.outcomes import (
     CORRECT,
     CORRECT_UNCLAIMED,
@@ -61,8 +61,8 @@ def claims(cells: pd.DataFrame) -> str:
     wrong = cells["outcome"] == WRONG_CLAIMED
     counts = [
         f"{wrong[mine].sum()} of {counted(len(wrong[mine]), 'row')} of {whose}"
-        for group, whose in zip(GROUPS, ("our solvers", "textbook methods", "libraries"), strict=True)
-        if (mine := cells["group"] == group).any()
+        for owner, whose in zip(OWNERS, ("our solvers", "textbook methods", "libraries"), strict=True)
+        if (mine := cells["owner"] == owner).any()
     ]
     return f"Wrong answers reported as solved: {', '.join(counts)}."
 

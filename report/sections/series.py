@@ -51,7 +51,7 @@ def compared(rows: pd.DataFrame) -> pd.DataFrame:
     rows = rows.assign(case_s=rows[CASE].sum(axis=1))
     within = rows["case_s"].where(rows["verdict"] == "within")
     rows["later_s"], cold_s = within.where(rows["warm"] == 1), within.where(rows["warm"] == 0)
-    libraries = rows.assign(cold_s=cold_s)[rows["group"] == "library"].groupby(CELL, dropna=False)
+    libraries = rows.assign(cold_s=cold_s)[rows["owner"] == "library"].groupby(CELL, dropna=False)
     best = libraries[["later_s", "cold_s"]].median().min(axis=1)
     fastest = best.groupby(ROUND).min().rename("library_s")
     rows = rows.join(fastest, on=ROUND)

@@ -95,7 +95,7 @@ def load_cases(results: Results) -> pd.DataFrame:
     cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
     cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
     for group in OPPONENTS:
-        lines = cases[cases["group"] == group].groupby(["scene", "threads", "method", "tolerance"])
+        lines = cases[cases["owner"] == group].groupby(["scene", "threads", "method", "tolerance"])
         fastest = lines[["load_case_s", "total_s"]].median().groupby(["scene", "threads"]).min()
         fastest.columns = pd.Index(["fastest", "fastest_total"])
         cases = cases.join(fastest, on=["scene", "threads"])

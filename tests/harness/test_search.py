@@ -135,7 +135,7 @@ def test_who_is_ten_times_slower_is_stopped(
 ) -> None:
     m = replace(expand(suite_of(tmp_path))[0], time_limit_s=60.0, stop_at_times_fastest=10.0)
     rows = [
-        row_of(m, seconds, verdict) | {"solver": name, "group": group}
+        row_of(m, seconds, verdict) | {"solver": name, "owner": group}
         for name, group, seconds, verdict in others
     ]
     found, why = stopped_at(m, rows)

@@ -261,7 +261,7 @@ def test_ratios_are_to_the_fastest_librarys_next_case_warm_or_cold() -> None:
         {
             **{"machine": "a", "scene": "s", "solver": solver, "form": "dual", "variant": ""},
             **{"tolerance": 1e-9, "threads": threads, "case": k, "warm": float(k > 0)},
-            "group": "ours" if solver == "newton" else "library",
+            "owner": "ours" if solver == "newton" else "library",
             "verdict": "outside" if solver == "clarabel" else "within",
             **{"setup_s": np.nan, "solve_s": 0.75 * times[k], "form_s": 0.25 * times[k]},
         }

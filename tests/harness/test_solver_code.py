@@ -9,7 +9,7 @@ import pytest
 from harness.measurement.solver_code import code_of
 from problems.storage.fingerprint import ROOT, fingerprint
 from solvers.plugin import own_files
-from solvers.registry import group_of, make_solver, modules, solver_version
+from solvers.registry import make_solver, modules, owner_of, solver_version
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def test_a_constant_two_imports_down_counts_for_those_who_use_it(package: Path) 
     before = hashes(package)
     # ipm → kkt, newton → active_set → kkt, and so all our methods; the libraries do not
     change(package / "kkt.py", "EPS = float(np.finfo(float).eps)", "EPS = 2 * float(np.finfo(float).eps)")
-    assert changed(package, before) == {name for name in modules() if group_of(name) == "ours"} | {
+    assert changed(package, before) == {name for name in modules() if owner_of(name) == "ours"} | {
         "projected-gauss-seidel",
         "textbook-active-set",
     }
@@ -80,7 +80,7 @@ def test_a_library_does_not_depend_on_the_solvers_of_the_house(package: Path) ->
     (package / "methods/newton.py").write_text("OTHER = 1\n")
     assert changed(package, before) == {"osqp", "newton"}
     (package / "adapter.py").write_text("OTHER = 1\n")
-    assert changed(package, before) == {name for name in modules() if group_of(name) == "library"} | {
+    assert changed(package, before) == {name for name in modules() if owner_of(name) == "library"} | {
         "l-bfgs-b",
         "newton",
         "nnls",

@@ -29,14 +29,14 @@ from problems.forms.assembly import Vector
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from solvers.registry import group_of, make_solver, modules
+from solvers.registry import make_solver, modules, owner_of
 
 SEED = 16
 LARGEST_CONDITION = 1e13  # the commands refuse 1e14
 
 Variant = tuple[str, Form, dict[str, Any]]
 USUAL: list[Variant] = [
-    (name, form, {}) for name in modules() if group_of(name) == "ours" for form in make_solver(name, {}).forms
+    (name, form, {}) for name in modules() if owner_of(name) == "ours" for form in make_solver(name, {}).forms
 ]
 OTHERS: list[Variant] = [
     *(("ipm-fast", "dual", {key: False}) for key in ("finish", "start_at_gaps", "band")),

@@ -20,10 +20,10 @@ from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.adapter import gap_tolerance
 from solvers.base import Answer, Form, Solver, WarmStart
-from solvers.registry import group_of, make_solver
+from solvers.registry import make_solver, owner_of
 
 #: The libraries that take the sparse form.
-TAKEN = [name for name in TESTED if group_of(name) == "library" and "sparse" in make_solver(name, {}).forms]
+TAKEN = [name for name in TESTED if owner_of(name) == "library" and "sparse" in make_solver(name, {}).forms]
 
 
 @cache

@@ -17,7 +17,7 @@ from report.figures.ladder_map import COUNTED, ladder_map
 from report.figures.maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
 from report.results.reader import read
 from report.sections.speed import steps
-from solvers.registry import group_of, modules
+from solvers.registry import modules, owner_of
 
 NAMED = {"floating", "loads", "parts"}  # ladders whose rungs are words
 #: Vision without one kind of cone, in linear RGB: Machado, Oliveira, Fernandes, IEEE TVCG 15:1291-1298, 2009.
@@ -42,7 +42,7 @@ def lab(colour: str, sight: str) -> np.ndarray:
 
 @pytest.mark.parametrize("sight", SIGHT)
 def test_the_colours_of_our_solvers_are_told_apart(sight: str) -> None:
-    names = [name for name in modules() if group_of(name) == "ours"]
+    names = [name for name in modules() if owner_of(name) == "ours"]
     names += ["projected-gauss-seidel", "textbook-active-set"]
     assert set(names) <= set(style.KNOWN)
     colours = {name: lab(style.KNOWN[name][0], sight) for name in names}

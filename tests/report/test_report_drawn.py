@@ -24,7 +24,7 @@ SCENES = 5
 def drawn(k: int, solver: str, form: str, n: int = 4386, **figures: Any) -> dict[str, Any]:
     """A row of scene k; it takes (1 + k/10) times as long as that of scene 0."""
     usual = {
-        **{"active": 400 * k + 50, "group": "ours", "tolerance": 1e-10, "threads": 1, "threads_asked": 1},
+        **{"active": 400 * k + 50, "owner": "ours", "tolerance": 1e-10, "threads": 1, "threads_asked": 1},
         **{"setup_s": 0.0, "solve_s": SECONDS[solver, form] * (1 + k / 10)},
     }
     return row(f"{n}/0001", solver, form, **usual | figures) | {"scene": f"drawn/{n}/{k}"}

@@ -18,7 +18,7 @@ def told(directory: Path, rows: list[dict[str, Any]]) -> Section | None:
 
 def measured(scene: str, solver: str, seconds: float, products: int | None, **more: Any) -> dict[str, Any]:
     details = {} if products is None else {"products": products}
-    figures = {"setup_s": 0.0, "form_s": 0.0, "solve_s": seconds, "group": "ours", "details": details}
+    figures = {"setup_s": 0.0, "form_s": 0.0, "solve_s": seconds, "owner": "ours", "details": details}
     return row(scene, solver, **figures | more)
 
 

@@ -42,11 +42,11 @@ def test_a_section_is_a_function_in_the_list(tmp_path: Path, monkeypatch: pytest
 
 
 def test_rows_are_taken_at_their_word(tmp_path: Path) -> None:
-    rows = [row(LOW, "mine", group="textbook", batched=8), row(LOW, "newton", group=None, in_house=False)]
-    rows += [row(HIGH, "mine", group=None, in_house=True, **no_answer("not_run"))]
+    rows = [row(LOW, "mine", owner="textbook", batched=8), row(LOW, "newton", owner=None, in_house=False)]
+    rows += [row(HIGH, "mine", owner=None, in_house=True, **no_answer("not_run"))]
     rows += [row(HIGH, "newton", **no_answer("crashed"), message="not run: no reason")]
     found = read(write_rows(tmp_path, rows)).rows
-    assert found["group"].tolist() == ["textbook", "library", "ours", "ours"]
+    assert found["owner"].tolist() == ["textbook", "library", "ours", "ours"]
     assert found["status"].tolist() == ["solved", "solved", "not_run", "crashed"]
     assert found["batched"].tolist()[0] == 8
 

@@ -8,7 +8,7 @@ import pytest
 from problems.errors import InputError
 from solvers.libraries.osqp import Osqp
 from solvers.plugin import load_plugin
-from solvers.registry import group_of, make_solver, modules, solver_names, solver_version
+from solvers.registry import make_solver, modules, owner_of, solver_names, solver_version
 
 NAMES = solver_names()
 OURS = ["gi", "ipm", "ipm-fast", "lemke", "mprgp", "newton", "projected-newton"]
@@ -22,8 +22,8 @@ def test_solvers_are_found_by_their_files() -> None:
     assert NAMES[: len(modules())] == list(modules())
     assert {"quadprog", "daqp", "qpalm"} <= set(NAMES)
     assert len(NAMES) == len(set(NAMES))
-    assert [name for name in NAMES if group_of(name) == "ours"] == OURS
-    assert [name for name in NAMES if group_of(name) == "textbook"] == TEXTBOOK
+    assert [name for name in NAMES if owner_of(name) == "ours"] == OURS
+    assert [name for name in NAMES if owner_of(name) == "textbook"] == TEXTBOOK
 
 
 @pytest.mark.parametrize("name", [*LIBRARIES, "l-bfgs-b", "nnls"])

@@ -43,14 +43,14 @@ def test_the_speed_of_the_readme_is_that_of_the_rows() -> None:
     ways = roads(results("uncondensed"))
     sizes = ways.groupby("scene")["n"].first()
     own = ways[ways["method"] == "newton (sparse)"].groupby("scene")["total_1_s"].min()
-    library = ways[ways["group"] == "library"].groupby("scene")["total_1_s"].min() / own
+    library = ways[ways["owner"] == "library"].groupby("scene")["total_1_s"].min() / own
     most = by_size(own.groupby(sizes).max().tolist())
     n = listed([f"{size:.0f}" for size in sorted(set(sizes))])
     least = library.groupby(sizes).min()
     assert f"at most {most} s at n = {n}." in text("README.md")
     assert f"takes at least {by_size(least.tolist())} times as long." in text("README.md")
     condensed = (
-        ways[(ways["group"] == "ours") & ways["form"].isin(DENSE_FORMS)].groupby("scene")["total_1_s"].min()
+        ways[(ways["owner"] == "ours") & ways["form"].isin(DENSE_FORMS)].groupby("scene")["total_1_s"].min()
         / own
     )
     for size, factor in condensed.groupby(sizes).min().items():
