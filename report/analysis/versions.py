@@ -33,7 +33,7 @@ def of_versions(results: Results) -> dict[str, pd.DataFrame]:
     differs from the one above, as in a comparison of runs; missing for the first.
     """
     rows = results.rows[(results.rows["status"] != "unsupported") & (results.rows["solver_version"] != "")]
-    if rows.empty:
+    if rows["solver_version"].nunique() < 2:
         return {}
     rows = rows.assign(what=_what(rows), place=rows["form"].map(form_place))
     rows = rows.sort_values(["n", "active", "scene", "place", "what"], kind="stable")
