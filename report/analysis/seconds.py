@@ -1,4 +1,4 @@
-"""Seconds per load case, or what is known of them if there is no answer."""
+"""Seconds per load case: what is known without an answer, those of the fastest opponent, their spread."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import pandas as pd
 
 from harness.results.schema import ANSWERED
 from report.document.numbers import MISSING, significant
+from report.results.rows import CELL
+
+ROUND = ["scene", "threads"]
 
 
 def timed(cells: pd.DataFrame) -> pd.DataFrame:
@@ -32,3 +35,17 @@ def seconds_text(cell: Mapping[str, Any]) -> str:
     if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
         return f"> {cell['time_limit_s']:.4g}"
     return str(cell["status"]).replace("_", " ") or MISSING
+
+
+def of_fastest(owner: str, rows: pd.DataFrame, *names: str) -> pd.Series[float]:
+    """For each row the seconds of the fastest solver of that owner on its scene with as many threads: the
+    least of the medians of any of the names.
+    """
+    medians = rows[rows["owner"] == owner].groupby(CELL, dropna=False)[[*names]].median().min(axis=1)
+    return rows.join(medians.groupby(ROUND).min().rename("fastest"), on=ROUND)["fastest"]
+
+
+def spreads(rows: pd.DataFrame, by: list[str], names: list[str]) -> pd.DataFrame:
+    """The medians over the groups, and with the endings _least and _most the ranges."""
+    found = rows.groupby(by, dropna=False)[names].agg(["median", "min", "max"])
+    return found.set_axis([f"{name}{end}" for name in names for end in ("", "_least", "_most")], axis=1)

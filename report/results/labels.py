@@ -23,6 +23,24 @@ def named(cells: pd.DataFrame) -> pd.DataFrame:
     return cells.assign(method=method, label=method + tolerance)
 
 
+def named_by(cells: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """Cells named group by group: for tables with columns for the `keys`, which the names then omit."""
+    groups = [named(group) for _, group in cells.groupby(keys)]
+    return pd.concat([named(cells.iloc[:0]), *groups], ignore_index=True)
+
+
+def lines_in_order(lines: pd.DataFrame, cells: pd.DataFrame, *first: str) -> pd.DataFrame:
+    """One line per `method` of some cells, indexed or not: sorted by what comes first, then in the order of
+    `in_order`.
+    """
+    places = {name: place for place, name in enumerate(in_order(cells, "method"))}
+    lines = lines.reset_index() if "method" in lines.index.names else lines
+    ordered = lines.assign(place=lines["method"].map(places)).sort_values(
+        [*first, "place"], ignore_index=True
+    )
+    return ordered.drop(columns="place")
+
+
 def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
     """The labels (or method, or solvers) of some cells in the one order used everywhere: in the
     order of OWNERS, then by name, and the forms of a solver in the order of FORMS.

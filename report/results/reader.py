@@ -84,18 +84,6 @@ class Results:
         rows = self.rows if what == "all" else self.rows[own.get(what, others)].reset_index(drop=True)
         return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 
-    def of_threads(self, threads: float) -> Results:
-        """The results with that number of threads, the names of whose lines then omit it."""
-        rows = self.rows[self.rows["threads"] == threads].reset_index(drop=True)
-        return replace(self, rows=rows, cells=cells_of(rows))
-
-    def cells_by_threads(self) -> pd.DataFrame:
-        """All cells, their names without the number of threads: for tables with a column for it."""
-        counts = sorted(self.rows["threads"].dropna().unique())
-        return pd.concat(
-            [self.cells.iloc[:0], *(self.of_threads(k).cells for k in counts)], ignore_index=True
-        )
-
     def by_machine(self) -> list[Results]:
         """The results of each machine, so that no table or mean can mix two of them."""
         names = self.rows["machine"].unique()

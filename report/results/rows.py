@@ -18,7 +18,7 @@ CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
 def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
     """The rows with every field of the schema as a column of one type, the last of equal measurements.
 
-    Flags are 1.0, 0.0 or missing. A row without a `owner` has that of its flag `in_house`. Adds
+    Flags are 1.0, 0.0 or missing. A row without an `owner` has that of its flag `in_house`. Adds
     `working_mib`, what the solver needs on top of the data. The size and the limits of a row that lacks them
     are those of its scene, of `problems` and of the suite.
     """

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pandas as pd
 
 from harness.results.schema import ANSWERED
+from report.analysis.seconds import ROUND, of_fastest, spreads
 from report.document.blocks import Column, Section, Table, number, word
 from report.document.numbers import power, spread, whole
-from report.results.labels import named
+from report.results.labels import named_by
 from report.results.reader import Results
 from report.results.rows import CELL
 
 CASE = ["setup_s", "solve_s", "form_s"]
-ROUND = ["scene", "threads"]
 
 
 def section(results: Results) -> Section | None:
@@ -22,8 +20,25 @@ def section(results: Results) -> Section | None:
     if rows.empty:
         return None
     rows = compared(rows)
-    lines = pd.DataFrame([_line(group) for _, group in rows.groupby(CELL, dropna=False, sort=False)])
-    lines = pd.concat([named(of_round) for _, of_round in lines.groupby(ROUND)])
+    answered = rows["verdict"].isin(ANSWERED)
+    first, later = answered & (rows["warm"] == 0), answered & (rows["warm"] == 1)
+    rows = rows.assign(
+        within=rows["verdict"] == "within",
+        error_mm=rows["displacement_error_mm"].where(answered),
+        first_s=rows["case_s"].where(first),
+        first_iterations=rows["iterations"].where(first),
+        later_iterations=rows["iterations"].where(later),
+    )
+    groups = rows.groupby(CELL, dropna=False)
+    lines = groups[["n", "searched", "owner"]].first().assign(cases=groups.size())
+    lines["within"] = groups["within"].sum()
+    lines["case_s"] = groups["later_s"].median()
+    lines["rate"] = 1 / lines["case_s"]
+    lines["once_s"] = groups[["convert_s", "prepare_s"]].max().sum(axis=1)
+    middle = ["first_s", "first_iterations", "later_iterations"]
+    lines[middle] = groups[middle].median()
+    lines[["batched", "error_mm"]] = groups[["batched", "error_mm"]].max()
+    lines = named_by(lines.join(spreads(rows, CELL, ["to_library"])).reset_index(), ROUND)
     lines = lines.sort_values(["n", "scene", "threads", "case_s"])
     columns = [
         word("scene", "scene"),
@@ -45,33 +60,11 @@ def section(results: Results) -> Section | None:
 
 def compared(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of series with `case_s`, the seconds per case; `later_s`, the same if a case was solved before and
-    the answer is within the limit; `to_library`, later_s relative to the fastest library, which may take each
-    case as its first: the least of the medians of both.
+    the answer is within the limit; `library_s`, the seconds of the fastest library, which may take each case
+    as its first; `to_library`, later_s relative to them.
     """
     rows = rows.assign(case_s=rows[CASE].sum(axis=1))
     within = rows["case_s"].where(rows["verdict"] == "within")
-    rows["later_s"], cold_s = within.where(rows["warm"] == 1), within.where(rows["warm"] == 0)
-    libraries = rows.assign(cold_s=cold_s)[rows["owner"] == "library"].groupby(CELL, dropna=False)
-    best = libraries[["later_s", "cold_s"]].median().min(axis=1)
-    fastest = best.groupby(ROUND).min().rename("library_s")
-    rows = rows.join(fastest, on=ROUND)
-    return rows.assign(to_library=rows["later_s"] / rows["library_s"])
-
-
-def _line(group: pd.DataFrame) -> dict[str, Any]:
-    answered = group[group["verdict"].isin(ANSWERED)]
-    first, later = answered["warm"] == 0, answered["warm"] == 1
-    case_s = float(group["later_s"].median())
-    line: dict[str, Any] = {name: group[name].iloc[0] for name in (*CELL, "n", "searched")}
-    line |= {"cases": len(group), "within": int((group["verdict"] == "within").sum())}
-    line |= {"case_s": case_s, "rate": 1 / case_s if case_s > 0 else None}
-    line |= {
-        "first_s": answered.loc[first, "case_s"].median(),
-        "once_s": float(group[["convert_s", "prepare_s"]].max().sum()),
-        "first_iterations": answered.loc[first, "iterations"].median(),
-        "later_iterations": answered.loc[later, "iterations"].median(),
-        "batched": group["batched"].max(),
-        "error_mm": answered["displacement_error_mm"].max(),
-    }
-    line |= {"to_library": group["to_library"].median(), "to_library_least": group["to_library"].min()}
-    return line | {"to_library_most": group["to_library"].max()}
+    rows = rows.assign(later_s=within.where(rows["warm"] == 1), cold_s=within.where(rows["warm"] == 0))
+    library = of_fastest("library", rows, "later_s", "cold_s")
+    return rows.assign(library_s=library, to_library=rows["later_s"] / library)

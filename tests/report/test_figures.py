@@ -16,7 +16,7 @@ from report.figures import style
 from report.figures.ladder_map import COUNTED, ladder_map
 from report.figures.maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
 from report.results.reader import read
-from report.sections.speed import steps
+from report.sections.steps import steps
 from solvers.registry import modules, owner_of
 
 NAMED = {"floating", "loads", "parts"}  # ladders whose rungs are words

@@ -15,7 +15,7 @@ from report.analysis.standings import best_tolerances, fastest_first
 from report.document.blocks import Figure, Section, Table, Text
 from report.figures import style
 from report.results.reader import Results, read
-from report.sections import SECTIONS, accuracy, speed, summary
+from report.sections import SECTIONS, accuracy, profiles, summary
 from report.writers.markdown import write
 
 
@@ -204,14 +204,14 @@ def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
     rows += [answer("4386/100", "seldom", 7, 0.01, 1e-9), answer("4386/100", "a", 9, 5.0, 1e-10)]
     late = answer("4386/105", "b", 7, 9.0, 1e-9) | no_answer("time_limit")
     rows += [answer("4386/105", "a", 7, 9.0, 1e-9), late, answer("4386/105", "c", 7, 0.1, 1e-6)]
-    found = table(speed.profiles(results(tmp_path, rows)), "profiles").data.set_index("method")
+    found = table(profiles.section(results(tmp_path, rows)), "profiles").data.set_index("method")
     counts = found[["load_cases", "answered", "within_1", "within_2", "within_10"]]
     assert counts.loc["a (dual)"].tolist() == [6, 6, 4, 4, 6]  # ratios 1, 1, 1, 3, 8 and 1
     assert counts.loc["b (dual)"].tolist() == [6, 5, 3, 4, 5]  # ratios 3, 2, 1, 1, 1 and none
     assert counts.loc["c (dual)"].tolist() == [6, 0, 0, 0, 0]
     assert "seldom (dual)" not in found.index
     few = [r for r in rows if r["scene"] < "4386/104"]
-    assert speed.profiles(results(tmp_path / "few", few)) is None
+    assert profiles.section(results(tmp_path / "few", few)) is None
 
 
 def test_settings_must_reach_the_accuracy_on_every_scene(tmp_path: Path) -> None:

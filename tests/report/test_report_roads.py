@@ -13,7 +13,7 @@ from problems.forms import names
 from report.analysis.roads import roads
 from report.results.reader import Results, read
 from report.sections import problems, summary
-from report.sections.speed import from_scene
+from report.sections.steps import from_scene
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0107", "4386/1471"

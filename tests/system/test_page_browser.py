@@ -22,7 +22,7 @@ from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
 from report.results.series import read as read_series
-from report.sections.speed import ratios
+from report.sections.profiles import ratios
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
 
