@@ -158,18 +158,6 @@ def test_a_preload_at_an_installed_fastener(tmp_path: Path) -> None:
 GAPS = 'kind = "measured_gap"\nfile = "gaps.csv"'
 
 
-def test_every_bad_row_of_a_file_is_named_by_its_line(tmp_path: Path) -> None:
-    (tmp_path / "gaps.csv").write_text("x,y,gap\n0,0,0.1\n50,zero,0.1\n\n90,0\n0,50,nan\n90,50,0.3\n")
-    found = faults(tmp_path, GAPS, 'kind = "shims"\nthickness = 0\nx = [0, 9]\ny = [0, 9]')
-    file = str(tmp_path / "gaps.csv")
-    assert [(fault.where, fault.key, fault.value) for fault in found[:-1]] == [
-        (file, "line 3", "50,zero,0.1"),
-        (file, "line 5", "90,0"),
-        (file, "line 6", "0,50,nan"),
-    ]
-    assert found[-1].key == "effect[1] (shims).thickness"
-
-
 def test_all_that_is_wrong_with_a_file_and_its_table_is_said_at_once(tmp_path: Path) -> None:
     """Bad rows hide neither the places of the good ones, each named by its line, nor other parameters."""
     rows = ["hole,x,y", "1,10,10", "2,ten,10", "", "3,101,10", "4,10,-1", "5,90", "6,50,25"]

@@ -155,21 +155,6 @@ def test_integers_become_the_nearest_float64_and_K_the_mean_of_its_halves(tmp_pa
     assert "asymmetric by 9.1e-13 N/mm" in symmetrised
 
 
-@long_double
-@pytest.mark.parametrize("key", "KAfg")
-@pytest.mark.parametrize("lost", ["1e-18", "1e-4900"])
-def test_digits_of_extended_precision_are_said_to_be_lost(key: str, lost: str) -> None:
-    data: dict[str, Any] = {"K": np.eye(2) * 4.0, "A": np.eye(2), "f": np.zeros(2), "g": np.zeros(2)}
-    data[key] = data[key].astype(np.longdouble)
-    data[key].flat[0 if lost == "1e-18" else 1] += np.longdouble(lost)
-    if key == "K":
-        data[key].flat[2] = data[key].flat[1]
-    if lost == "1e-18" and key in "fg":
-        data[key].flat[0] += 1
-    (note,) = prepared(own_matrices(**data)).assembly.notes
-    assert f"Numbers of {key} {ROUNDED}" in note
-
-
 def test_the_cache_keeps_the_notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     np.savez(tmp_path / "mine.npz", **by_an_ulp(0, 1e6))

@@ -1,6 +1,5 @@
 """The plate element against closed forms, beam theory and another code."""
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,78 +18,8 @@ from problems.effects.supports import Supports
 from problems.fem.hermite import line_matrices
 from problems.fem.plate import Plate
 
-SIDE = 1000.0
 UNEVEN_X = np.array([0.0, 70.0, 110.0, 260.0, 300.0])
 UNEVEN_Y = np.array([-90.0, 0.0, 35.0, 50.0])
-
-
-def square(elements: int) -> Plate:
-    grid = np.linspace(0, SIDE, elements + 1)
-    return Plate(grid, grid, thickness=6.0, young=70e3, poisson=0.3)
-
-
-def centre_deflection(plate: Plate, edges: str, load: str) -> float:
-    """w D / q a⁴ or w D / P a² at the centre of a square plate."""
-    n = len(plate.x)
-    fixed = set()
-    for ix in range(n):
-        for iy in range(n):
-            along_y, along_x = ix in (0, n - 1), iy in (0, n - 1)
-            if edges == "clamped" and (along_x or along_y):
-                fixed |= {dof(n, ix, iy, dx, dy) for dx in (0, 1) for dy in (0, 1)}
-            elif along_x or along_y:  # w = 0 along the edge, and so its derivative along the edge
-                fixed.add(dof(n, ix, iy))
-            if edges == "supported" and along_x:
-                fixed.add(dof(n, ix, iy, dx=1))
-            if edges == "supported" and along_y:
-                fixed.add(dof(n, ix, iy, dy=1))
-    free = np.setdiff1d(np.arange(plate.size), list(fixed))
-    centre = dof(n, n // 2, n // 2)
-    f = np.zeros(plate.size)
-    if load == "point":
-        f[centre] = 1 / SIDE**2
-    else:
-        # ∫φ over the two elements at a point: h for the value; the slopes cancel inside, and are fixed
-        # or loaded by ±h²/12 at the ends.
-        h = SIDE / (n - 1)
-        line = np.zeros(2 * n)
-        line[::2] = h
-        line[[0, -2]] = h / 2
-        line[1], line[-1] = h**2 / 12, -(h**2) / 12
-        f = np.kron(line, line) / SIDE**4
-    w = np.zeros(plate.size)
-    w[free] = spsolve(plate.stiffness()[free][:, free].tocsc(), f[free])
-    return float(w[centre] * plate.rigidity)
-
-
-def navier(load: str) -> float:
-    """The same for simply supported edges: Navier's double sine series."""
-    odd = np.arange(1, 2001, 2)
-    m, n = np.meshgrid(odd, odd)
-    if load == "point":
-        return float(4 / np.pi**4 * np.sum(1.0 / (m**2 + n**2) ** 2))
-    signs = np.where((m + n) // 2 % 2, 1.0, -1.0)
-    return float(16 / np.pi**6 * np.sum(signs / (m * n * (m**2 + n**2) ** 2.0)))
-
-
-@pytest.mark.parametrize(
-    ("edges", "load", "expected", "digits"),
-    [
-        ("clamped", "uniform", 0.00126532, 1e-5),
-        ("supported", "uniform", 0.00406235, 1e-5),
-        ("clamped", "point", 0.00561, 1e-3),
-        ("supported", "point", 0.01160, 3e-4),
-    ],
-)
-def test_square_plate(edges: str, load: str, expected: float, digits: float) -> None:
-    assert centre_deflection(square(32), edges, load) == pytest.approx(expected, rel=digits)
-
-
-def test_deflection_converges_with_the_fourth_power() -> None:
-    exact = navier("uniform")
-    errors = [abs(centre_deflection(square(n), "supported", "uniform") - exact) for n in (4, 8, 16)]
-    for coarse, fine in pairwise(errors):
-        assert 3.7 < np.log2(coarse / fine) < 4.3
 
 
 @given(

@@ -159,23 +159,6 @@ def test_one_fault_names_file_key_value_and_what_is_allowed(
     assert key in str(found[0])
 
 
-def test_several_faults_are_reported_at_once(path: Path) -> None:
-    text = swapped(
-        ("thickness = 2.0", "thickness = -2.0\ncolour = 1"),
-        ("mean = 0.6", "mean = nan"),
-        ('kind = "ribs"', 'kind = "keel"'),
-        ("preload = 1000.0", "preload = 0"),
-    )
-    assert {fault.key for fault in faults(path, "speed = 3\n" + text)} == {
-        "speed",
-        "part.0.thickness",
-        "part.0.colour",
-        "effect[0] (initial_gap).mean",
-        "effect[1] (fasteners).preload",
-        "effect[2].kind",
-    }
-
-
 @pytest.mark.parametrize(
     "points", ["[[10.0, 10.0]]", "[[10.0, 10.0], [80.0, 20.0]]", "[[10.0, 10.0], [30.0, 20.0], [70.0, 40.0]]"]
 )

@@ -19,7 +19,7 @@ from problems.forms.units import Units
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.adapter import gap_tolerance
-from solvers.base import Answer, Form, Solver, WarmStart
+from solvers.base import Answer, Form, Solver
 from solvers.registry import make_solver, owner_of
 
 #: The libraries that take the sparse form.
@@ -201,18 +201,6 @@ def test_answers_do_not_depend_on_units(name: str, form: Form, bits: int) -> Non
     np.testing.assert_allclose(answers[0][0].lam, lam, rtol=0, atol=1e-3)
     if answers[0][0].x is not None:
         np.testing.assert_allclose(answers[0][0].x, x, rtol=0, atol=1e-7)
-
-
-def test_a_warm_start_is_scaled_with_the_problem() -> None:
-    base = make_prepared(3, 15, 4)
-    given, case = rescaled(base, make_load(4, base)[0], np.ones(base.assembly.n), powers(5, 19, 20))
-    problem = in_form(given, "dual")
-    (load,) = problem.loads([case])
-    session = opened_session("newton", problem, 1e-10)
-    lam = session.cold(load).lam
-    answer = session.warm(load, WarmStart(load, lam, problem.gap(load, lam, None)))
-    assert answer.iterations == 1  # the set is the solution's
-    np.testing.assert_allclose(answer.lam, lam, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -108,16 +108,6 @@ def test_duplicate_contacts_do_not_hinder_the_primal_form() -> None:
     assert (answer.x, answer.lam) == (pytest.approx([0.25]), pytest.approx([0.0, 0.75]))
 
 
-INDEFINITE = [(np.ones((2, 2)), "dual"), (-np.eye(2), "dual"), (-np.eye(2), "primal")]
-
-
-@pytest.mark.parametrize(("Q", "form"), INDEFINITE)
-def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(Q: np.ndarray, form: Form) -> None:
-    answer = two_contacts_of_one_node(Q, form)
-    assert (answer.status, answer.lam) == ("failed", None)
-    assert "definite" in answer.details["cause"]
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.2])
 def test_block_pivoting_finishes_what_an_inaccurate_inverse_misleads(noise: float) -> None:
     prepared = make_prepared(3, 40)

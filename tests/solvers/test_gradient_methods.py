@@ -121,22 +121,6 @@ def test_from_its_own_answer_little_is_left_to_do(name: str, options: dict[str, 
     assert warm.details["products"] <= min(5, cold.details["products"])
 
 
-@pytest.mark.parametrize(
-    ("name", "options"),
-    [
-        ("mprgp", {"max_products": 3, "preconditioner": "none"}),
-        ("projected-newton", {"max_iterations": 2}),
-        ("lemke", {"max_pivots": 0.01}),
-        ("projected-gauss-seidel", {"max_sweeps": 3}),
-    ],
-    ids=str,
-)
-def test_a_limit_that_was_reached_is_said(name: str, options: dict[str, Any]) -> None:
-    answer = solved(name, options, *strips(400))
-    assert answer.status == "iteration_limit"
-    assert next(iter(options)) in answer.details["cause"]
-
-
 def test_a_path_solves_the_problem_at_each_of_its_points() -> None:
     """λ and y are those of p − td, and of the contacts of C and of the others none has the wrong sign."""
     prepared, load = strips(60)

@@ -188,13 +188,6 @@ def test_too_few_iterations_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     assert answer.iterations == 2
 
 
-def test_spent_cg_iterations_are_said_and_counted() -> None:
-    answer = solved(definite(25, 0), np.ones(25), max_cg=30)
-    assert answer.status == "iteration_limit"
-    assert answer.inner_iterations == 30
-    assert "max_cg" in answer.details["cause"]
-
-
 def test_a_start_that_cannot_be_made_is_a_failure_that_says_so() -> None:
     answer = solved(-np.eye(4), np.ones(4), preconditioner="none")
     assert answer.status == "failed"
@@ -209,14 +202,6 @@ def test_where_no_feasible_start_is_found_another_is_taken() -> None:
     assert answer.status == "solved"
     assert "no λ > 0" in answer.details["start_instead"]
     np.testing.assert_allclose(Q @ answer.lam, [3.2364333, -3.4684], atol=1e-3)
-
-
-@pytest.mark.parametrize("system", ["V", "direct"])
-@pytest.mark.parametrize("start", ["algorithm_5", "mehrotra"])
-def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(system: str, start: str) -> None:
-    answer = solved(np.diag([1.0, -2.0]), np.ones(2), preconditioner=system, start=start)
-    assert (answer.status, answer.lam) == ("failed", None)
-    assert answer.details["cause"]
 
 
 def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyPatch) -> None:

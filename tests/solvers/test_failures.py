@@ -1,0 +1,54 @@
+"""What the in-house methods say when they cannot solve a problem, or may not go on."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from small import make_load, make_strips
+from solving import IN_HOUSE
+
+from harness.solving.session import SolverSession
+from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from problems.stiffness.operator import Stiffness
+from solvers.base import Answer, Form
+from solvers.registry import make_solver
+
+
+def answered(name: str, form: Form, prepared: Prepared, load: LoadCase, **options: Any) -> Answer:
+    session = SolverSession(make_solver(name, options), in_form(prepared, form), 1e-10)
+    session.open(batched=False)
+    return session.next(load, None)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered in sqrt")
+@pytest.mark.parametrize(("name", "form"), IN_HOUSE)
+def test_a_matrix_that_is_not_positive_definite_is_a_failure_that_says_so(name: str, form: Form) -> None:
+    K, A = np.diag([1.0] * 9 + [-1.0]), sp.eye_array(10, 3, format="csc")
+    if form == "sparse":
+        prepared = Prepared(Assembly(Stiffness.of(sp.csc_array(K)), A))
+    else:
+        prepared = Prepared(Assembly(Stiffness.of(abs(K)), A), Q=lambda: np.diag([1.0, -2.0, 3.0]))
+    answer = answered(name, form, prepared, LoadCase(np.ones(10), np.zeros(3), np.ones(3)))
+    assert (answer.status, answer.lam) == ("failed", None)
+    assert "definite" in answer.details["cause"]
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("ipm", {"max_cg": 30}),
+        ("lemke", {"max_pivots": 0.01}),
+        ("mprgp", {"max_products": 3, "preconditioner": "none"}),
+        ("projected-gauss-seidel", {"max_sweeps": 3}),
+        ("projected-newton", {"max_iterations": 2}),
+    ],
+    ids=str,
+)
+def test_a_limit_that_was_reached_is_said(name: str, options: dict[str, Any]) -> None:
+    prepared = make_strips(400)
+    answer = answered(name, "dual", prepared, make_load(3, prepared)[1], **options)
+    assert answer.status == "iteration_limit"
+    assert next(iter(options)) in answer.details.get("cause", "")
