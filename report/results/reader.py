@@ -24,6 +24,7 @@ from report.document.numbers import tidy_power
 from .cells import cells_of
 from .rows import frame
 
+MOST_SHOWN = 40  # scenes drawn at random: more have a section of their own alone
 FAR_AWAY = 1e15  # mm: no picture is so large
 
 
@@ -77,10 +78,13 @@ class Results:
         return arrays if arrays.get("contact_nodes", np.empty(0)).ndim == 2 else None
 
     def about(self, what: str) -> Results:
-        """The results on rungs of "ladders", on scenes "drawn" at random, on all other "scenes", or "all"."""
+        """The results on rungs of "ladders", on scenes "drawn" at random, on all "scenes" that are shown
+        one by one, or "all".
+        """
         names = self.rows["scene"].str
         own = {"ladders": names.startswith(LADDERS), "drawn": names.startswith(DRAWN)}
-        others = ~(own["ladders"] | own["drawn"])
+        many = own["drawn"] & (self.rows.loc[own["drawn"], "scene"].nunique() > MOST_SHOWN)
+        others = ~(own["ladders"] | many)
         rows = self.rows if what == "all" else self.rows[own.get(what, others)].reset_index(drop=True)
         return self if len(rows) == len(self.rows) else replace(self, rows=rows, cells=cells_of(rows))
 

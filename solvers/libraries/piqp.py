@@ -1,8 +1,7 @@
 """PIQP: a proximal interior-point method, https://predict-epfl.github.io/piqp.
 
 Stops when the unscaled ∞-norms of both residuals and the duality gap are below the tolerance; its
-relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as bounds, not as rows. In the
-sparse form, the rows are eliminated from the KKT system, so what is factored has the pattern of K̂ + BBᵀ.
+relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as bounds, not as rows.
 """
 
 from __future__ import annotations
@@ -26,12 +25,13 @@ STATUS: dict[Any, Status] = {
 class Piqp(Library):
     """backend : "dense" or "sparse" Cholesky; None: as the blocks of P are. Where they are dense, dense is
     several times faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal
-    form. kkt_solver : of the sparse form, with or without the rows. settings : PIQP's own.
+    form. kkt_solver : of the sparse form; "sparse_ldlt_ineq_cond" eliminates the rows, so that what is factored
+    has the pattern of K̂ + BBᵀ. settings : PIQP's own.
     """
 
     choices: ClassVar[dict[str, tuple[str | None, ...]]] = {
         "backend": (None, "dense", "sparse"),
-        "kkt_solver": ("sparse_ldlt_ineq_cond", "sparse_ldlt"),
+        "kkt_solver": ("sparse_ldlt", "sparse_ldlt_ineq_cond"),
     }
 
     def __init__(self, **options: object) -> None:

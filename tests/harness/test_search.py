@@ -105,6 +105,7 @@ def test_the_search_starts_where_it_ended_on_the_scene_before(tmp_path: Path) ->
         ({1e-6: "within"}, 1e-5),
         ({1e-6: "within", 1e-5: "outside"}, None),
         ({1e-6: "time_limit"}, 1e-5),
+        ({1e-6: "time_limit", 1e-5: "time_limit"}, None),
         ({1e-6: "time_limit", 1e-5: "outside"}, None),
         ({1e-6: "inaccurate", 1e-5: "within", 1e-4: "within", 1e-3: "within"}, None),
         ({1e-16: "outside"}, None),

@@ -113,7 +113,8 @@ def test_other_tolerances_enter_no_figure(tmp_path: Path) -> None:
     assert not any(getattr(block, "name", "") == "drawn-failures" for block in section.blocks)
 
 
-def test_the_report_keeps_drawn_scenes_apart(tmp_path: Path) -> None:
+def test_the_report_keeps_many_drawn_scenes_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("report.results.reader.MOST_SHOWN", SCENES + 1)
     rows = [*every_row(), row("4386/0107", "newton"), row("4386/0107", "piqp")]
     rows += [drawn(k, "newton", "sparse", n=6112) for k in range(2)]
     page = write(write_rows(tmp_path, rows)).read_text("utf-8")

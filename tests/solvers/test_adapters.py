@@ -99,7 +99,7 @@ def test_settings_that_a_library_holds(name: str, form: Form) -> None:
     held = {key: GAP[form] if value == "GAP" else value for key, value in wanted.items()}
     assert {key: getattr(settings, key) for key in held} == held
     if name == "clarabel":
-        assert settings.equilibrate_enable is (form == "primal")
+        assert settings.equilibrate_enable is (form != "dual")
         assert settings.max_threads == 0  # the environment decides
     if name == "piqp":
         assert isinstance(library, piqp.SparseSolver if form == "sparse" else piqp.DenseSolver)

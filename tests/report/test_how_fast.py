@@ -1,0 +1,73 @@
+"""How fast is it? Ratios of the fastest answers of each owner, scene by scene."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from synthetic_results import row, write_rows
+
+from report.analysis.how_fast import FROM_SCENE, ONE_MORE, how_fast
+from report.results.reader import Results, read
+from report.sections import how_fast as shown
+
+#: solver, form, owner, seconds to solve on scenes 0 and 1; None: outside the limit.
+LINES: list[tuple[str, str, str, tuple[float | None, float | None]]] = [
+    ("newton", "dual", "ours", (0.1, 0.2)),
+    ("newton", "sparse", "ours", (1.0, 1.0)),
+    ("a", "dual", "library", (5.0, None)),
+    ("a", "sparse", "library", (3.0, None)),
+    ("b", "dual", "textbook", (0.5, 0.4)),
+]
+PROBLEMS = [
+    {"scene": f"4386/{k}", "build_s": {"condensation": 4.0, "cholesky": 1.0, "Q": 2.0}} for k in range(2)
+]
+
+
+def rows() -> list[dict[str, Any]]:
+    made = []
+    for solver, form, owner, seconds in LINES:
+        for k, taken in enumerate(seconds):
+            times = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "form_s"), 0.0)
+            figures: dict[str, Any] = times | {"solve_s": taken or 1.0, "owner": owner}
+            figures |= {"model_s": 0.5} if form == "sparse" else {"stages": "K factors Q"}
+            figures |= {} if taken else {"verdict": "outside"}
+            made.append(row(f"4386/{k}", solver, form, **figures))
+    return made
+
+
+def results(folder: Path, made: list[dict[str, Any]]) -> Results:
+    write_rows(folder, made)
+    (folder / "problems.jsonl").write_text("".join(json.dumps(line) + "\n" for line in PROBLEMS))
+    return read(folder)
+
+
+def table(folder: Path, made: list[dict[str, Any]]) -> pd.DataFrame:
+    found = how_fast(results(folder, made))
+    return found.set_index("question") if len(found) else found
+
+
+def test_the_fastest_of_each_owner_scene_by_scene(tmp_path: Path) -> None:
+    found = table(tmp_path, rows())
+    more = found.loc[ONE_MORE]
+    assert (more["scenes"], more["seconds"], more["seconds_most"]) == (2, pytest.approx(0.15), 0.2)
+    assert (more["textbook"], more["textbook_least"]) == (pytest.approx(3.5), pytest.approx(2.0))
+    assert (more["library_least"], more["library_none"]) == (pytest.approx(30.0), 1)
+    first = found.loc[FROM_SCENE]  # the sparse form: 0.5 + 1 s; the dual one 7 s more
+    assert first["seconds"] == pytest.approx(1.5)
+    assert first["library_least"] == pytest.approx(3.5 / 1.5)
+    assert first["textbook_least"] == pytest.approx(7.4 / 1.5)
+
+
+def test_what_no_library_solves_counts_as_more(tmp_path: Path) -> None:
+    made = [r | ({"verdict": "outside"} if r["owner"] == "library" else {}) for r in rows()]
+    section = shown.section(results(tmp_path, made))
+    assert section is not None
+    (text,) = (block.markdown for block in section.blocks)
+    assert "more × (–)" in text
+
+
+@pytest.mark.parametrize("missing", ["library", "textbook"])
+def test_without_an_opponent_there_is_no_figure(tmp_path: Path, missing: str) -> None:
+    assert table(tmp_path, [r for r in rows() if r["owner"] != missing]).empty
