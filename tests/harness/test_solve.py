@@ -303,16 +303,6 @@ def test_bad_input_is_a_line_and_an_exit_code(tmp_path: Path) -> None:
     assert not out.exists()
 
 
-def test_a_joint_that_no_memory_holds_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "large.toml").write_text(APART.replace("nodes = [11, 5]", "nodes = [2001, 2001]"))
-    for command in (["validate"], ["solve", "--out", str(tmp_path / "out")]):
-        done = harness(*command, tmp_path / "large.toml")
-        assert done.exit_code == 2
-        (line,) = done.output.strip().splitlines()
-        assert "junction.nodes = [2001, 2001]: fewer nodes" in line
-        assert "MiB" in line
-
-
 def test_validate_says_what_will_be_built(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SCENE.replace("PRELOAD", "80").replace("I = 500.0", "I = 777.0"))

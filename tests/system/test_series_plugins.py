@@ -59,16 +59,6 @@ def test_a_plugin_that_writes_into_the_cache_is_named(tmp_path: Path) -> None:
     assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within", "no_answer"]
 
 
-def test_forks_threads_and_exit_handlers_are_left_behind(tmp_path: Path) -> None:
-    at_import = "threading.Thread(target=time.sleep, args=(60,)).start()\natexit.register(time.sleep, 60)"
-    in_solve = "os.fork() or (os.setsid(), time.sleep(60)); print('hello' * 10**6)"
-    done = harness(tmp_path, *series(tmp_path, at_import, in_solve))
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "5 within" in done.stdout
-    assert series_file.StoredGaps(tmp_path / "out", 45)[range(5)].shape == (5, 45)
-    assert {row["verdict"] for row in series_file.rows(tmp_path / "out")} == {"within"}
-
-
 def test_a_preparation_that_hangs_ends(tmp_path: Path) -> None:
     going = series(tmp_path)
     plugin = tmp_path / "mine.py"
