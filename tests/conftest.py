@@ -5,7 +5,6 @@ warning where the page was tried in no browser.
 import os
 import shutil
 from collections.abc import Iterator
-from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -30,14 +29,14 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished run of the tiny joint, two rows of the plug-in `exact`, which nobody may change."""
     import tiny
-    from rich.console import Console
+    from runs import said_by
 
     from harness.measurement.run import run
     from harness.planning.suite import read_suite
 
     folder = tmp_path_factory.mktemp("finished")
     suite = read_suite(str(tiny.write_suite(folder, tolerances=[1e-6, 1e-8])))
-    assert run(suite, folder / "finished", Console(file=StringIO())) == 0
+    assert said_by(run, suite, folder / "finished")[0] == 0
     return folder / "finished"
 
 

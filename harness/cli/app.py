@@ -197,7 +197,7 @@ def report(
         from harness.results.series_file import refuse_damaged
         from problems.errors import InputError
 
-        if (directory / SERIES).is_file():
+        if (directory / SERIES).exists():
             from report.writers.series import write as write_series
 
             refuse_damaged(directory)

@@ -32,6 +32,15 @@ def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_m
     assert estimate.sparse_mib == pytest.approx(stored / 2**20)
 
 
+def test_the_stored_matrices_of_the_dense_forms_are_known_before_they_are_made() -> None:
+    scene = read_scene("gallery/three-part-stack")
+    made = prepared(scene)
+    stored = sum(a.nbytes for a in (*made.assembly.K.matrices, *made.assembly.K.factors, made.Q))
+    estimate = size_of(scene)
+    assert estimate is not None
+    assert estimate.dense_mib == pytest.approx(stored / 2**20)
+
+
 def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (form_choice, memory, validate):
         monkeypatch.setattr(module, "physical_memory_mib", lambda: mib)

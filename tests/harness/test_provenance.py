@@ -5,19 +5,17 @@ import os
 import shutil
 import subprocess
 import sys
-from io import StringIO
 from pathlib import Path
 
 import pytest
 import tiny
-from rich.console import Console
+from runs import rows_of, said_by
 from strip import write_strip
 
 from harness.measurement.run import run as run_suite
 from harness.planning.suite import read_suite
 from harness.results import series_file
 from harness.results.provenance import HOOK_VARIABLES, ROOT, commit
-from harness.results.records import MEASUREMENTS, read
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from problems import __version__
@@ -80,20 +78,13 @@ def installed(folder: Path, origin: object) -> None:
     (about / "direct_url.json").write_text(json.dumps(origin))
 
 
-def test_a_work_tree_as_committed(tree: Path) -> None:
-    head = committed(tree)
-    assert len(head) == 40
-    (tree / "results").mkdir()
-    (tree / "results/measurements.jsonl").write_text("{}\n")  # written meanwhile
-    (tree / "README.md").write_text("not code\n")
-    assert asked(tree) == (head, True)
-
-
 def test_a_commit_of_documents_or_results_is_no_other_code(tree: Path) -> None:
     code = committed(tree)
+    assert len(code) == 40
     (tree / "results").mkdir()
-    for name in ("results/index.md", "README.md"):
+    for name in ("results/measurements.jsonl", "README.md"):
         (tree / name).write_text("said\n")
+    assert asked(tree) == (code, True)
     assert committed(tree) != code
     assert asked(tree) == (code, True)
     with (tree / "pyproject.toml").open("a") as file:
@@ -121,13 +112,10 @@ def test_a_hook_of_another_repository_does_not_lead_astray(tree: Path, tmp_path:
     assert asked(tree, **hook) == (head, True)
 
 
-def test_without_git_the_version_is_named(tree: Path, tmp_path: Path) -> None:
+def test_without_git_or_a_repository_the_version_is_named(tree: Path, tmp_path: Path) -> None:
+    assert asked(tree) == NOT_KNOWN
     committed(tree)
     assert asked(tree, PATH=str(tmp_path)) == NOT_KNOWN
-
-
-def test_without_a_repository_the_version_is_named(tree: Path) -> None:
-    assert asked(tree) == NOT_KNOWN
 
 
 @pytest.mark.parametrize("tracked", [False, True])
@@ -142,32 +130,24 @@ def test_the_repository_of_another_project_is_not_ours(tmp_path: Path, tracked: 
     assert asked(site) == NOT_KNOWN
 
 
-def test_installed_from_a_repository_the_commit_that_pip_recorded(tree: Path) -> None:
-    installed(tree, ORIGIN)
-    assert asked(tree) == ("c" * 40, True)
-
-
-def test_what_is_installed_elsewhere_says_nothing_of_this_code(tree: Path, tmp_path: Path) -> None:
+def test_installed_from_a_repository_the_commit_that_pip_recorded(tree: Path, tmp_path: Path) -> None:
+    """Unless it is installed elsewhere; a work tree outweighs it."""
     installed(tmp_path / "elsewhere", ORIGIN)
     paths = os.pathsep.join([str(tree), str(tmp_path / "elsewhere")])
     assert asked(tree, PYTHONPATH=paths) == NOT_KNOWN
-
-
-def test_a_work_tree_outweighs_what_is_installed(tree: Path) -> None:
-    head = committed(tree)
     installed(tree, ORIGIN)
-    assert asked(tree) == (head, True)
+    assert asked(tree) == ("c" * 40, True)
+    assert committed(tree) == asked(tree)[0]
 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:
     here = dict(zip(("commit", "clean"), commit(), strict=True))
     suite = read_suite(str(tiny.write_suite(tmp_path, '[[solver]]\nname = "newton"\n')))
-    run_suite(suite, tmp_path / "suite", Console(file=StringIO()))
+    said_by(run_suite, suite, tmp_path / "suite")
     scene = read_scene(str(write_strip(tmp_path)))
-    cases = random_gaps(scene, 3, 0)
-    job = Job(scene, cases, "newton", "dual", 1e-11, 1e-7, 0, 1)
-    run_series(job, {}, tmp_path / "series", Console(file=StringIO()))
-    rows = [*read(tmp_path / "suite" / MEASUREMENTS), *series_file.rows(tmp_path / "series")]
+    job = Job(scene, random_gaps(scene, 3, 0), "newton", "dual", 1e-11, 1e-7, 0, 1)
+    said_by(run_series, job, {}, tmp_path / "series")
+    rows = [*rows_of(tmp_path / "suite"), *series_file.rows(tmp_path / "series")]
     assert len(rows) == 4
     for row in rows:
         assert {name: row[name] for name in here} == here

@@ -1,14 +1,12 @@
 """tolerances = "auto" and repeats = "auto": what is measured, and what the report makes of it."""
 
-import json
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 import tiny
-from rich.console import Console
+from runs import rows_of, said_by
 
 from harness.measurement.run import run
 from harness.planning.overrides import Overrides, overridden, tolerances_of
@@ -20,26 +18,17 @@ from problems.errors import InputError
 from report.results.reader import read
 
 #: Right to a tenth of the tolerance; below `least` it gives up.
-ROUGH = """
-import numpy as np
-import scipy.linalg as sla
-from scipy.optimize import nnls
-from solvers.base import Answer, Solver
-
-
-class Rough(Solver):
-    forms = ("dual",)
-
-    def __init__(self, *, least=0.0):
-        self.least = least
-
-    def solve(self, problem, load, tolerance):
-        L = sla.cholesky(problem.Q, lower=True)
-        lam, _ = nnls(L.T, sla.solve_triangular(L, load.p, lower=True))
+ROUGH = (
+    tiny.EXACT.partition("        return")[0]
+    + """
         if tolerance < self.least:
             return Answer("inaccurate", lam * (1 + self.least))
         return Answer("solved", lam * (1 + tolerance))
+
+    def __init__(self, *, least=0.0):
+        self.least = least
 """
+)
 
 
 def suite_of(folder: Path, **changes: Any) -> Any:
@@ -50,8 +39,8 @@ def suite_of(folder: Path, **changes: Any) -> Any:
 
 
 def measured(suite: Any, directory: Path) -> list[dict[str, Any]]:
-    assert run(suite, directory, Console(file=StringIO())) in (0, 3)
-    return [json.loads(line) for line in (directory / "measurements.jsonl").read_text().splitlines()]
+    assert said_by(run, suite, directory)[0] in (0, 3)
+    return rows_of(directory)
 
 
 def test_the_search_ends_at_the_first_tolerance_that_suffices(tmp_path: Path) -> None:

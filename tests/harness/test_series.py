@@ -5,7 +5,6 @@ import re
 import shutil
 import time
 from collections.abc import Iterator
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import tiny
-from rich.console import Console
+from runs import rows_of, said_by
 from small import solve_by_nnls
 from strip import write_strip
 
@@ -90,43 +89,22 @@ def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
     write_strip(folder)
     with_how = ('fault="none"):', 'fault="none", how="none"):\n        self.how = how')
     (folder / "faulty.py").write_text(tiny.FAULTY.replace(*with_how) + THIRD)
-    (folder / "two.toml").write_text(SUITE)
-    (folder / "together.toml").write_text(TOGETHER)
-    for fault in ("leave", "sleep", "out_of_memory", "system_exit"):
-        (folder / f"{fault}.toml").write_text(FAULTY.replace("FAULT", fault))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         yield
 
 
-def write(name: str, text: str) -> str:
-    Path(name).write_text(text)
-    return name
-
-
-def made(suite: str, out: str) -> tuple[str, list[dict[str, Any]]]:
-    console = Console(file=StringIO(), width=200)
-    run(read_suite(suite), Path(out), console)
-    text = console.file.getvalue()  # type: ignore[attr-defined]
-    return text, records.read(Path(out) / records.MEASUREMENTS)
+def made(suite: str, out: str) -> tuple[str, list[Row]]:
+    Path("suite.toml").write_text(suite)
+    _, text = said_by(run, read_suite("suite.toml"), Path(out))
+    return text, rows_of(Path(out))
 
 
 @pytest.fixture(scope="module")
 def two(_here: None) -> Path:
-    """A run of two.toml. A test that changes it takes a copy."""
-    made("two.toml", "two")
+    """A run of SUITE. A test that changes it takes a copy."""
+    made(SUITE, "two")
     return Path("two").absolute()
-
-
-@pytest.fixture(scope="module")
-def together(_here: None) -> Path:
-    """A run of together.toml."""
-    made("together.toml", "together")
-    return Path("together").absolute()
-
-
-def read(run: Path) -> list[dict[str, Any]]:
-    return records.read(run / records.MEASUREMENTS)
 
 
 def right(rows: list[Row]) -> Iterator[tuple[Row, Vector, Vector]]:
@@ -138,21 +116,20 @@ def right(rows: list[Row]) -> Iterator[tuple[Row, Vector, Vector]]:
 
 
 def test_each_case_has_a_row_and_an_answer_of_its_own(two: Path) -> None:
-    rows = read(two)
+    rows = rows_of(two)
     assert [(row["solver"], row["case"]) for row in rows] == [
         (solver, k) for solver in ("newton", "piqp") for k in range(4)
     ]
     assert {(row["status"], row["verdict"]) for row in rows} == {("solved", "within")}
     for row, x, lam in right(rows):
-        with np.load(Path("two") / row["answer"]) as saved:
+        with np.load(two / row["answer"]) as saved:
             np.testing.assert_allclose(saved["x"], x, atol=1e-8)
         assert row["active"] == (lam > 0).sum()
         assert row["setup_s"] is not None
     assert len({row["answer"] for row in rows}) == 8
     # once an assembly, so the same in each row of a process
     assert len({row["prepare_s"] for row in rows if row["solver"] == "newton"}) == 1
-    code = gate(Path("two"), Console(file=StringIO()))
-    assert code == 0
+    assert said_by(gate, two)[0] == 0
 
 
 def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:
@@ -160,7 +137,7 @@ def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:
     path = Path("gap") / records.MEASUREMENTS
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:2] + lines[3:]))
-    text, rows = made("two.toml", "gap")
+    text, rows = made(SUITE, "gap")
     assert "8 measurements, 7 of them already" in text
     assert sorted(row["key"] for row in rows) == sorted(json.loads(line)["key"] for line in lines)
     assert rows[-1]["case"] == 2
@@ -172,14 +149,13 @@ def test_a_case_that_is_missing_is_measured_alone(two: Path) -> None:
     [
         ("leave", "crashed", "exit code 7"),
         ("sleep", "time_limit", "more than 2 s"),
-        ("out_of_memory", "memory_limit", "as numpy does"),
         ("system_exit", "failed", "enough"),
     ],
 )
 def test_a_case_that_ends_the_process_leaves_those_before_it(fault: str, status: str, why: str) -> None:
     """And costs those after it nothing: a solver out of time waits for one limit, not for theirs."""
     start = time.monotonic()
-    _, rows = made(f"{fault}.toml", fault)
+    _, rows = made(FAULTY.replace("FAULT", fault), fault)
     assert time.monotonic() - start < 15
     assert [row["status"] for row in rows] == ["solved", "solved", status, status]
     assert why in rows[2]["message"]
@@ -187,9 +163,9 @@ def test_a_case_that_ends_the_process_leaves_those_before_it(fault: str, status:
     assert "case=2" in rows[3]["message"]
 
 
-def test_cases_solved_together_share_the_seconds(together: Path) -> None:
+def test_cases_solved_together_share_the_seconds() -> None:
     """A row a case, each judged for itself; the second call begins with what the first has found."""
-    rows = read(together)
+    _, rows = made(TOGETHER, "together")
     alone, batched, faulty = rows[:2], rows[2:6], rows[6:]
     assert [(row["case"], row["warm"], row["batched"]) for row in alone] == [
         (0, False, None),
@@ -206,7 +182,7 @@ def test_cases_solved_together_share_the_seconds(together: Path) -> None:
         assert len({row[name] for row in batched}) == 2
     assert len({row["prepare_s"] for row in batched}) == 1
     for row, x, lam in right(batched):
-        with np.load(together / row["answer"]) as saved:
+        with np.load(Path("together") / row["answer"]) as saved:
             np.testing.assert_allclose(saved["x"], x, atol=1e-8)
             np.testing.assert_allclose(saved["lam"], lam, atol=1e-4)
     assert {row["status"] for row in faulty} == {"unsupported"}
@@ -216,18 +192,19 @@ def test_cases_solved_together_share_the_seconds(together: Path) -> None:
 def test_other_gaps_are_another_series(two: Path) -> None:
     """More cases are added; rows of another random field are set aside."""
     shutil.copytree(two, "changed")
-    text, rows = made(write("more.toml", SUITE.replace("cases = 4", "cases = 5")), "changed")
+    text, rows = made(SUITE.replace("cases = 4", "cases = 5"), "changed")
     assert "10 measurements, 8 of them already" in text
     assert len(rows) == 10
-    text, rows = made(write("wide.toml", SUITE.replace("seed = 9", "seed = 9\nsd = 0.3")), "changed")
+    text, rows = made(SUITE.replace("seed = 9", "seed = 9\nsd = 0.3"), "changed")
     assert "8 rows are set aside" in text
     assert [row["series"]["sd"] for row in rows].count(0.3) == 8
 
 
 def test_what_is_for_a_series_is_refused_elsewhere_and_two_ways_need_two_names() -> None:
     without = TOGETHER.replace("[series]\ncases = 4\nseed = 9\n", "").replace('variant = "batched"\n', "")
+    Path("without.toml").write_text(without)
     with pytest.raises(InputError) as caught:
-        read_suite(write("without.toml", without))
+        read_suite("without.toml")
     faults = {fault.key: fault.allowed for fault in caught.value.faults}
     assert {key for key, why in faults.items() if "with [series]" in why} == {
         *("solver.0.cases", "solver.1.batched", "solver.2.batched")

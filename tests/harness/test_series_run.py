@@ -281,17 +281,3 @@ def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault:
     assert [row["case"] for row in rows] == list(range(count))
     assert {row["status"] for row in rows} == {"solved"}
     assert [("setup_s" in row) for row in rows] == [False] * session_module.BLOCK + [True] * 5
-
-
-@pytest.mark.parametrize("kind", ["pipe", "device"])
-def test_a_file_that_never_ends_is_refused(kind: str) -> None:
-    directory, name = Path(kind), SERIES
-    series("--cases", "3", "--check", "0", "--out", str(directory))
-    (directory / name).unlink()
-    if kind == "pipe":
-        os.mkfifo(directory / name)
-    else:
-        (directory / name).symlink_to("/dev/zero")
-    ended = series("--cases", "4", "--check", "0", "--out", str(directory), code=2)
-    assert "no regular file" in ended.output
-    assert name in ended.output.replace("\n", "")

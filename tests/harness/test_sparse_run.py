@@ -1,13 +1,12 @@
 """A run of both roads on one scene: measured, judged, recorded beside each other, and gated."""
 
 import shutil
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
+from runs import moved, rows_of, said_by
 from strip import write_strip
 
 from harness.measurement.run import run
@@ -30,31 +29,22 @@ forms = ["dual", "sparse"]
 """
 
 
-def quiet() -> Console:
-    return Console(file=StringIO(), width=200)
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The directory of a run; tests that change it take a copy."""
     folder = tmp_path_factory.mktemp("both")
     write_strip(folder)
     (folder / "both.toml").write_text(SUITE)
-    assert run(read_suite(str(folder / "both.toml")), folder / "run", quiet()) == 0
+    assert said_by(run, read_suite(str(folder / "both.toml")), folder / "run")[0] == 0
     return folder / "run"
 
 
-@pytest.fixture
-def copy(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "copy"))
-
-
-def rows_of(directory: Path) -> dict[str, Any]:
-    return {row["form"]: row for row in records.read(directory / records.MEASUREMENTS)}
+def by_form(directory: Path) -> dict[str, Any]:
+    return {row["form"]: row for row in rows_of(directory)}
 
 
 def test_both_forms_are_within_and_say_so_in_the_same_terms(finished: Path) -> None:
-    rows = rows_of(finished)
+    rows = by_form(finished)
     assert set(rows) == {"dual", "sparse"}
     for row in rows.values():
         assert (row["status"], row["verdict"], row["n"], row["m"]) == ("solved", "within", 45, 45)
@@ -85,7 +75,7 @@ def test_a_scene_has_one_row_with_the_facts_of_both_roads(finished: Path) -> Non
         assert arrays["x"].shape == arrays["lam"].shape == (45,)
 
 
-@pytest.mark.parametrize("order", [("dual", "sparse"), ("sparse", "dual", "dual"), ("sparse", "sparse")])
+@pytest.mark.parametrize("order", [("sparse", "dual", "dual"), ("sparse", "sparse")])
 def test_the_difference_of_the_roads_is_recorded_in_either_order(
     order: tuple[Form, ...], tmp_path: Path
 ) -> None:
@@ -101,23 +91,21 @@ def test_the_difference_of_the_roads_is_recorded_in_either_order(
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
-@pytest.mark.parametrize(("moved", "code"), [(5e-8, 0), (2e-7, 1), (np.nan, 1)])
-def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, moved: float, code: int) -> None:
-    """Moved at the last displacement of the junction; an inner unknown is not judged."""
-    path = copy / rows_of(copy)[form]["answer"]
-    problem = reference_problem(rows_of(copy)[form]["source"], form="sparse" if form == "sparse" else "dual")
+@pytest.mark.parametrize(("shift", "code"), [(5e-8, 0), (2e-7, 1), (np.nan, 1)])
+def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, shift: float, code: int) -> None:
+    """At the last displacement of the junction; an inner unknown is not judged."""
+    row = by_form(copy)[form]
+    problem = reference_problem(row["source"], form=row["form"])
     junction = problem.prepared.assembly.junction
-    with np.load(path) as saved:
-        arrays = {name: saved[name] for name in saved.files}
-    arrays["x"][-1 if junction is None else junction[-1]] += moved
-    if junction is not None and np.isfinite(moved):
-        arrays["x"][np.setdiff1d(np.arange(len(arrays["x"])), junction)[0]] += 1e-3
-    np.savez(path, **arrays)
-    assert gate(copy, quiet()) == code
+    moved(copy / row["answer"], shift, -1 if junction is None else junction[-1])
+    if junction is not None and np.isfinite(shift):
+        inner = np.setdiff1d(np.arange(problem.prepared.assembly.n), junction)
+        moved(copy / row["answer"], 1e-3, inner[0])
+    assert said_by(gate, copy)[0] == code
 
 
 def test_an_answer_of_the_other_form_is_none(copy: Path) -> None:
     """x of the junction alone in the row of the sparse form."""
-    rows = rows_of(copy)
+    rows = by_form(copy)
     shutil.copy(copy / rows["dual"]["answer"], copy / rows["sparse"]["answer"])
-    assert gate(copy, quiet()) == 1
+    assert said_by(gate, copy)[0] == 1

@@ -80,15 +80,11 @@ def test_its_page_has_no_contacts(path: Path) -> None:
     }
 
 
-def test_validate_says_so(path: Path) -> None:
+def test_validate_says_so_and_there_is_nothing_to_measure(path: Path) -> None:
     done = harness("validate", path)
     assert done.exit_code == 0
     assert "No contact: a linear solve" in done.output
-
-
-def test_there_is_nothing_to_measure(path: Path) -> None:
-    out = path.parent / "run"
-    done = harness("run", "--scene", path, "--solver", "gi", "--out", out)
+    done = harness("run", "--scene", path, "--solver", "gi", "--out", path.parent / "run")
     assert done.exit_code == 2
     assert "there is no quadratic program to measure" in done.output
 

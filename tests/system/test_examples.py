@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from harness.conformance.check import run
 from solvers.base import Solver
 from solvers.plugin import load_plugin
 from solvers.registry import modules
@@ -33,10 +32,10 @@ def test_an_example_prints_its_number(name: str, capsys: pytest.CaptureFixture[s
     assert float(line) == pytest.approx(PRINTED[name], rel=2e-6)
 
 
-def test_the_template_has_every_step_and_no_faults() -> None:
+def test_the_template_has_every_step() -> None:
+    """That it has no faults: test_docs.py."""
     template = load_plugin(TEMPLATE)
     own = {name for name in vars(Solver) if not name.startswith("_")}
     assert own <= set(vars(template))
     assert all(getattr(template, name).__doc__ for name in own - {"forms", "distribution"})
-    assert run(template) == []
     assert "my-solver" not in modules()

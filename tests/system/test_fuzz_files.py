@@ -8,6 +8,7 @@ import resource
 import shutil
 import signal
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hostile_comparisons import comparisons
 from hostile_draws import mutate
 from hostile_targets import Fault, Target, all_targets, invoke
 from long import draws
@@ -67,7 +67,7 @@ def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(root / "cache"))
         patch.setattr(style, "DPI", 30)
-        made = [*all_targets(root), *comparisons(root)]
+        made = all_targets(root)
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, before[1]))
         yield made
     resource.setrlimit(resource.RLIMIT_AS, before)
@@ -118,30 +118,23 @@ def _exit_code(
         return None
     command = target.commands[random.integers(len(target.commands))]
     before = contents(work, target.keeps)
-    said = f"{what}; {' '.join(command)}"
     try:
         with limited():
             code, output = invoke(work, command)
-    except Fault as fault:
-        raise Fault(fault.kind, f"{said}: {fault.what}") from None
-    except Exception as error:
-        import traceback
-
-        where = traceback.extract_tb(error.__traceback__)
-        mine = [f"{Path(f.filename).name}:{f.lineno}" for f in where if "/site-packages/" not in f.filename][
-            -3:
-        ]
-        raise Fault("traceback", f"{said}: {error!r:.200} at {' '.join(mine)}") from error
-    if code not in CODES:
-        raise Fault("words", f"{said}: exit code {code}")
-    if code and not output.strip():
-        raise Fault("words", f"{said}: exit code {code} without a word")
-    if "Traceback" in output or "\x1b" in output:
-        raise Fault("words", f"{said}: {output[-300:]}")
-    if contents(work, target.keeps) != before:
-        raise Fault("lost", said)
-    try:
+        if code not in CODES or (code and not output.strip()):
+            raise Fault("words", f"exit code {code}: {output[-300:]}")
+        if "Traceback" in output or "\x1b" in output:
+            raise Fault("words", output[-300:])
+        if contents(work, target.keeps) != before:
+            raise Fault("lost", "a file")
         target.checked(work, command, code, output)
-    except Fault as fault:
-        raise Fault(fault.kind, f"{said}: {fault.what}") from None
+    except Exception as error:
+        kind, found = (error.kind, error.what) if isinstance(error, Fault) else ("traceback", _where(error))
+        raise Fault(kind, f"{what}; {' '.join(command)}: {found}") from error
     return code
+
+
+def _where(error: Exception) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
+    mine = [f"{Path(f.filename).name}:{f.lineno}" for f in frames if "/site-packages/" not in f.filename]
+    return f"{error!r:.200} at {' '.join(mine[-3:])}"

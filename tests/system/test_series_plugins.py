@@ -27,14 +27,13 @@ def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[ob
     ("fault", "status", "said"),
     [
         ("os.kill(os.getpid(), 11)", "crashed", "killed by SIGSEGV"),
-        ("exec('while True: pass')", "time_limit", "solve took more than 1 s"),
         (MORE_MEMORY, "memory_limit", "more than 700 MiB"),
     ],
 )
 def test_the_case_that_ends_the_process_is_a_row_and_the_others_are_solved(
     tmp_path: Path, fault: str, status: str, said: str
 ) -> None:
-    limits = ("--time-limit", 1 if "took" in said else 20, "--memory-limit", 700)
+    limits = ("--time-limit", 20, "--memory-limit", 700)
     going = [*series(tmp_path, in_solve=COUNTED + fault), *limits]
     done = harness(tmp_path, *going)
     assert done.returncode == 1
@@ -60,16 +59,6 @@ def test_a_plugin_that_writes_into_the_cache_is_named(tmp_path: Path) -> None:
     assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within", "no_answer"]
 
 
-def test_forks_threads_and_exit_handlers_are_left_behind(tmp_path: Path) -> None:
-    at_import = "threading.Thread(target=time.sleep, args=(60,)).start()\natexit.register(time.sleep, 60)"
-    in_solve = "os.fork() or (os.setsid(), time.sleep(60)); print('hello' * 10**6)"
-    done = harness(tmp_path, *series(tmp_path, at_import, in_solve))
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "5 within" in done.stdout
-    assert series_file.StoredGaps(tmp_path / "out", 45)[range(5)].shape == (5, 45)
-    assert {row["verdict"] for row in series_file.rows(tmp_path / "out")} == {"within"}
-
-
 def test_a_preparation_that_hangs_ends(tmp_path: Path) -> None:
     going = series(tmp_path)
     plugin = tmp_path / "mine.py"
@@ -87,9 +76,7 @@ def test_on_workers_too(tmp_path: Path) -> None:
     assert "5 no answer" in done.stdout
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_ends_within_a_second(tmp_path: Path, sent: int) -> None:
+def test_a_signal_ends_it_within_a_second(tmp_path: Path) -> None:
     go = tmp_path / "begun"
-    interrupt(
-        command(*series(tmp_path, in_solve=f"open({str(go)!r}, 'w'); time.sleep(60)")), tmp_path, go, sent
-    )
+    going = series(tmp_path, in_solve=f"open({str(go)!r}, 'w'); time.sleep(60)")
+    interrupt(command(*going), tmp_path, go, signal.SIGTERM)
