@@ -124,8 +124,8 @@ function ladderView(main) {
     node.cell = cell;
     return node;
   };
-  const table = el("table", {class: "matrix squares"}, el("thead", {}, el("tr", {}, el("th", {scope: "col"}, "solver (form)"),
-    ladders.map(({key, values}) => el("th", {scope: "col", colspan: values.length, title: key}, key)))),
+  const table = el("table", {class: "matrix squares", style: `--side:${Math.max(8, Math.min(20, Math.floor(1000 / rungs.length)))}px`}, el("thead", {}, el("tr", {}, el("th", {scope: "col"}, "solver (form)"),
+    ladders.map(({key, values}) => el("th", {scope: "col", colspan: values.length, class: "upright"}, el("span", {}, key))))),
   el("tbody", {}, lines.map(line => el("tr", {}, el("th", {scope: "row"}, line.name), rungs.map(scene => square(line, scene))))));
   table.querySelector("td[data-key]")?.setAttribute("tabindex", "0");
   moves(table);
