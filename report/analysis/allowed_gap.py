@@ -15,7 +15,6 @@ import pandas as pd
 from report.results.series import Array, Series
 
 ROUNDING = 2.0**-24
-AT_ONCE = 2**22  # gaps read at a time
 
 
 @dataclass(frozen=True)
@@ -42,12 +41,8 @@ def exceeding(series: Series, allowed_mm: float) -> Exceeding:
     larger = told & (gaps - e > allowed_mm)
     undecided = ~told | (~larger & (gaps + e > allowed_mm))
     cases = series.cases.assign(e=e)[larger].sort_values("max_gap_mm", ascending=False, kind="stable")
-    m = series.gaps.m
-    counts, largest = np.zeros(m), np.zeros(m)
-    rows = max(AT_ONCE // m, 1)
-    for start in range(0, len(cases), rows):
-        block = cases.iloc[start : start + rows]
-        some = series.gaps[block["case"].to_numpy()].astype(float)
+    counts, largest = np.zeros(series.gaps.m), np.zeros(series.gaps.m)
+    for block, some in series.of_cases(cases):
         counts += (some - block["e"].to_numpy()[:, None] > allowed_mm).sum(axis=0)
         largest = np.maximum(largest, some.max(axis=0))
     shares = counts / max(len(gaps), 1)

@@ -44,6 +44,13 @@ def pareto(points: pd.DataFrame) -> pd.DataFrame:
     return ordered[ordered["load_case_s"] < ordered["load_case_s"].cummin().shift(fill_value=math.inf)]
 
 
+def accurate(cells: pd.DataFrame, accuracy_mm: float) -> pd.Series[bool]:
+    """Where the error is at most accuracy_mm, and the reference accurate enough to say so."""
+    cells = with_errors(cells)
+    unknown = cells["reference_bound_mm"] > BOUND_SHARE * accuracy_mm
+    return (cells["error"] <= accuracy_mm) & ~unknown
+
+
 def judged(cells: pd.DataFrame, accuracy_mm: float) -> bool:
     """Whether the references of some cells are accurate enough to decide that an error is ≤ accuracy_mm."""
     return not cells["reference_bound_mm"].max() > BOUND_SHARE * accuracy_mm

@@ -12,37 +12,27 @@ import pandas as pd
 from report.results.series import Array, Series
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-AT_ONCE = 2**22  # gaps read at a time
 LEVELS = 200  # thresholds of the exceedance curve
 CONFIDENCE = 0.95
 
 
 def quantile_maps(series: Series) -> Array:
     """(len(QUANTILES) + 1, m), mm: the quantiles over the cases for each contact, and the mean."""
-    numbers, m = series.cases["case"].to_numpy(), series.gaps.m
-    maps = np.empty((len(QUANTILES) + 1, m))
-    width = max(AT_ONCE // max(len(numbers), 1), 1)
-    for start in range(0, m, width):
-        some = series.gaps[numbers, start : start + width].astype(float)
-        maps[:-1, start : start + width] = np.quantile(some, QUANTILES, axis=0)
-        maps[-1, start : start + width] = some.mean(axis=0)
-    return maps
+    pieces = [np.vstack([np.quantile(s, QUANTILES, axis=0), s.mean(axis=0)]) for s in series.of_contacts()]
+    return np.hstack(pieces)
 
 
 def exceedance(series: Series) -> pd.DataFrame:
     """For gaps t in mm, the share of cases whose largest gap exceeds t, and the share of all contacts."""
     largest = np.sort(series.cases["max_gap_mm"].to_numpy())
     t = np.linspace(0.0, float(largest[-1]), LEVELS)
-    numbers, m = series.cases["case"].to_numpy(), series.gaps.m
     above = np.zeros(LEVELS)
-    rows = max(AT_ONCE // m, 1)
-    for start in range(0, len(numbers), rows):
-        some = np.sort(series.gaps[numbers[start : start + rows]].ravel())
+    for _, gaps in series.of_cases(series.cases):
+        some = np.sort(gaps.ravel())
         above += some.size - np.searchsorted(some, t.astype(np.float32), side="right")
     cases = 1 - np.searchsorted(largest, t, side="right") / len(largest)
-    return pd.DataFrame(
-        {"gap_mm": t, "share_of_cases": cases, "share_of_contacts": above / (len(numbers) * m)}
-    )
+    contacts = above / (len(largest) * series.gaps.m)
+    return pd.DataFrame({"gap_mm": t, "share_of_cases": cases, "share_of_contacts": contacts})
 
 
 def convergence(series: Series) -> pd.DataFrame:

@@ -6,6 +6,7 @@ seconds over these scenes. Good: within the limit, or with an error of at most a
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import Any
 
@@ -14,7 +15,7 @@ import pandas as pd
 
 from report.results.labels import in_order
 
-from .precision import judged, with_errors
+from .precision import accurate, judged
 
 #: Lines that take at most this many times as long as the fastest count as equally fast: single runs on a
 #: shared machine vary by as much.
@@ -25,7 +26,8 @@ NOT_RUN = ("unsupported", "not_run")
 
 
 def geometric_mean(values: pd.Series[float]) -> float:
-    return float(np.exp(np.log(values).mean()))
+    """Missing if one of the values is."""
+    return float(math.exp(values.map(math.log).mean(skipna=False)))
 
 
 def best_tolerances(cells: pd.DataFrame) -> pd.DataFrame:
@@ -84,10 +86,11 @@ def fastest_first(
     """By the rule above: solver, form and `seconds` of each `name` that is good on every scene of
     `cells`. accuracy_mm : if not given, the limit.
     """
-    good = cells["verdict"] == "within" if accuracy_mm is None else with_errors(cells)["error"] <= accuracy_mm
+    good = cells["verdict"] == "within" if accuracy_mm is None else accurate(cells, accuracy_mm)
     known = cells[good & (cells[seconds] > 0)]
     known = known[known.groupby(name)["scene"].transform("nunique") == cells["scene"].nunique()]
-    means = np.exp(np.log(known[seconds]).groupby(known[name]).mean()).rename("seconds")
+    fastest = known.groupby([name, "scene"])[seconds].min()
+    means = fastest.groupby(level=0).agg(geometric_mean).rename("seconds")
     lines = known.drop_duplicates(name).set_index(name, drop=False)[[name, "solver", "form", "owner"]]
     return lines.assign(seconds=means).sort_values("seconds", ignore_index=True)
 

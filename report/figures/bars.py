@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from report.document.blocks import records
 from report.document.escape import short
@@ -16,10 +17,9 @@ from report.document.numbers import significant
 
 from . import style
 
-COLUMNS = 2  # of panels
 ROW = 0.19  # inches
 MOST = 12  # lines per panel
-LONGEST = 42  # characters of a name
+LONG, LONGEST = 30, 60  # characters of a name: beyond LONG, only one panel fits into a row
 Looks = Mapping[str, tuple[str, str, str | None]]
 
 
@@ -28,10 +28,11 @@ def stacked(lines: pd.DataFrame, total: str, looks: Looks) -> Figure:
     scenes = [
         of.sort_values(total).head(MOST) for _, of in lines.groupby(["n", "active", "scene"], dropna=False)
     ]
-    rows = -(-len(scenes) // COLUMNS)
-    heights = [0.45 + ROW * max(map(len, scenes[k * COLUMNS : (k + 1) * COLUMNS])) for k in range(rows)]
-    drawing = style.figure(sum(heights) + 0.15 * rows + 0.7)
-    panels = drawing.subplots(rows, min(COLUMNS, len(scenes)), height_ratios=heights, squeeze=False)
+    columns = 1 if len(scenes) == 1 or lines["method"].map(len).max() > LONG else 2
+    rows = [scenes[k : k + columns] for k in range(0, len(scenes), columns)]
+    heights = [0.45 + ROW * max(map(len, row)) for row in rows]
+    drawing = style.figure(sum(heights) + 0.15 * len(rows) + 0.7)
+    panels = drawing.subplots(len(rows), columns, height_ratios=heights, squeeze=False)
     for axes in panels.ravel()[len(scenes) :]:
         axes.set_axis_off()
     for axes, of_scene in zip(panels.ravel(), scenes, strict=False):
@@ -45,6 +46,7 @@ def stacked(lines: pd.DataFrame, total: str, looks: Looks) -> Figure:
             at: Any = {"textcoords": "offset points", "va": "center", "fontsize": 8}
             axes.annotate(significant(line[total]), (left[place], place), (4, 0), **at)
         axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of_scene) - 0.5, -0.5), xlabel="seconds")
+        axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         axes.set_yticks(places, [short(name, LONGEST) for name in of_scene["method"]])
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")

@@ -17,7 +17,10 @@ from report.results.labels import in_order
 from . import style
 
 YARDSTICK: dict[str, Any] = {"color": "#888888", "linewidth": 1.0, "zorder": 0.5}
-BESIDE: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 7.5, "color": "#666666"}
+BESIDE: dict[str, Any] = {
+    **{"textcoords": "offset points", "va": "center", "fontsize": 7.5, "color": "#666666"},
+    "bbox": {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1},
+}
 OUTSIDE: dict[str, Any] = {
     "marker": "x",
     "markersize": 8,

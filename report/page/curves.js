@@ -28,5 +28,5 @@ function curve(title, curves) {
 }
 
 function answerView(main) {
-  main.append(el("table", {class: "facts"}, DATA.facts.map(([name, value]) => el("tr", {}, el("th", {scope: "row"}, name), el("td", {}, value)))));
+  main.append(factTable(DATA.facts));
 }

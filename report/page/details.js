@@ -33,8 +33,7 @@ function openRow(cell) {
     el("p", {}, SCENES.get(cell.scene)?.title ?? ""),
     cell.key ? el("div", {class: "command"}, el("p", {}, "To measure it again:"), el("code", {}, again),
       el("button", {type: "button", onclick: () => navigator.clipboard?.writeText(again)}, "copy")) : "",
-    el("div", {class: "scroll"}, el("table", {class: "facts"}, facts.map(([name, value]) =>
-      el("tr", {}, el("th", {scope: "row"}, words(name)), el("td", {}, typeof value === "number" ? String(value) : value))))),
+    el("div", {class: "scroll"}, factTable(facts.map(([name, value]) => [words(name), String(value)]))),
     el("button", {type: "button", onclick: () => dialog.close()}, "close"));
   if (!dialog.open) dialog.showModal();
   remember({row: cell.key ?? ""});

@@ -48,8 +48,7 @@ function profileView(main) {
 }
 
 function profileTable(methods, ratios, count) {
-  const within = (method, most) => `${ratios.get(method).filter(value => value <= most).length}`;
-  return el("table", {}, el("thead", {}, el("tr", {}, ["solver (form)", "fastest", "τ ≤ 2", "τ ≤ 10", "within the limit", "scenes"].map((text, k) => el("th", {scope: "col", class: k ? "number" : ""}, text)))),
-    el("tbody", {}, methods.map(method => el("tr", {}, el("th", {scope: "row"}, swatch(method), method),
-      [1, 2, 10, 1e300].map(most => el("td", {class: "number"}, within(method, most))), el("td", {class: "number"}, String(count))))));
+  const within = most => method => String(ratios.get(method).filter(value => value <= most).length);
+  return tableOf([["solver (form)", method => el("span", {}, swatch(method), method)], ["fastest", within(1), 1], ["τ ≤ 2", within(2), 1],
+    ["τ ≤ 10", within(10), 1], ["within the limit", within(1e300), 1], ["scenes", () => String(count), 1]], methods, {name: ""});
 }

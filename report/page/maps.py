@@ -1,7 +1,7 @@
 """Gap maps for the page: places, gaps and forces of the contacts of scenes, answers and series.
 
-A map has `nodes` (one per group of maps on the same contacts), `fields` by name with their unit, and
-`contacts`, how many there are if only every k-th is in the page.
+A map has `fields` by name with their unit; the `group` of its places, which maps on the same contacts share;
+and `contacts`, how many there are if only every k-th is in the page.
 """
 
 from __future__ import annotations
@@ -21,57 +21,43 @@ BUDGET = 1_100_000  # characters of all maps of a page
 MOST = 20_000  # contacts of a map; of more, every k-th is shown
 CASES = 60  # of a series, at most
 SHARES = (1.0, 0.99, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.0)
+FIELDS = {"gap_before": "gap before", "gap_after": "gap after", "lam": "force"}
 
 
 def scene_maps(results: Results) -> Data:
     """The maps of a run's scenes as far as they fit, and the names of those left out."""
     page = _empty()
-    spent = 0
     for scene in results.cells.sort_values(["n", "active", "scene"])["scene"].unique():
-        arrays = results.scene_arrays(scene)
-        if not arrays or "contact_nodes" not in arrays:
-            continue
-        made = _fields_map(scene, arrays["contact_nodes"], arrays, arrays.get("fasteners", NO_MARKS))
-        new = 0 if made["nodes"] in page["groups"] else len(made["nodes"])
-        size = new + sum(len(field["values"]) for field in made["fields"])
-        if spent + size > BUDGET:
-            page["left_out"].append(scene)
-            continue
-        spent += size
-        _add(page, made)
+        if arrays := results.scene_arrays(scene):
+            fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
+            marks = arrays.get("fasteners", NO_MARKS)
+            if not _added(page, scene, arrays["contact_nodes"], fields, marks, BUDGET):
+                page["left_out"].append(scene)
     return page
 
 
 def answer_maps(record: Data, arrays: dict[str, Array]) -> Data:
     """The maps of one answer, one per pair of parts in contact."""
-    if "contact_nodes" not in arrays or not record["m"]:
-        return _empty()
-    page = _empty()
-    for pair in record["pairs"]:
-        own = slice(pair["start"], pair["stop"])
-        of_pair = {name: arrays[name][own] for name in ("gap_before", "gap_after", "lam")}
-        _add(page, _fields_map(pair_name(pair), arrays["contact_nodes"][own], of_pair, _places(record)))
-    return page
-
-
-def _places(record: Data) -> Array:
-    """Of all marks on the junction."""
-    return np.array([point for points in record.get("marks", {}).values() for point in points])
+    return _pairs(record, {text: arrays[name] for name, text in FIELDS.items()}, arrays)
 
 
 def two_answers_maps(record: Data, answers: list[dict[str, Array]]) -> Data:
     """The maps of two answers on one junction, one per pair of parts: both gaps, and what the second adds."""
-    if "contact_nodes" not in answers[0]:
-        return _empty()
+    first, second = (arrays["gap_after"] for arrays in answers)
+    fields = {"first": first, "second": second, "second − first": second - first}
+    page = _pairs(record, fields, answers[0])
+    for each in page["maps"]:
+        each["fields"][-1]["signed"] = True
+    return page
+
+
+def _pairs(record: Data, fields: dict[str, Array], arrays: dict[str, Array]) -> Data:
     page = _empty()
-    for pair in record["pairs"]:
+    marks = np.array([point for points in record.get("marks", {}).values() for point in points])
+    for pair in record["pairs"] if "contact_nodes" in arrays else ():
         own = slice(pair["start"], pair["stop"])
-        first, second = (arrays["gap_after"][own] for arrays in answers)
-        nodes = answers[0]["contact_nodes"][own]
-        step = _step(len(nodes))
-        fields = [_field("first", first[::step]), _field("second", second[::step])]
-        fields.append(_field("second − first", (second - first)[::step]) | {"signed": True})
-        _add(page, _map(pair_name(pair), nodes, fields, _places(record)))
+        of_pair = {name: values[own] for name, values in fields.items()}
+        _added(page, pair_name(pair), arrays["contact_nodes"][own], of_pair, marks)
     return page
 
 
@@ -81,23 +67,25 @@ def series_maps(series: Series, quantiles: Array, names: list[str]) -> Data:
 
     quantiles : (len(names), m), mm.
     """
+    page = _empty()
     if series.nodes is None or not len(series.cases):
-        return _empty()
+        return page
     step = _step(len(series.nodes))
-    numbers = series.cases["case"].to_numpy()
-    fields = [_field(name, values[::step]) for name, values in zip(names, quantiles, strict=True)]
     curves = _exceeded(series, step)
-    spent = sum(len(field["values"]) for field in fields) + len(curves)
+    numbers = series.cases["case"].to_numpy()
+    maps = dict(zip(names, quantiles, strict=True))
+    _added(page, f"{len(numbers)} cases", series.nodes, maps, series.fasteners)
+    (made,) = page["maps"]
+    spent, worst, cases = _size(made["fields"]) + len(curves), next(_chosen(series)), []
     for case in _chosen(series):
-        field = _field(f"case {case}", np.asarray(series.gaps[case, ::step], dtype=float))
-        spent += len(field["values"])
+        field = _field(f"case {case}", np.asarray(series.gaps[case, ::step], dtype=float)) | {"case": case}
+        spent += _size([field])
         if spent > BUDGET:
             break
-        fields.append(field | {"case": int(case)})
-    fields[len(names) :] = sorted(fields[len(names) :], key=lambda field: field["case"])
-    worst = next(_chosen(series))
-    made = _map(f"{len(numbers)} cases", series.nodes, fields, series.fasteners)
-    return _add(_empty(), made | {"shares": list(SHARES), "exceeded": curves, "worst": worst})
+        cases.append(field)
+    made["fields"] += sorted(cases, key=lambda field: field["case"])
+    made |= {"shares": list(SHARES), "exceeded": curves, "worst": worst}
+    return page
 
 
 def _chosen(series: Series) -> Iterator[int]:
@@ -112,50 +100,38 @@ def _chosen(series: Series) -> Iterator[int]:
 
 def _exceeded(series: Series, step: int) -> str:
     """(contacts, len(SHARES)), mm: the gap that this share of the cases exceeds."""
-    numbers, m = series.cases["case"].to_numpy(), series.gaps.m
-    found = []
-    width = max(2**22 // len(numbers), 1) * step
-    for start in range(0, m, width):
-        some = series.gaps[numbers, start : min(start + width, m) : step].astype(float)
-        found.append(np.quantile(some, 1 - np.array(SHARES), axis=0).T)
-    return packed(np.concatenate(found))
+    shares = 1 - np.array(SHARES)
+    return packed(np.concatenate([np.quantile(gaps, shares, axis=0).T for gaps in series.of_contacts(step)]))
 
 
 def _empty() -> Data:
     return {"groups": [], "maps": [], "left_out": []}
 
 
-def _add(page: Data, made: Data) -> Data:
-    """The page's maps with one more; maps on the same contacts share their places."""
-    place = made.pop("nodes")
-    if place not in page["groups"]:
-        page["groups"].append(place)
-    page["maps"].append(made | {"group": page["groups"].index(place)})
-    return page
-
-
-def _map(name: str, nodes: Array, fields: list[Data], marks: Array = NO_MARKS) -> Data:
+def _added(
+    page: Data, name: str, nodes: Array, fields: dict[str, Array], marks: Array, budget: float = np.inf
+) -> bool:
+    """Whether the map fitted into the page."""
     step = _step(len(nodes))
-    return {
-        "name": name,
-        "contacts": len(nodes),
-        "every": step,
-        "fields": fields,
-        "marks": marks.tolist(),
-        "nodes": exact(nodes[::step]),
-    }
+    place = exact(nodes[::step])
+    made = [_field(text, values[::step]) for text, values in fields.items()]
+    groups = page["groups"]
+    spent = sum(map(len, groups)) + sum(_size(each["fields"]) for each in page["maps"])
+    if spent + _size(made) + (0 if place in groups else len(place)) > budget:
+        return False
+    if place not in groups:
+        groups.append(place)
+    of_map = {"contacts": len(nodes), "every": step, "marks": marks.tolist(), "group": groups.index(place)}
+    page["maps"].append({"name": name, "fields": made, **of_map})
+    return True
 
 
-def _fields_map(name: str, nodes: Array, arrays: dict[str, Array], marks: Array) -> Data:
-    """The map of what is known of the gaps and forces."""
-    step = _step(len(nodes))
-    known = {"gap_before": ("gap before", "mm"), "gap_after": ("gap after", "mm"), "lam": ("force", "N")}
-    fields = [_field(text, arrays[key][::step], unit) for key, (text, unit) in known.items() if key in arrays]
-    return _map(name, nodes, fields, marks)
+def _field(name: str, values: Array) -> Data:
+    return {"name": name, "unit": "N" if name == FIELDS["lam"] else "mm", "values": packed(values)}
 
 
-def _field(name: str, values: Array, unit: str = "mm") -> Data:
-    return {"name": name, "unit": unit, "values": packed(values)}
+def _size(fields: list[Data]) -> int:
+    return sum(len(field["values"]) for field in fields)
 
 
 def _step(contacts: int) -> int:

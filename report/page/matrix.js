@@ -22,12 +22,11 @@ function matrix(main) {
     ["name", "solver (form)", ""], ["within", "within", "scenes within the limit, of those measured"],
     ["slower", "× fastest", "geometric mean of time over the fastest, on the scenes answered within the limit"],
     ...scenes.map(scene => [`scene ${scene.scene}`, scene.ladder ? scene.scene.split("/").slice(1).join("/") : scene.scene + closed(scene), `${scene.title} n = ${scene.n}, m = ${scene.m}, active ${scene.active}`])];
-  const head = el("tr", {}, heads.map(([name, text, hint], place) => el("th", {
-    scope: "col", class: place < 2 ? `stuck${place}` : place > 3 ? upright : "",
-    "aria-sort": STATE.sort === name ? (STATE.down ? "descending" : "ascending") : "none",
-    onclick: () => update({sort: name, down: (STATE.sort === name ? !STATE.down : name === "within") ? "1" : ""}), // the most first
-  }, el("button", {type: "button", title: hint, "data-sort": name},
-  el("span", {}, text), STATE.sort === name ? (STATE.down ? " ▾" : " ▴") : ""))));
+  const head = el("tr", {}, heads.map(([name, text, hint], place) => {
+    const kind = place < 2 ? `stuck${place}` : place > 3 ? upright : "";
+    const [button, more] = sorting(name, text, {hint, kind, mostFirst: name === "within"});
+    return el("th", {scope: "col", ...more}, button);
+  }));
   const body = lines.map(line => el("tr", {class: line === base ? "base" : ""},
     el("td", {class: "stuck0 number"}, String(line.rank)),
     el("th", {scope: "row", class: "stuck1"},
@@ -72,12 +71,10 @@ const claimed = (cell, judged) => judged === "outside" && cell.status === "solve
 function cellOf(cell, limit, fastest, against, pinned) {
   if (!cell) return el("td", {class: "none"});
   const judged = verdict(cell, limit), slower = timeOf(cell) / fastest, errors = STATE.metric === "error";
-  const node = el("td", {
+  return el("td", {
     class: `number ${judged} ${claimed(cell, judged) ? "claimed" : !errors && judged === "within" && slower === 1 ? "fastest" : ""}`, "data-key": cell.key, tabindex: "-1",
-    style: judged === "within" ? `background:${errors ? NEAR(figure(cell) || 1e-9) : BLUES(slower || 1)}` : null,
+    style: judged === "within" ? `background:${errors ? NEAR(figure(cell) || 1e-9) : BLUES(slower || 1)}` : null, cell,
   }, textOf(cell, judged, against, pinned));
-  node.cell = cell;
-  return node;
 }
 
 // One listener per table: description, row, and movement by the arrow keys.
@@ -120,12 +117,10 @@ function ladderView(main) {
   lines.sort((a, b) => DATA.order.findIndex(label => label.startsWith(a.name)) - DATA.order.findIndex(label => label.startsWith(b.name)));
   const square = (line, scene) => {
     const cell = line.cells.get(scene.scene), judged = cell && verdict(cell, limit);
-    const node = el("td", {class: `${cell ? `number ${judged} ${claimed(cell, judged) ? "claimed" : ""}` : "none"} ${ends.has(scene) ? "last" : ""}`, ...(cell ? {"data-key": cell.key, tabindex: "-1"} : {})});
-    node.cell = cell;
-    return node;
+    return el("td", {class: `${cell ? `number ${judged} ${claimed(cell, judged) ? "claimed" : ""}` : "none"} ${ends.has(scene) ? "last" : ""}`, ...(cell ? {"data-key": cell.key, tabindex: "-1", cell} : {})});
   };
-  const table = el("table", {class: "matrix squares"}, el("thead", {}, el("tr", {}, el("th", {scope: "col"}, "solver (form)"),
-    ladders.map(({key, values}) => el("th", {scope: "col", colspan: values.length, title: key}, key)))),
+  const table = el("table", {class: "matrix squares", style: `--side:${Math.max(8, Math.min(20, Math.floor(1000 / rungs.length)))}px`}, el("thead", {}, el("tr", {}, el("th", {scope: "col"}, "solver (form)"),
+    ladders.map(({key, values}) => el("th", {scope: "col", colspan: values.length, class: "upright"}, el("span", {}, key))))),
   el("tbody", {}, lines.map(line => el("tr", {}, el("th", {scope: "row"}, line.name), rungs.map(scene => square(line, scene))))));
   table.querySelector("td[data-key]")?.setAttribute("tabindex", "0");
   moves(table);

@@ -15,9 +15,8 @@ function banner() {
   if (answer) {
     const fasteners = DATA.fasteners ?? [];
     box.before(el("section", {id: "headline", class: answer.kind}, el("p", {}, answer.text),
-      fasteners.length ? el("details", {open: fasteners.length <= 12}, el("summary", {}, `forces of ${fasteners.length} fasteners`), el("table", {},
-        el("thead", {}, el("tr", {}, ["kind", "contact", "x, mm", "y, mm", "force, N"].map((text, k) => el("th", {scope: "col", class: k > 1 ? "number" : ""}, text)))),
-        el("tbody", {}, fasteners.map(line => el("tr", {}, line.map((value, k) => el("td", {class: k > 1 ? "number" : ""}, k > 1 ? number(value, 5) : words(value)))))))) : ""));
+      fasteners.length ? el("details", {open: fasteners.length <= 12}, el("summary", {}, `forces of ${fasteners.length} fasteners`),
+        tableOf(["kind", "contact", "x, mm", "y, mm", "force, N"].map((text, k) => [text, line => k > 1 ? number(line[k], 5) : words(line[k]), k > 1]), fasteners, {name: ""})) : ""));
     if (!warned) document.getElementById("view").after(box); // first the answer, last the machine
   }
   box.replaceChildren(

@@ -3,7 +3,7 @@ const SHAPES = {s: [4, 45], D: [4, 0], d: [4, 0], p: [5, 0], h: [6, 0], H: [6, 3
 
 function markerPath(marker, size = 4.5) {
   const symbol = (type, area) => d3.symbol().type(type).size(area * size * size)();
-  if (marker === "*") return symbol(d3.symbolStar, 3.4);
+  if (marker === "*") return symbol(d3.symbolStar, 2.4);
   if (marker === "P" || marker === "X") return symbol(d3.symbolCross, 2.6);
   const [corners, turn] = SHAPES[marker] ?? [0, 0];
   if (!corners) return symbol(d3.symbolCircle, 2.6);

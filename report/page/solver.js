@@ -1,12 +1,11 @@
 // All that was measured of one solver.
 function solverView(main) {
-  const names = [...new Set(DATA.order.map(label => CELLS.find(cell => cell.label === label)?.method))];
+  const names = known(CELLS);
   const chosen = names.includes(STATE.solver) ? STATE.solver : names[0];
   const limit = Number(STATE.limit), {fastest} = ranking(filtered(), limit);
   const cells = filtered().filter(cell => cell.method === chosen);
-  const select = el("select", {id: "solver", onchange: event => update({solver: event.target.value})},
-    names.map(name => el("option", {value: name, selected: name === chosen}, name)));
-  main.append(el("p", {}, el("label", {}, "solver ", select)));
+  main.append(el("p", {}, options("solver", "solver", names.map(name => [name, name]), "")));
+  document.getElementById("solver").value = chosen;
   if (!cells.length) return main.append(el("p", {}, "None of its measurements passes the filters."));
   const counts = Object.entries(VERDICTS).map(([name, [text]]) => [cells.filter(cell => verdict(cell, limit) === name).length, text]).filter(([count]) => count);
   const versions = [...new Set(cells.map(cell => [cell.solver_version && `version ${cell.solver_version}`, cell.solver_code && `code ${cell.solver_code}`].filter(Boolean).join(", ")))];
@@ -21,12 +20,9 @@ function solverView(main) {
     ["with preparation, s", cell => number(cell.total_s), 1], ["× fastest", cell => verdict(cell, limit) === "within" ? number(timeOf(cell) / fastest.get(cell.scene)) : "–", 1],
     ["peak, MiB", cell => number(cell.peak_rss_mib), 1],
   ];
-  const table = el("table", {class: "matrix"}, el("thead", {}, el("tr", {}, columns.map(([text, , right]) => el("th", {scope: "col", class: right ? "number" : ""}, text)))),
-    el("tbody", {}, cells.map(cell => el("tr", {}, columns.map(([, text, right], k) => {
-      const node = el("td", {class: `${right ? "number" : ""} ${k === 3 ? verdict(cell, limit) : ""}`, "data-key": cell.key, tabindex: k ? "-1" : "0"}, text(cell));
-      node.cell = cell;
-      return node;
-    })))));
+  const table = tableOf(columns, cells, {cell: (cell, k) => ({
+    class: `${columns[k][2] ? "number" : ""} ${k === 3 ? verdict(cell, limit) : ""}`, "data-key": cell.key, tabindex: k ? "-1" : "0", cell,
+  })});
   moves(table);
   main.append(el("div", {class: "scroll"}, table));
 }

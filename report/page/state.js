@@ -31,12 +31,31 @@ function remember(changes) {
 function el(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
+    if (name === "cell") node.cell = value;
+    else if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
     else if (value === true) node.setAttribute(name, "");
     else if (value !== false && value != null) node.setAttribute(name, value);
   }
   node.append(...children.flat().filter(child => child != null && child !== false));
   return node;
+}
+
+// A table. columns: heading, text or element of a line, whether a number, attributes of the heading.
+function tableOf(columns, lines, {name = "matrix", row = () => ({}), cell = () => ({})} = {}) {
+  const kind = isNumber => isNumber ? "number" : "";
+  return el("table", {class: name},
+    el("thead", {}, el("tr", {}, columns.map(([text, , isNumber, more]) => el("th", {scope: "col", class: kind(isNumber), ...more}, text)))),
+    el("tbody", {}, lines.map(line => el("tr", row(line), columns.map(([, text, isNumber], k) => el("td", {class: kind(isNumber), ...cell(line, k)}, text(line)))))));
+}
+
+const factTable = facts => el("table", {class: "facts"}, facts.map(([name, value]) => el("tr", {}, el("th", {scope: "row"}, name), el("td", {}, value))));
+
+// A heading that sorts by its column: the way down first if the most come first.
+function sorting(name, text, {hint = "", kind = "", mostFirst = false} = {}) {
+  const own = STATE.sort === name;
+  const turned = () => update({sort: name, down: (own ? !STATE.down : mostFirst) ? "1" : ""});
+  return [el("button", {type: "button", title: hint, "data-sort": name}, el("span", {}, text), own ? (STATE.down ? " ▾" : " ▴") : ""),
+    {class: kind, "aria-sort": own ? (STATE.down ? "descending" : "ascending") : "none", onclick: turned}];
 }
 
 // Rows of objects from columns; texts come as their distinct values and places.

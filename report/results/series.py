@@ -6,6 +6,7 @@ The gaps stay on disk, so that memory grows with the number of cases only by a f
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from harness.results import series_file
 from report.document.escape import quoted
 
 Array = NDArray[np.float64]
+AT_ONCE = 2**22  # gaps read at a time
 
 FIGURES = (
     *("max_gap_mm", "mean_gap_mm", "gap_error_mm", "bound_mm", "displacement_error_mm"),
@@ -39,6 +41,20 @@ class Series:
     fasteners: Array
     swept: list[str]
     code: pd.DataFrame
+
+    def of_contacts(self, step: int = 1) -> Iterator[Array]:
+        """The gaps of every step-th contact in pieces: (cases, some contacts), mm."""
+        numbers = self.cases["case"].to_numpy()
+        width = max(AT_ONCE // max(len(numbers), 1), 1) * step
+        for start in range(0, self.gaps.m, width):
+            yield self.gaps[numbers, start : min(start + width, self.gaps.m) : step].astype(float)
+
+    def of_cases(self, cases: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, Array]]:
+        """Some of the cases in pieces, with their gaps: (some cases, m), mm."""
+        rows = max(AT_ONCE // max(self.gaps.m, 1), 1)
+        for start in range(0, len(cases), rows):
+            block = cases.iloc[start : start + rows]
+            yield block, self.gaps[block["case"].to_numpy()].astype(float)
 
 
 def read(directory: Path) -> Series:

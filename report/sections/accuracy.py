@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
 from report.analysis.precision import ACCURACIES, CURVE_POINTS, curves, judged, pareto, swept
-from report.analysis.standings import geometric_mean
+from report.analysis.standings import fastest_first, geometric_mean
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.figures import style
@@ -21,9 +20,6 @@ from report.figures.lines import styles_of
 from report.results.labels import in_order, named
 from report.results.reader import Results
 
-REACHED, LATE, MISSED, UNJUDGED, NOT_RUN = "reached", "not in time", "missed", "cannot be judged", "not run"
-#: The state of a size is the first of these that occurs among its scenes.
-WORST_FIRST = (NOT_RUN, UNJUDGED, MISSED, LATE, REACHED)
 DIGITS = 2  # the fewest that a Pareto front spans for a factor to be fitted
 LARGEST_ERROR_MM = 1.0  # larger errors are drawn there
 PANEL = 2.7  # inches
@@ -36,56 +32,52 @@ def costs(results: Results) -> Section | None:
     cells = swept(results)
     if cells["error"].isna().all():
         return None
-    lines = []
-    for _, of_size in cells.groupby("n"):
-        scenes = of_size["scene"].unique().tolist()
-        for method in in_order(of_size, "method"):
-            lines.append(_line(of_size[of_size["method"] == method], scenes))
+    sizes = [of_size for _, of_size in cells.groupby("n")]
     columns = [number("n", "n", whole), word("solver (form)", "method")]
-    columns += [Column(f"≤ {tidy_power(x)} mm", partial(_shown, name=tidy_power(x))) for x in ACCURACIES]
+    for accuracy in map(tidy_power, ACCURACIES):
+        columns.append(Column(f"≤ {accuracy} mm", itemgetter(f"price_{accuracy}")))
     columns.append(number("time factor per digit", "factor_per_digit"))
     caption = (
         "*Price list*: seconds per load case of the fastest run on each scene with an error of at most that "
         "of the heading, the geometric mean over the scenes; >: stopped at the time limit; not reached: "
         "with the smallest error on the worst scene. Last column: from the solver's own Pareto front."
     )
-    figures = [
-        _diagram(of_size, f"{n:.0f}", results.limit) for n, of_size in cells.groupby("n") if curves(of_size)
-    ]
-    return Section(
-        "The cost of accuracy", [*figures, Table("price-list", caption, pd.DataFrame(lines), columns)]
+    table = Table("price-list", caption, pd.concat([_prices(of_size) for of_size in sizes]), columns)
+    figures = [_diagram(of_size, results.limit) for of_size in sizes if curves(of_size)]
+    return Section("The cost of accuracy", [*figures, table])
+
+
+def _prices(cells: pd.DataFrame) -> pd.DataFrame:
+    """One line per method at one size: the seconds and their text for each of ACCURACIES."""
+    factors = pd.Series(
+        {key: factor_per_digit(runs) for key, runs in cells.groupby(["method", "scene"])}, dtype=float
     )
-
-
-def _line(runs: pd.DataFrame, scenes: list[str]) -> dict[str, Any]:
-    by_scene = [runs[runs["scene"] == scene] for scene in scenes]
-    line: dict[str, Any] = {
-        "n": runs["n"].iloc[0],
-        "method": runs["method"].iloc[0],
-        "best_error_mm": np.max([group["error"].min() for group in by_scene]),  # missing if one scene's is
-        "factor_per_digit": _mean([factor_per_digit(group) for group in by_scene]),
-    }
+    lines = pd.DataFrame({"n": cells["n"].iloc[0], "method": in_order(cells, "method")})
+    lines["factor_per_digit"] = lines["method"].map(factors.groupby(level=0).agg(geometric_mean))
+    scenes = cells["scene"].nunique()
     for accuracy in ACCURACIES:
-        prices = [price(group, accuracy) for group in by_scene]
         name = tidy_power(accuracy)
-        line[f"state_{name}"] = next(s for s in WORST_FIRST if s in {state for state, _ in prices})
-        line[f"seconds_{name}"] = _mean([seconds for _, seconds in prices])
-    return line
+        means = fastest_first(cells, "method", accuracy_mm=accuracy).set_index("method")["seconds"]
+        lines[f"seconds_{name}"] = lines["method"].map(means)
+        lines[f"price_{name}"] = [
+            f"{significant(means[method])} s" if method in means else _missed(runs, accuracy, scenes)
+            for method in lines["method"]
+            for runs in [cells[cells["method"] == method]]
+        ]
+    return lines
 
 
-def price(runs: pd.DataFrame, accuracy: float) -> tuple[str, float]:
-    """State and seconds of one method on one scene: the fastest run with an error ≤ accuracy, or else the
-    smallest time limit at which a run was stopped, a lower bound.
-    """
-    if runs.empty:
-        return NOT_RUN, math.nan
+def _missed(runs: pd.DataFrame, accuracy: float, scenes: int) -> str:
+    """Why a method has no price: the time limit only where no answer missed the accuracy."""
+    if runs["scene"].nunique() < scenes:
+        return MISSING
     if not judged(runs, accuracy):
-        return UNJUDGED, math.nan
-    good = runs[runs["error"] <= accuracy]
-    if len(good):
-        return REACHED, float(good["load_case_s"].min())
-    late = runs[runs["error"].isna() & (runs["status"] == "time_limit")]
-    return (LATE, float(late["time_limit_s"].min())) if len(late) else (MISSED, math.nan)
+        return "cannot be judged"
+    late = runs["error"].isna() & (runs["status"] == "time_limit")
+    if runs.loc[late | (runs["error"] <= accuracy), "scene"].nunique() == scenes:
+        return f"> {significant(runs.loc[late, 'time_limit_s'].min())} s"
+    best = runs.groupby("scene")["error"].min()
+    return "no answer" if best.isna().any() else f"not reached ({power(best.max(), 2)})"
 
 
 def factor_per_digit(runs: pd.DataFrame) -> float:
@@ -99,22 +91,9 @@ def factor_per_digit(runs: pd.DataFrame) -> float:
     return float(10**slope)
 
 
-def _mean(values: list[float]) -> float:
-    """The geometric mean; missing if one of the values is."""
-    return geometric_mean(pd.Series(values)) if not np.isnan(values).any() else math.nan
-
-
-def _shown(line: Mapping[str, Any], name: str) -> str:
-    state, seconds = line[f"state_{name}"], line[f"seconds_{name}"]
-    if state == MISSED:
-        best = line["best_error_mm"]
-        return f"not reached ({power(best, 2)})" if best == best else "no answer"
-    words = {REACHED: f"{significant(seconds)} s", LATE: f"> {significant(seconds)} s", NOT_RUN: MISSING}
-    return words.get(state, state)
-
-
-def _diagram(cells: pd.DataFrame, n: str, limit: str) -> Figure:
+def _diagram(cells: pd.DataFrame, limit: str) -> Figure:
     """Work–precision on the scenes with the fewest and the most active contacts, side by side."""
+    n = f"{cells['n'].iloc[0]:.0f}"
     points = cells.dropna(subset=["error"])
     points = points.assign(error=points["error"].clip(upper=LARGEST_ERROR_MM))
     scenes = points.drop_duplicates("scene").sort_values(["active", "scene"])["scene"].tolist()

@@ -25,8 +25,8 @@ STATUS: dict[Any, Status] = {
 class Piqp(Library):
     """backend : "dense" or "sparse" Cholesky; None: as the blocks of P are. Where they are dense, dense is
     several times faster in both forms (measured from n = 594 to 4386); sparse takes less memory in the primal
-    form. kkt_solver : of the sparse form; "sparse_ldlt_ineq_cond" eliminates the rows, so that what is factored
-    has the pattern of K̂ + BBᵀ. settings : PIQP's own.
+    form. kkt_solver : of the sparse form; "sparse_ldlt_ineq_cond" eliminates the rows, so that what is
+    factored has the pattern of K̂ + BBᵀ. settings : PIQP's own.
     """
 
     choices: ClassVar[dict[str, tuple[str | None, ...]]] = {

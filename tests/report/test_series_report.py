@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 
 from harness.results import series_file
-from report.analysis import remaining_gaps as statistics
 from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
 from report.results.series import Series, read
 from report.writers.series import write
@@ -49,7 +48,7 @@ def made(directory: Path, swept: bool = False) -> np.ndarray:
 @pytest.mark.parametrize("at_once", [1, 1000, 2**22])
 def test_maps_and_exceedance_in_pieces(at_once: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gaps = made(tmp_path)
-    monkeypatch.setattr(statistics, "AT_ONCE", at_once)
+    monkeypatch.setattr("report.results.series.AT_ONCE", at_once)
     series = read(tmp_path)
     assert series.counts == {"within": CASES - 1, "no_answer": 1}
     maps = quantile_maps(series)
