@@ -1,7 +1,5 @@
 """Holding clamps: each presses the parts together over a round pad."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fasteners: each presses the two parts of a contact together at one junction node."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Initial gap between the parts before riveting: constant, or a random field around its mean."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Installed fasteners: springs that tie the two parts of a contact together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 

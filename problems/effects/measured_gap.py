@@ -1,7 +1,5 @@
 """Measured gap: values measured at points, interpolated to the contacts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any
 

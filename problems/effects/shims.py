@@ -1,7 +1,5 @@
 """Shims: a sheet of given thickness fills the gap over a rectangle."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 

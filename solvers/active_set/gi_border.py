@@ -10,8 +10,6 @@ currently in use, raising u_k by one while the active slacks stay zero changes
 products with a few columns instead of two solves with R.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import lapack
 

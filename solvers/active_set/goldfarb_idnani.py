@@ -5,8 +5,6 @@ Study 25:46–61, 1985 (the safeguards: violations within rounding do not count,
 and the point is recomputed from the original data before the method stops).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -11,8 +11,6 @@ was 8e-8 mm. The settings were chosen on these problems. The primal form keeps t
 so does the sparse one but for the equilibration, which its units replace (problems/forms/units.py).
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import clarabel

@@ -5,8 +5,6 @@ relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as
 sparse form, the rows are eliminated from the KKT system, so what is factored has the pattern of K̂ + BBᵀ.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np

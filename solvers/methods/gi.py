@@ -10,8 +10,6 @@ u = 0 is the unconstrained minimum, where Algorithm 1 starts. The pivots are Gol
 in this space they need a factor of G_CC instead of (n, n) matrices.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
