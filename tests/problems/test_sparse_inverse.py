@@ -1,4 +1,4 @@
-"""Entries of K⁻¹ and Q, all or near the diagonal, from the factors of a sparse K, against the dense inverse."""
+"""Entries of K⁻¹ and Q, all or near the diagonal, by the factor of a sparse K, against a dense inverse."""
 
 import numpy as np
 import pytest
