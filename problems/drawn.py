@@ -5,8 +5,6 @@ integer from low to high, as low + ⌊u (high − low + 1) / 2³²⌋. So the sc
 every machine, and those of the next version are others.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from hashlib import sha256

@@ -9,8 +9,6 @@
 or, for a user's own matrices, `[matrices]` with K, A, f, g (Matrix Market) or problem (.npz).
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches

@@ -6,8 +6,6 @@ them separately, and the absolute ones are the requested tolerance, in the libra
 Kx − f + Aλ, mm for Aᵀx − g and Qλ − p; N·mm for the duality gap (`gap_tolerance`).
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -16,8 +16,6 @@ Only `solve` must be written: by default, the other steps pass on their argument
 The harness calls and times the steps; a solver never reads a clock, judges its answer or handles limits.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The KKT residual of an approximate dual solution, and the answer that it makes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the methods of this project share: a start, and a failed answer where a matrix is indefinite."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar

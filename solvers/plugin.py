@@ -1,7 +1,5 @@
 """A user's own solver: a Python file with one subclass of solvers.base.Solver, and what it imports."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import inspect

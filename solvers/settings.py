@@ -1,7 +1,5 @@
 """Options of a method, and settings of a library that a user may choose, as OSQP's scaling."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What methods for the dual problem share on the sparse form: p and y by solutions with K, and x from λ."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Each answer is refined to a proven one (see `proof`); its own bound is the dista
 bound. All cases of the block share their passes over K.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ so that 1e-11 mm becoming 9e-8 mm is news, although both are within the limit. T
 those in its rows; its answers need not have been kept.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite

@@ -7,8 +7,6 @@ An eigenvalue below 2⁻¹⁰⁰⁰ counts as none: above, what underflows in th
 η = 2⁻¹⁰⁷⁴, is within the margin's last 1 %.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the gate finds, and its files for a CI: JSON, and JUnit XML, which most of them show row by row."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ The figures in the rows are not used. A row only says which answer belongs to wh
 data and the reference are made from the scene.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import inf
 from pathlib import Path

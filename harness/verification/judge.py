@@ -18,8 +18,6 @@ dual one −½xᵀKx − gᵀλ. A contact counts as open in x* if its gap there
 gap, it may be open or closed in an answer within the limit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -25,8 +25,6 @@ by conjugate gradients with products Q_CC v = A_Cᵀ K⁻¹ A_C v, preconditione
 cases are columns, left out when done.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ A, f and g alone (see `proof`), until a bound is at most a tenth of the limit. T
 where the forces came from; the best one is kept.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Holding clamps: each presses the parts together over a round pad."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np
@@ -17,7 +15,7 @@ class Clamps(Positions, ContactEffect):
     """f += force on the first part of every contact, −= on the second, shared by the nodes under the pad.
 
     clamping_force in N per clamp, spread evenly over the junction nodes within `radius` mm of the clamp's
-    node. `between` names one contact; by default a clamp grips all of them.
+    node.
     """
 
     clamping_force: Annotated[Positive, "N"]

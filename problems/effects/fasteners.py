@@ -1,7 +1,5 @@
 """Fasteners: each presses the two parts of a contact together at one junction node."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np
@@ -17,8 +15,7 @@ class Fasteners(Positions, ContactEffect):
     """f += preload on the first part of every contact, f −= preload on the second, in N.
 
     A temporary fastener, or a rivet while it is being set: a force, no stiffness. It acts on the nearest
-    junction node, at most half a node spacing away; two fasteners on one node add up. `between` names one
-    contact; by default a fastener goes through all of them.
+    junction node, at most half a node spacing away; two fasteners on one node add up.
     """
 
     preload: Annotated[Positive, "N"]

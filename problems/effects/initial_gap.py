@@ -1,7 +1,5 @@
 """Initial gap between the parts before riveting: constant, or a random field around its mean."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Annotated
 
@@ -29,8 +27,7 @@ class InitialGap(ContactEffect, GapEffect):
 
     The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
     roots Lx and Ly of two one-dimensional correlation matrices; it is met to some 1e-10 of its largest
-    eigenvalue. A negative gap is an overclosure.
-    `between` names one contact; by default all of them get the gap, each with its own random field.
+    eigenvalue. A negative gap is an overclosure. Each contact has a random field of its own.
     """
 
     mean: Annotated[Finite, "mm"]

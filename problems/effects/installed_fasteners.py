@@ -1,7 +1,5 @@
 """Installed fasteners: springs that tie the two parts of a contact together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -21,7 +19,7 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
     stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
     shank through 20 mm. approach in mm: by how much the gap was reduced when the fastener was set; 0 keeps
     the gap as it was, the value of the initial gap keeps it closed. Each fastener acts on the nearest
-    junction node. `between` names one contact; by default a fastener ties all that it crosses.
+    junction node.
     """
 
     stiffness: Annotated[Positive, "N/mm"] = 1e5

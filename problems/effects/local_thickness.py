@@ -1,7 +1,5 @@
 """Local thickness: a rectangle of a part that is thicker or thinner than the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated

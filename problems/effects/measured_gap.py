@@ -1,7 +1,5 @@
 """Measured gap: values measured at points, interpolated to the contacts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -20,7 +18,7 @@ class MeasuredGap(ContactEffect, GapEffect):
     """g += linear interpolation of the points (x, y, gap) in mm, from `file`, a CSV with these columns.
 
     Linear on the Delaunay triangles of the points; outside their convex hull, the gap of the nearest point.
-    Points may lie outside the junction. `between` names one contact; by default all of them get the gap.
+    Points may lie outside the junction.
     """
 
     points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3), "mm"]

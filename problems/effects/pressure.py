@@ -1,7 +1,5 @@
 """Uniform pressure on one part's junction strip."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

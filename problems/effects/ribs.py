@@ -1,7 +1,5 @@
 """Ribs: beams along x over the full length of the part, bonded to the skin."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import scipy.sparse as sp

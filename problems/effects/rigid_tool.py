@@ -1,7 +1,5 @@
 """A rigid tool: a surface that one part may touch but not penetrate."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 

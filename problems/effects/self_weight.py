@@ -1,7 +1,5 @@
 """Self-weight of a part, in the junction and beyond it."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shims: a sheet of given thickness fills the gap over a rectangle."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -16,8 +14,7 @@ from problems.model.joint import Faults, Joint
 class Shims(ContactEffect, GapEffect):
     """g −= thickness at every contact with x and y in the ranges, borders included; mm.
 
-    A shim is rigid. One thicker than the gap holds the parts apart; overlapping shims add up. `between` names
-    one contact; by default every contact gets a shim.
+    A shim is rigid. One thicker than the gap holds the parts apart; overlapping shims add up.
     """
 
     thickness: Annotated[Positive, "mm"]

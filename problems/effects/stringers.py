@@ -1,7 +1,5 @@
 """Stringers: equally spaced beams along y, bonded to the skin."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

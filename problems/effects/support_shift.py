@@ -1,7 +1,5 @@
 """Support shift: supports displaced from their nominal position."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 

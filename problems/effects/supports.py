@@ -1,7 +1,5 @@
 """Point supports: springs between the part and the ground."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import scipy.sparse as sp

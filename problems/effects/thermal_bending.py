@@ -1,7 +1,5 @@
 """Thermal bending: one face of a part is warmer than the other."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Annotated
 

@@ -3,8 +3,6 @@
 Each grid point carries two degrees of freedom, value and derivative, numbered 2i and 2i + 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

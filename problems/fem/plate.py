@@ -8,8 +8,6 @@ Hermite functions, so the stiffness is a sum of Kronecker products of one-dimens
 Source: Bogner, Fox, Schmit, Proc. Conf. Matrix Methods in Struct. Mech., 1965.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

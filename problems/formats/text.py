@@ -7,8 +7,6 @@ for A, f, g, which stay Matrix Market files; its stiffness are lines of numbers,
     row, column, value                                     FORMAT=COORDINATE
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The data of a riveting problem: what load cases share, and each load case's own. Units: mm and N."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

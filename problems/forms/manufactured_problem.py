@@ -1,7 +1,5 @@
 """Matrices and a load that are made in memory, with their exact answer if it is known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

@@ -3,8 +3,6 @@
 A new form is a class in problem.py and its name here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal, get_args
 

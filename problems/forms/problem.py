@@ -6,8 +6,6 @@ P and G belong to the assembly, q and h to a load case. The solution z and the m
 contact forces λ and the displacements x, the same in every form.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar

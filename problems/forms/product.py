@@ -1,7 +1,5 @@
 """Products with a symmetric matrix."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import blas
 

@@ -2,8 +2,6 @@
 first needed, with errors that name the scene.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

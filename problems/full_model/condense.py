@@ -6,8 +6,6 @@ line and its coupling to the kept unknowns behind it. The line's other unknowns 
 Cholesky factorisation, which updates S and the next line. All work is matrix–matrix.
 """
 
-from __future__ import annotations
-
 import inspect
 import time
 from collections.abc import Callable, Sequence

@@ -6,8 +6,6 @@ together near the junction, where the short waves are, and those of stiff beams 
 across the part is then half as wide, and what costs its cube an eighth.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

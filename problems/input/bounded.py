@@ -1,7 +1,5 @@
 """Numbers, names and files from outside, bounded by type: what no structure has is refused at the door."""
 
-from __future__ import annotations
-
 import os
 import stat
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Columns of numbers from a comma-separated file with a header, checked row by row."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

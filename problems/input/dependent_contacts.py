@@ -7,8 +7,6 @@ sparse matrix. The rounding of l_jj² is some k + (entries of a_j) ulps of ‖a_
 times ‖z‖².
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 
 import numpy as np

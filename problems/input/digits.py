@@ -1,7 +1,5 @@
 """The apparent precision of a matrix's entries, and its effect on the displacements."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 

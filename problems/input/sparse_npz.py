@@ -2,8 +2,6 @@
 X_indptr and X_shape; SciPy's own files of one sparse matrix are read too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

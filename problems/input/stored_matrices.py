@@ -1,7 +1,5 @@
 """A user's matrices, read and checked once, then from the cache."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

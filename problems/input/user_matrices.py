@@ -1,7 +1,5 @@
 """A user's own K, A, f, g: from one .npz, from Matrix Market files, or as arrays."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Validation errors of pydantic as faults, with the unit and what is allowed."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches

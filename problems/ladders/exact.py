@@ -13,8 +13,6 @@ contact_scale   columns of A and gaps multiplied by 2^−k to 2^k, so that 1 mm 
 together        cond(K) grows, a quarter of the contacts are weakly active, each has its own unit
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

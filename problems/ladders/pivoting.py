@@ -15,8 +15,6 @@ problem (counted for m = 8, 16, 24, 32; found by search, no source).
 vertex: as many contacts as unknowns, in random directions, all of them touch, and two thirds without a force.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

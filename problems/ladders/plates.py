@@ -7,8 +7,6 @@ supports     a clamped plate, and one on four ever softer springs; at full size 
 thickness    two plates, the second ever thicker: its stiffness, and with it cond(K), grows with its cube
 """
 
-from __future__ import annotations
-
 import tomllib
 from functools import partial
 from pathlib import Path

@@ -5,8 +5,6 @@ parts      stiff parts, stacks, a rigid tool, and the smallest possible problems
 floating   parts held by contact alone: K is singular, and the model refuses it
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

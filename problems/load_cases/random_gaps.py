@@ -1,7 +1,5 @@
 """Load cases that differ in a random initial gap."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

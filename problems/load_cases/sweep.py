@@ -1,7 +1,5 @@
 """Load cases that step through values of a scene's keys: initial_gap.mean=0.1:1.0:10."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod

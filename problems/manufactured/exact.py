@@ -10,8 +10,6 @@ powers of two; H is then block diagonal, of the Hadamard matrices of these order
 x and λ are the exact solution. Finally everything is scaled by powers of two.
 """
 
-from __future__ import annotations
-
 import itertools
 from functools import partial
 

@@ -6,8 +6,6 @@ file has it, are `hard-full/<ladder>/<n>-<rung>`, at the sizes of the paper: n =
 problems of others in problems/outside are found likewise, `outside/<problem>/<size>`.
 """
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping

@@ -3,8 +3,6 @@
 On squares of two right triangles each, the stiffness of linear elements is the five-point stencil, free of h.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -76,7 +76,7 @@ class PartEffect(Effect):
 
 
 class ContactEffect(Effect):
-    """Acts on the contact `between`, by default on all."""
+    """Acts on the contact `between`, by default on all: each gets the gap, the fastener goes through each."""
 
     between: Between = None
 

@@ -10,8 +10,6 @@ y = −south.length          └──────────────┘
                            x = 0 … length
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from typing import Annotated, Literal

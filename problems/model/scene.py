@@ -1,7 +1,5 @@
 """A scene: a joint with its effects, a user's matrices, or matrices constructed for a rung of a ladder."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass

@@ -10,8 +10,6 @@ The unknowns are x = v − w, where w is the membrane without the hemisphere, so
 the energy that the hemisphere adds.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -8,8 +8,6 @@ is that of its corners. With an even number of cells, sin(x) = 0 on the line in 
 carry hardly any force.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

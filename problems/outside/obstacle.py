@@ -10,8 +10,6 @@ that step grows as 1/h, so that there is no limit under refinement.
 CUTEst's OBSTCLAE sums over the four differences of each inner node, so that those to the edge count half.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

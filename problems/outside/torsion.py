@@ -10,8 +10,6 @@ COPS (Dolan, Moré and Munson, ANL/MCS-TM-273, 2004) is the same on 51 × 51 cel
 the four differences of each inner node, so that those to the edge count half.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

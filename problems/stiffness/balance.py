@@ -1,7 +1,5 @@
 """Units in which the unknowns of a model weigh alike, and the least eigenvalue of K in them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

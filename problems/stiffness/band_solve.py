@@ -6,8 +6,6 @@ leading dimension, any part of L inside the band is an ordinary matrix, not copi
 triangle at the edge of the band, a rectangle, and a triangle at the diagonal.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise
 

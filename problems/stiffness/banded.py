@@ -1,7 +1,5 @@
 """A sparse block with a narrow band, in some numbering: K = LLᵀ in (b + 1) N numbers, LAPACK's dpbtrf."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any

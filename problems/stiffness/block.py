@@ -1,7 +1,5 @@
 """One diagonal block of K, symmetric positive definite, whatever its storage and its factor."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """A dense block: K = UᵀU by LAPACK."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any

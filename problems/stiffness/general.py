@@ -1,7 +1,5 @@
 """A sparse block without a narrow band: K = LDLᵀ by SuperLU, fill-reducing order, no pivoting."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The unit roundoff of float64, and what k roundings amount to."""
 
-from __future__ import annotations
-
 from typing import Any
 
 U = 2.0**-53

@@ -1,7 +1,5 @@
 """K in other units, DKD: a view that solves with K's factors. Powers of two round nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any

@@ -4,8 +4,6 @@ Tried are the numbering as it is, the one along the longer side of the model, an
 first that is narrow enough is taken.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -3,8 +3,6 @@
 An entry is a folder with one read-only .npy per array and a manifest: the size of each file, and the facts.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -5,8 +5,6 @@ raises, import lines and the locations of files. It includes the files that a fi
 if they lie in the given folders.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from collections.abc import Iterable, Iterator

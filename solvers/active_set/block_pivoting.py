@@ -1,7 +1,5 @@
 """Block principal pivoting: finds the contact set C with λ ≥ 0 on it and y ≥ 0 off it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -20,8 +20,6 @@ Appl. 4:303–320, 1969),
 Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; what is left is for the next product with Q.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

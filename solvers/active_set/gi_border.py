@@ -10,8 +10,6 @@ currently in use, raising u_k by one while the active slacks stay zero changes
 products with a few columns instead of two solves with R.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import lapack
 
@@ -58,14 +56,10 @@ class Border:
         """Remove the constraint at this position of `active`."""
         if place >= len(self.C):
             del self.added[place - len(self.C)]
-        else:
-            self._leave(place)
-
-    def _leave(self, position: int) -> None:
-        unit = np.zeros(self.V.shape[1])
-        unit[position] = 1.0
+            return
+        unit = (np.arange(len(self.C)) == place).astype(float)
         v = self.factor.solve(self.factor.solve_transposed(unit))
-        row = -np.append(self.V[:, position], v[position])
+        row = -np.append(self.V[:, place], v[place])
         self.S = np.block([[self.S, row[:-1, None]], [row]])
         self.V = np.vstack([self.V, v])
-        self.removed.append(position)
+        self.removed.append(place)

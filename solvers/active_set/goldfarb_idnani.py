@@ -5,8 +5,6 @@ Study 25:46–61, 1985 (the safeguards: violations within rounding do not count,
 and the point is recomputed from the original data before the method stops).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -16,6 +14,7 @@ import scipy.linalg as sla
 from problems.forms.assembly import Indices, Matrix, Vector
 from problems.forms.product import product
 from solvers.base import Status
+from solvers.kkt import EPS
 
 from .gi_border import Border
 from .growing_factor import GrowingFactor
@@ -26,7 +25,6 @@ Slacks = Callable[[Vector], tuple[Vector, Vector]]
 CANDIDATES = 64  # violated constraints considered between two products with the whole of G
 MAX_REFINEMENTS = 20
 FAILED_REFINEMENTS = 2  # without progress, before the method gives up
-EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -100,17 +98,20 @@ class _State:
         self.u_base = self.u.copy()
         return size
 
-    def slacks(self) -> Vector:
-        """s at the current u."""
-        return self.base + product(self.G, self.u - self.u_base)
-
     def refine(self, slacks: Slacks) -> Vector:
-        """Powell: s from the original data, u_C corrected so that s_C = 0; drops negative multipliers."""
+        """Powell: s from the original data, u_C −= G_CC⁻¹ s_C so that s_C = 0; drops negative multipliers."""
         while True:
-            self.correct(slacks(self.u)[0])
+            if self.C:
+                s = slacks(self.u)[0][self.C]
+                self.u[self.C] -= self.factor.solve(self.factor.solve_transposed(s))
             if not (self.u < 0).any():
                 return self.reset_base(slacks)
-            self.drop_negative()
+            for position in reversed(range(len(self.C))):
+                if self.u[self.C[position]] < 0:
+                    k = self.C.pop(position)
+                    self.u[k], self.is_active[k] = 0.0, False
+                    self.factor.delete(position)
+                    self.drops += 1
 
     def violation(self, limit: Vector) -> float:
         """The largest excess over the limit: of |s_C|, and of −s elsewhere."""
@@ -120,7 +121,7 @@ class _State:
     def pivot_until_feasible(self, limit: Vector) -> None:
         """Add violated constraints, worst first, until s ≥ −limit."""
         while self.pivots < self.max_pivots:
-            s = self.slacks()
+            s = self.base + product(self.G, self.u - self.u_base)
             s[self.is_active] = 0.0
             violated = np.flatnonzero(s < -limit)
             if not violated.size:
@@ -181,19 +182,3 @@ class _State:
         )
         self.factor.extend(D, sla.cholesky(self.G[np.ix_(E, E)] - D.T @ D, check_finite=False))
         self.C += E.tolist()
-
-    def drop(self, position: int) -> None:
-        k = self.C.pop(position)
-        self.u[k], self.is_active[k] = 0.0, False
-        self.factor.delete(position)
-        self.drops += 1
-
-    def correct(self, s: Vector) -> None:
-        """u_C −= G_CC⁻¹ s_C, so that the active slacks vanish."""
-        if self.C:
-            self.u[self.C] -= self.factor.solve(self.factor.solve_transposed(s[self.C]))
-
-    def drop_negative(self) -> None:
-        for position in reversed(range(len(self.C))):
-            if self.u[self.C[position]] < 0:
-                self.drop(position)

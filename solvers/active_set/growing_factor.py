@@ -1,7 +1,5 @@
 """A Cholesky factor, updated as rows and columns are added and deleted."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as sla
 from scipy.linalg import blas

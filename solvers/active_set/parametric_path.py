@@ -11,8 +11,6 @@ zero before the first of them reaches −δ (P. M. J. Harris, Math. Programming 
 accuracy, and no step is negative.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as sla
 

@@ -1,7 +1,5 @@
 """From a guess of the contact set to the solution of the dual problem, exact up to rounding."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -17,8 +17,6 @@ An edge of contact creeps by about a row of contacts per set. As long as λ is f
 corrects more than further sets; so the limit on the sets of a sweep grows with the sweeps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -12,8 +12,6 @@ The preconditioner on a face F, N the other contacts, is B_FF⁻¹: for B = M⁻
 two band products and a band solution.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import partial
 

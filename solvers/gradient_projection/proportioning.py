@@ -13,8 +13,6 @@ A projection d is taken in full if that decreases the objective, −yᵀd/dᵀQd
 it, as is one that only frees contacts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

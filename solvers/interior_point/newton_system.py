@@ -4,8 +4,6 @@ D is a positive diagonal that changes from system to system, Q does not: what ca
 factored when the system is made.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 The paper's is V = U + √D (eq. 15) with Q = UᵀU; the others are there for comparison.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

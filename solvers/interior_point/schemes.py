@@ -4,8 +4,6 @@ With A = I the unknowns are λ, its slack w and the multiplier y = Qλ − p (th
 the start and is preserved by every step, so w is not stored.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -9,8 +9,6 @@ Project Chrono, and its parameters. In the dual form the unknowns are λ and its
 are the gaps y, and the residual is s1 = y − (Qλ − p).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

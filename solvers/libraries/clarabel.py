@@ -11,8 +11,6 @@ was 8e-8 mm. On a scene drawn at random it takes 1.2 times as long with the form
 at no tolerance that sufficed. The primal and the sparse form keep the defaults (docs/libraries.md).
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import clarabel

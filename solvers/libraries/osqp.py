@@ -5,8 +5,6 @@ Stops when ‖Aᵀx − s‖∞ and ‖Kx − f + Aλ‖∞ (primal and sparse f
 never by the clock, so the iteration count does not depend on the machine.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np

@@ -4,8 +4,6 @@ Stops when the unscaled ∞-norms of both residuals and the duality gap are belo
 relative tests, alternatives to these, are off. The dual form passes λ ≥ 0 as bounds, not as rows.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np

@@ -4,8 +4,6 @@ The sparse backend in the sparse form, else the dense one. Stops when the unscal
 and the duality gap are below the tolerance. The dual form uses its box constraints, so no rows are formed.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np

@@ -7,8 +7,6 @@ Those with a sparse interface take the sparse form. HiGHS does so for small mode
 keeps a dense matrix of the order of the free unknowns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

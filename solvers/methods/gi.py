@@ -10,8 +10,6 @@ u = 0 is the unconstrained minimum, where Algorithm 1 starts. The pivots are Gol
 in this space they need a factor of G_CC instead of (n, n) matrices.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -20,10 +18,10 @@ import scipy.linalg as sla
 from scipy.linalg import lapack
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.active_set.goldfarb_idnani import EPS, GiResult, Slacks, goldfarb_idnani
+from solvers.active_set.goldfarb_idnani import GiResult, Slacks, goldfarb_idnani
 from solvers.active_set.principal_sets import solve_from
 from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, failed
-from solvers.kkt import kkt_residual, kkt_status
+from solvers.kkt import EPS, kkt_residual, kkt_status
 from solvers.method import Method, State
 from solvers.settings import require
 

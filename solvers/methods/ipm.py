@@ -5,8 +5,6 @@ hence two matrices H per iteration), the systems solved by conjugate gradients p
 V = U + √D (eq. 15), from the start of Algorithm 5. Each option changes one ingredient.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

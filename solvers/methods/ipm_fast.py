@@ -5,8 +5,6 @@ systems by conjugate gradients with a banded M ≈ Q⁻¹; and, once most closed
 ones, an exact finish on the active set it identified. The paper's method is `ipm`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -7,8 +7,6 @@ d_i are random between 1 and 2, so that contacts with equal p_i do not reach zer
 d is the change of p from the load case whose answer is the start, and t goes from 1 to 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -9,8 +9,6 @@ precondition the face alone is not enough: Q is a compliance, so a gradient step
 smooth fields only, and the face changes contact by contact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 

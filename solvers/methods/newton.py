@@ -10,8 +10,6 @@ M ≈ Q⁻¹ and corrected by products with Q, whatever the form and the share o
 an area, the equations of each set are solved with a factorisation of K.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar

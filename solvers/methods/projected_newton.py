@@ -16,8 +16,6 @@ Newton projection for riveting is by S. Baklanov, M. Stefanova and S. Lupuleac (
 length nor how it solves its equations: nothing here is taken from it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

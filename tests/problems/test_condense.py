@@ -9,16 +9,12 @@ from joints import make_joint, make_scene
 from numpy.typing import NDArray
 from small import solve_by_nnls
 
-from problems.build import load_case, prepared
-from problems.effects.fasteners import Fasteners
-from problems.effects.initial_gap import InitialGap
-from problems.effects.pressure import Pressure
+from problems.build import prepared
 from problems.effects.supports import Supports
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.full_model.condense import NotPositiveDefinite, condense
-from problems.model.scene import Scene
 
 SHORT, LONG = {"length": 90.0, "elements": 2}, {"length": 250.0, "elements": 4}
 PARTS: list[dict[str, Any]] = [
@@ -100,26 +96,3 @@ def test_reaction_in_point_contact(strip: Prepared, times: float) -> None:
     _, force = pressed(strip, q)
     assert np.flatnonzero(force).tolist() == [ELEMENTS // 2 - 1]
     assert force.sum() == pytest.approx(q * LENGTH / 2 - 192 * EI * GAP / LENGTH**3, rel=2e-3)
-
-
-def test_two_equal_parts_are_one_part_on_a_tool_at_half_the_gap() -> None:
-    part = {"north": SHORT, "clamped": ["north"]}
-    one = make_joint(part, contacts=[["a", "tool"]], nodes=(9, 5))
-    two = make_joint(part, part | {"name": "b"}, nodes=(9, 5))
-    press = Pressure(kind="pressure", part="a", value=0.02)
-    rivets = Fasteners(kind="fasteners", preload=300.0, points=((50.0, 10.0), (310.0, 55.0)))
-
-    def gap(mean: float) -> InitialGap:
-        return InitialGap(kind="initial_gap", mean=mean)
-
-    against = press.model_copy(update={"part": "b", "value": -0.02})
-    x_one, lam_one = solve(make_scene(one, press, rivets, gap(0.4)))
-    x_two, lam_two = solve(make_scene(two, press, against, rivets, gap(0.8)))
-    assert 3 < sum(lam_one > 0) < 42
-    np.testing.assert_allclose(x_two[:45], x_one, atol=1e-10)
-    np.testing.assert_allclose(x_two[45:], -x_one, atol=1e-10)
-    np.testing.assert_allclose(lam_two, lam_one, atol=1e-7)
-
-
-def solve(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return solve_by_nnls(prepared(scene), load_case(scene))

@@ -109,10 +109,3 @@ def test_rounding_does_not_change_a_random_gap(length: float) -> None:
     np.testing.assert_allclose(mirrored @ Z, root @ Z, rtol=0, atol=1e-9)
     C = np.exp(-0.5 * ((grid[:, None] - grid) / length) ** 2)
     np.testing.assert_allclose(root @ root, C, rtol=0, atol=1.1 * SHIFT * np.linalg.norm(C, 2))
-
-
-def test_each_contact_pair_has_a_field_of_its_own() -> None:
-    joint = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, nodes=(9, 5))
-    g = field_of(1, joint)
-    assert len(g) == 90
-    assert abs(g[:45] - g[45:]).max() > 0.05

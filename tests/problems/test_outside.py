@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -80,16 +79,6 @@ def test_the_free_boundary_is_found_by_another_code() -> None:
     found = scipy.optimize.lsq_linear(L.T, np.linalg.solve(L, load.f), (-load.g, np.inf), tol=1e-14)
     known, _ = solved("outside/obstacle/20")
     assert abs(found.x - known.x).max() < 1e-6
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_every_form_gives_the_same_answer(form: Any) -> None:
-    known, _ = solved("outside/journal_bearing/20")
-    scene = read_scene("outside/journal_bearing/20")
-    data, load = prepared(scene, form=form), load_case(scene, form)
-    solver = make_solver("gi" if form == "primal" else "newton", {})
-    answer = answer_of("any", solver, data, form, load, 1e-12)
-    assert abs(np.asarray(answer.x) - known.x).max() < 1e-9
 
 
 def test_a_large_one_is_solved_in_the_sparse_form_by_choice() -> None:

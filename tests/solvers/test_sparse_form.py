@@ -1,7 +1,8 @@
-"""`newton` on the sparse form: cold, warm, batched, by sets alone, with a band and without."""
+"""`newton` and `mprgp` on the sparse form, where a product with Q is a solution with K's factors."""
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from harness.solving.session import SolverSession
 from harness.verification.reference import best_of_candidates, reference
 from problems.build import load_case, prepared
 from problems.forms import approximate_inverse
-from problems.forms.assembly import Assembly, Vector
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.scene import read_scene, scene_names
@@ -32,16 +33,18 @@ GALLERY = [
 ]
 
 
-def session_of(data: Prepared, tolerance: float = 1e-10) -> SolverSession:
-    made = SolverSession(make_solver("newton", {}), in_form(data, "sparse"), tolerance)
-    made.open(batched=True)
+def session_of(name: str, data: Prepared, **options: Any) -> SolverSession:
+    made = SolverSession(make_solver(name, options), in_form(data, "sparse"), 1e-10)
+    made.open(batched=name == "newton")
     return made
 
 
-def check(answer: Answer, x: Vector, lam: Vector, limit: float = LIMIT_MM) -> None:
+def check(answer: Answer, dense: Prepared, load: LoadCase) -> None:
+    x, lam = solve_by_nnls(dense, load)
+    assert 0 < np.count_nonzero(lam) < len(lam)
     assert answer.status == "solved"
-    np.testing.assert_allclose(answer.x, x, rtol=0, atol=limit)
-    np.testing.assert_allclose(answer.lam, lam, rtol=0, atol=1e-5 * max(1.0, abs(lam).max(initial=0.0)))
+    np.testing.assert_allclose(answer.x, x, rtol=0, atol=LIMIT_MM)
+    np.testing.assert_allclose(answer.lam, lam, rtol=0, atol=1e-5 * max(1.0, lam.max()))
 
 
 @pytest.mark.parametrize("name", GALLERY)
@@ -50,14 +53,14 @@ def test_a_scene_of_the_gallery(name: str) -> None:
     scene = read_scene(name)
     known = reference(prepared(scene), load_case(scene))
     data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
-    answer = session_of(data).next(load, None)
-    assert answer.status == "solved"
-    assert answer.x.shape == (data.assembly.n,)
-    assert abs(data.assembly.at_junction(answer.x) - known.x).max() <= LIMIT_MM
-    assert (answer.lam >= 0).all()
-    out_of_balance = data.assembly.K.multiply(answer.x) + data.assembly.A @ answer.lam - load.f
-    assert abs(out_of_balance).max() <= 1e-9 * data.assembly.K.norm * abs(answer.x).max()
-    assert answer.details["closed"] == pytest.approx(known.active.sum(), abs=2)  # weakly active ones
+    for solver in ("newton", "mprgp"):
+        answer = session_of(solver, data).next(load, None)
+        assert answer.status == "solved"
+        assert abs(data.assembly.at_junction(np.asarray(answer.x)) - known.x).max() <= LIMIT_MM
+        out_of_balance = data.assembly.K.multiply(answer.x) + data.assembly.A @ answer.lam - load.f
+        assert abs(out_of_balance).max() <= 1e-9 * data.assembly.K.norm * abs(np.asarray(answer.x)).max()
+        closed = (np.asarray(answer.lam) > 0).sum()
+        assert closed == pytest.approx(known.active.sum(), abs=2)  # weakly active ones
 
 
 def banded(seed: int) -> Prepared:
@@ -79,12 +82,10 @@ def test_without_m_the_sets_are_solved_by_factorisations_of_k(
 ) -> None:
     monkeypatch.setattr(Stiffness, "local_compliance", lambda *_: None)
     load, _ = make_load(6, dense)
-    check(session_of(dense).next(load, None), *solve_by_nnls(dense, load))  # few: M = Q⁻¹
+    check(session_of("newton", dense).next(load, None), dense, load)  # few: M = Q⁻¹
     monkeypatch.setattr(approximate_inverse, "FEW", -1)
-    blocks = [sp.csc_array(K) for K in dense.assembly.K.matrices]
-    data = Prepared(Assembly(Stiffness.of(*blocks), dense.assembly.A))
-    answer = session_of(data).next(load, None)
-    check(answer, *solve_by_nnls(dense, load))
+    data = Prepared(replace(dense.assembly, K=dense.assembly.K.as_sparse()))
+    check(session_of("newton", data).next(load, None), dense, load)
 
 
 @pytest.mark.parametrize("with_nodes", [False, True])
@@ -107,13 +108,47 @@ def test_a_users_own_sparse_matrices(band: bool, with_nodes: bool, tmp_path: Pat
     assert not data.assembly.K.dense
     load = load_case(scene, "sparse")
     dense = Prepared(Assembly(Stiffness.of(K.toarray(order="F")), A))
-    x, lam = solve_by_nnls(dense, load)
-    assert 0 < (lam > 0).sum() < m
-    session = session_of(data)
-    check(session.next(load, None), x, lam)
+    x, _ = solve_by_nnls(dense, load)
+    session = session_of("newton", data)
+    check(session.next(load, None), dense, load)
     assert isinstance(data.assembly.K.blocks[0], BandedBlock if band else GeneralBlock)
     found = best_of_candidates(data, load)
     assert abs(found.x - x).max() <= found.bound_mm + 1e-11
     assert found.bound_mm <= 1e-12
     again = replace(load, g=load.g + 0.01)
-    check(session.next(again, session.nearest(again)), *solve_by_nnls(dense, again))
+    check(session.next(again, session.nearest(again)), dense, again)
+
+
+@pytest.mark.parametrize("kind", ["band", "face", "none"])
+def test_each_preconditioner_cold_and_warm(kind: str) -> None:
+    dense = make_strips(150)
+    data = Prepared(replace(dense.assembly, K=dense.assembly.K.as_sparse()))
+    first, _ = make_load(3, dense)
+    second = LoadCase(first.f * 1.02, first.g)
+    session = session_of("mprgp", data, preconditioner=kind)
+    check(session.next(first, None), dense, first)
+    warm = session.next(second, session.nearest(second))
+    check(warm, dense, second)
+    again = session_of("mprgp", data, preconditioner=kind).next(second, None)
+    assert warm.details["products"] <= again.details["products"]
+
+
+def test_the_papers_smallest_joint_in_a_few_products() -> None:
+    scene = read_scene("4386/1471")
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    answer = session_of("mprgp", data).next(load, None)
+    assert answer.status == "solved"
+    known = best_of_candidates(data, load, given=[answer.lam])
+    assert known.bound_mm < LIMIT_MM
+    assert abs(np.asarray(answer.x) - known.x).max() < LIMIT_MM
+    assert answer.details["products"] <= 20
+
+
+def test_contacts_all_over_an_area_are_refused_with_the_reason() -> None:
+    """For them M would take longer than some factorisations of K; newton solves them with those."""
+    scene = read_scene("outside/obstacle/80")
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    assert data.approximate_inverse.M is None
+    answer = session_of("mprgp", data).next(load, None)
+    assert (answer.status, answer.lam) == ("failed", None)
+    assert "all over an area" in answer.details["cause"]
