@@ -41,7 +41,8 @@ class Ipm(Method):
     """Primal–dual interior point.
 
     Stops when μ = λᵀy/m ≤ ε_μ and max(max(p − Qλ), λᵀ|s1| / Σλ) ≤ 1e-3 √ε_μ mm with s1 = y − (Qλ − p).
-    ε_μ, in N·mm, is the tolerance; the paper tests μ alone, because it solves its systems exactly.
+    ε_μ, in N·mm, is the tolerance, which the session's units divide by a length and this by its square; the
+    paper tests μ alone, because it solves its systems exactly.
     Feasibility is not required below the rounding of Qλ − p, which is at most
     4ε max(|p| + |Q|λ) with |q_ij| ≤ √(q_ii q_jj). In addition each contact must be closed or open:
     min(y_i, q_ii λ_i) at most that or √(0.1 mm/N · ε_μ). A contact that touches without a force is off by
@@ -99,6 +100,7 @@ class Ipm(Method):
 
     def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
         Q, system = ready.Q, ready.system
+        tolerance /= load.energy**0.5
         system.begin()
         newton = NewtonSteps(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
         details: dict[str, Any] = {"cg": newton.counts}

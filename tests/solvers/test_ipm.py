@@ -1,5 +1,6 @@
 """The interior-point method: its schemes, its stopping rule, and what it says when it cannot."""
 
+from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 from typing import Any
@@ -168,6 +169,15 @@ def test_a_looser_tolerance_takes_fewer_iterations_and_vouches_for_less() -> Non
         assert answer.details["infeasibility"] <= 1e-3 * np.sqrt(tolerance)
         counts.append(answer.iterations)
     assert counts == sorted(set(counts))
+
+
+def test_the_tolerance_is_an_energy_in_the_units_of_the_session() -> None:
+    """In lengths of 2¹¹ mm the session asks 2⁻¹¹ of the tolerance, and the energy is 2²² as large."""
+    prepared = make_prepared(2, 20, 5)
+    solver, (_, load) = Ipm(), make_load(3, prepared)
+    state = solver.prepare(in_form(prepared, "dual"))
+    answer = solver.solve(state, replace(load, energy=2.0**22), 1e-9 / 2**11)
+    assert answer.details["mu"] <= 1e-9 / 2**22 < solver.solve(state, load, 1e-9).details["mu"]
 
 
 def test_no_feasibility_is_asked_for_below_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
