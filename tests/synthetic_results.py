@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from report.document.blocks import Section, Table
+from report.results.reader import Results, read
+
 GRIDS = {4386: (129, 17), 6112: (191, 16), 11308: (257, 22)}
 COND = {4386: 2.6303e6, 6112: 1.112e7, 11308: 1.7692e7}
 
@@ -58,6 +61,26 @@ def write_rows(directory: Path, rows: list[dict[str, Any]]) -> Path:
     text = "".join(json.dumps(r) + "\n" for r in rows)
     (directory / "measurements.jsonl").write_text(text, "utf-8")
     return directory
+
+
+def results(directory: Path, rows: list[dict[str, Any]], *problems: dict[str, Any]) -> Results:
+    """A directory of these rows and scenes, read."""
+    write_rows(directory, rows)
+    (directory / "problems.jsonl").write_text("".join(json.dumps(each) + "\n" for each in problems), "utf-8")
+    return read(directory)
+
+
+def table(section: Section | None, name: str = "") -> Table:
+    """The section's table of that name, or its only one."""
+    assert section is not None
+    (found,) = (b for b in section.blocks if isinstance(b, Table) and name in ("", b.name))
+    return found
+
+
+def shown(table: Table) -> list[list[str]]:
+    """The cells of its Markdown, line by line, the headings first."""
+    lines = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.markdown.splitlines()]
+    return [lines[0], *lines[2:]]
 
 
 def everything(directory: Path, scenes_of: dict[int, list[int]]) -> Path:

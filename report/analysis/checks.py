@@ -1,4 +1,4 @@
-"""What a reader must know before trusting the figures: mixed and damaged results."""
+"""What a reader must know before trusting the figures: mixed and damaged results, and other code."""
 
 from __future__ import annotations
 
@@ -6,34 +6,95 @@ from fnmatch import fnmatchcase
 from itertools import product
 from typing import Any
 
+import pandas as pd
+
+from harness.results.provenance import commit
 from report.document.numbers import counted, listed
 from report.results.reader import Results
 
-from .code import code_warnings
 from .versions import asked_for
+
+DIGITS = 10  # of a commit, in sentences
 
 
 def warnings(results: Results) -> list[str]:
     """One sentence per fault, the gravest first."""
-    checks = (_machines, _unfinished, _versions, _threads)
-    found = [sentence for check in checks for sentence in check(results)]
-    return [*code_warnings(results.rows), *found, *results.warnings]
+    rows = results.rows
+    found = code_warnings(rows)
+    machines = rows["machine"].replace("", "a machine not recorded")
+    if machines.nunique() > 1:
+        found.append(
+            f"The rows come from {machines.nunique()} machines: {_with_rows(machines)}. "
+            "They are reported one after the other; no table, mean or figure mixes them."
+        )
+    found += _unfinished(results)
+    for solver, versions in _several(rows[~asked_for(rows)], "solver_version").items():
+        found.append(f"{solver} was run in several versions: {listed(versions)}.")
+    for versions in _several(rows.assign(solver=""), "rivetbench_version").values():
+        found.append(f"The rows were written by several versions of rivetbench: {listed(versions)}.")
+    known = rows.dropna(subset=["threads", "threads_asked"])
+    other = known[known["threads"] != known["threads_asked"]]
+    if len(other):
+        found.append(
+            f"In {counted(len(other), 'row')} ({listed(sorted(other['solver'].unique()))}) the number of "
+            "threads in effect was not the requested one; the tables give the one in effect."
+        )
+    return [*found, *results.warnings]
 
 
-def _machines(results: Results) -> list[str]:
-    counts = results.rows["machine"].value_counts(sort=False)
-    if len(counts) < 2:
-        return []
-    names = [f"{name or 'a machine not recorded'} ({counted(k, 'row')})" for name, k in counts.items()]
-    return [
-        f"The rows come from {len(names)} machines: {listed(names)}. "
-        "They are reported one after the other; no table, mean or figure mixes them."
-    ]
+def code_warnings(rows: pd.DataFrame) -> list[str]:
+    """One sentence per reason to doubt that the rows are of one code, and of the code that is running."""
+    found: list[str] = []
+    commits = rows["commit"]
+    if commits.nunique() > 1:
+        found.append(f"The tables mix rows measured with different code: {_with_rows(commits.map(_short))}.")
+    elif (commits == "").any():
+        found.append("No row records the commit it was measured with.")
+    if changed := int((rows["clean"] == 0).sum()):
+        which = f"{counted(changed, 'row')} {_was(changed)}"
+        found.append(f"{which} measured with uncommitted changes to that commit.")
+    if mixed := _several(rows, "solver_code"):
+        found.append(f"The tables mix rows of different code of {listed([*mixed])}.")
+    if other := int((~commits.isin(["", commit()[0]])).sum()):
+        which = "All rows were" if other == len(rows) else f"{other} of {len(rows)} rows {_was(other)}"
+        found.append(f"{which} measured with older code than the code that drew this report.")
+    return found
+
+
+def commits_text(rows: pd.DataFrame) -> str:
+    """The commits in full, each with the state of the tree: '0123… (clean)'."""
+    states = rows["clean"].map({1.0: " (clean)", 0.0: " (with uncommitted changes)"}).fillna("")
+    words = rows["commit"].where(rows["commit"] != "", "not recorded") + states
+    return listed([str(text) for text in words.unique()])
+
+
+def _with_rows(names: pd.Series[str]) -> str:
+    """'a (1 row) and b (2 rows)'."""
+    counts = names.value_counts(sort=False)
+    return listed([f"{name} ({counted(count, 'row')})" for name, count in counts.items()])
+
+
+def _several(rows: pd.DataFrame, name: str) -> dict[str, list[str]]:
+    """The values of a text by solver, where there are several."""
+    values = rows[rows[name] != ""].groupby("solver")[name].agg(lambda texts: sorted(set(texts)))
+    return {str(solver): texts for solver, texts in values.items() if len(texts) > 1}
+
+
+def _was(number: int) -> str:
+    return "was" if number == 1 else "were"
+
+
+def _short(name: str) -> str:
+    hexadecimal = len(name) == 40 and set(name) <= set("0123456789abcdef")
+    return f"commit {name[:DIGITS]}" if hexadecimal else name or "a commit that is not recorded"
 
 
 def _unfinished(results: Results) -> list[str]:
-    suite = results.suite | {"scenes": _scenes_to_measure(results)}
-    made, planned = len(results.rows), planned_measurements(suite)
+    """The suite's scenes count without those that the model rejects, as it should."""
+    problems, suite = results.problems, results.suite
+    refused = set(problems.loc[problems["refused"].notna(), "scene"]) if "refused" in problems else set()
+    scenes = [scene for scene in suite.get("scenes", []) if scene not in refused]
+    made, planned = len(results.rows), planned_measurements(suite | {"scenes": scenes})
     if made >= planned:
         return []
     return [
@@ -42,50 +103,27 @@ def _unfinished(results: Results) -> list[str]:
     ]
 
 
-def _scenes_to_measure(results: Results) -> list[str]:
-    """The suite's scenes without those that the model rejects, as it should."""
-    problems = results.problems
-    refused = set(problems.loc[problems["refused"].notna(), "scene"]) if "refused" in problems else set()
-    return [scene for scene in results.suite.get("scenes", []) if scene not in refused]
-
-
 def planned_measurements(suite: dict[str, Any]) -> int:
     """How many rows the expanded suite file plans at least; what two entries plan counts once."""
     planned = set()
     for solver in suite.get("solver", []):
+
+        def given(name: str, default: Any, entry: dict[str, Any] = solver) -> Any:
+            return entry.get(name, suite.get(name, default))
+
         patterns = solver.get("scenes", ["*"])
         scenes = [s for s in suite.get("scenes", []) if any(fnmatchcase(s, glob) for glob in patterns)]
-        tolerances = solver.get("tolerances", suite.get("tolerances", [None]))
-        tolerances = [tolerances] if tolerances == "auto" else tolerances
-        what = [(solver.get("name"), solver.get("variant", ""), *solver.get("with", []))]
-        rounds = solver.get("repeats", suite.get("repeats", 1))
-        repeats = range(1 if rounds == "auto" else rounds)
-        threads = solver.get("threads", suite.get("threads", [None]))
-        cases = range(solver.get("cases", suite.get("series", {}).get("cases", 1)))
-        forms = solver.get("forms", [None])
-        planned |= {*product(what, scenes, forms, tolerances, threads, repeats, cases)}
+        tolerances, rounds = given("tolerances", [None]), given("repeats", 1)
+        cases = solver.get("cases", suite.get("series", {}).get("cases", 1))
+        planned |= {
+            *product(
+                [(solver.get("name"), solver.get("variant", ""), *solver.get("with", []))],
+                scenes,
+                solver.get("forms", [None]),
+                [tolerances] if tolerances == "auto" else tolerances,
+                given("threads", [None]),
+                range(1 if rounds == "auto" else rounds),
+                range(cases),
+            )
+        }
     return len(planned)
-
-
-def _versions(results: Results) -> list[str]:
-    rows = results.rows[(results.rows["solver_version"] != "") & ~asked_for(results.rows)]
-    found = []
-    for solver, versions in rows.groupby("solver")["solver_version"].unique().items():
-        if len(versions) > 1:
-            found.append(f"{solver} was run in several versions: {listed(sorted(versions))}.")
-    own = sorted(set(results.rows["rivetbench_version"]) - {""})
-    if len(own) > 1:
-        found.append(f"The rows were written by several versions of rivetbench: {listed(own)}.")
-    return found
-
-
-def _threads(results: Results) -> list[str]:
-    rows = results.rows.dropna(subset=["threads", "threads_asked"])
-    other = rows[rows["threads"] != rows["threads_asked"]]
-    if other.empty:
-        return []
-    solvers = listed(sorted(other["solver"].unique()))
-    return [
-        f"In {counted(len(other), 'row')} ({solvers}) the number of threads in effect was not the "
-        "requested one; the tables give the one in effect."
-    ]

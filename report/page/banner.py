@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.analysis.code import commits_text
+from report.analysis.checks import commits_text
 
 from .packed import Data
 

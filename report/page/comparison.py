@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.code import commits_text
+from report.analysis.checks import commits_text
 from report.document.blocks import records
 from report.document.numbers import listed
 

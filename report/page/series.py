@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.analysis.code import code_warnings
+from report.analysis.checks import code_warnings
 from report.results.series import Array, Series
 
 from .banner import banner

@@ -5,23 +5,14 @@ from __future__ import annotations
 import pandas as pd
 
 from harness.results.schema import LADDERS, OWNERS
-from report.analysis.outcomes import (
-    CORRECT,
-    CORRECT_UNCLAIMED,
-    NO_ANSWER,
-    UNJUDGED,
-    WRONG_CLAIMED,
-    WRONG_UNCLAIMED,
-    is_correct,
-    with_outcomes,
-)
+from report.analysis.outcomes import OUTCOMES, WRONG_CLAIMED, with_outcomes
 from report.document.blocks import Block, Figure, Section, Table, Text, number, word
 from report.document.numbers import MISSING, as_number, counted, power, whole
 from report.figures.ladder_map import ladder_map
 from report.results.labels import in_order
 from report.results.reader import Results
 
-OUTCOMES = (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, WRONG_CLAIMED, NO_ANSWER, UNJUDGED)
+KINDS = list(dict.fromkeys(OUTCOMES.values()))
 NOT_RUN = "not run"
 
 
@@ -60,17 +51,15 @@ def claims(cells: pd.DataFrame) -> str:
     """How often a wrong answer is reported as solved."""
     wrong = cells["outcome"] == WRONG_CLAIMED
     counts = [
-        f"{wrong[mine].sum()} of {counted(len(wrong[mine]), 'row')} of {whose}"
+        f"{wrong[of].sum()} of {counted(int(of.sum()), 'row')} of {whose}"
         for owner, whose in zip(OWNERS, ("our solvers", "textbook methods", "libraries"), strict=True)
-        if (mine := cells["owner"] == owner).any()
+        if (of := cells["owner"] == owner).any()
     ]
     return f"Wrong answers reported as solved: {', '.join(counts)}."
 
 
 def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
-    counts = pd.crosstab(cells["label"], cells["outcome"]).reindex(
-        index=order, columns=[*OUTCOMES], fill_value=0
-    )
+    counts = pd.crosstab(cells["label"], cells["outcome"]).reindex(index=order, columns=KINDS, fill_value=0)
     solved = cells[cells["status"] == "solved"]
     share = solved["displacement_error_mm"] / solved["limit_mm"]
     wrong = cells[cells["outcome"] == WRONG_CLAIMED].groupby("label")["scene"]
@@ -81,23 +70,20 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
         where=wrong.agg(lambda scenes: ", ".join(scene.split("/", 1)[1] for scene in scenes)),
     )
     columns = [word("solver (form)", "label"), number("rungs", "rungs", whole)]
-    columns += [
-        number(name, name, whole) for name in (CORRECT, CORRECT_UNCLAIMED, WRONG_UNCLAIMED, NO_ANSWER)
-    ]
-    columns.append(number(f"**{WRONG_CLAIMED}**", WRONG_CLAIMED, _bold))
+    columns += [number(name, name, whole) for name in KINDS[:-1] if name != WRONG_CLAIMED]
+    columns.append(number(f"**{WRONG_CLAIMED}**", WRONG_CLAIMED, lambda k: f"**{k}**" if k else "0"))
     columns.append(number("largest error / limit, reported solved", "worst_share", power))
     caption = "*Wrong answers reported as solved* are the worst outcome."
     return Table("honesty", caption, table.reset_index(), columns)
 
 
 def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Table:
-    lines = []
-    for label in order:
-        mine = cells[cells["label"] == label]
-        broken = {
-            ladder: _first_broken(mine[mine["ladder"] == ladder], rungs) for ladder, rungs in ladders.items()
-        }
-        lines.append({"label": label} | broken)
+    by_line = {key: line for key, line in cells.groupby(["label", "ladder"])}
+    lines = [
+        {"label": label}
+        | {ladder: _first_broken(by_line.get((label, ladder)), rungs) for ladder, rungs in ladders.items()}
+        for label in order
+    ]
     columns = [word("solver (form)", "label"), *(word(ladder, ladder) for ladder in ladders)]
     caption = (
         "*Breaking points: the first rung of each ladder without a correct answer.* ×: reported as solved. "
@@ -106,16 +92,12 @@ def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, li
     return Table("breaking-points", caption, pd.DataFrame(lines), columns)
 
 
-def _first_broken(line: pd.DataFrame, rungs: list[str]) -> str:
-    if line.empty:
+def _first_broken(line: pd.DataFrame | None, rungs: list[str]) -> str:
+    if line is None:
         return NOT_RUN
-    broken = line[~is_correct(line)].set_index("rung")["outcome"]
+    broken = line[line["verdict"] != "within"].set_index("rung")["outcome"]
     first = next((rung for rung in rungs if rung in broken), MISSING)
     return f"{first} ×" if broken.get(first) == WRONG_CLAIMED else first
-
-
-def _bold(count: object) -> str:
-    return f"**{count}**" if count else "0"
 
 
 def rungs(results: Results) -> Section | None:
@@ -141,17 +123,16 @@ def rungs(results: Results) -> Section | None:
     ]
     broken = with_outcomes(results.cells).query("verdict != 'within'").sort_values(["scene", "label"])
     if len(broken):
-        figures = ("displacement_error_mm", "limit_mm", "backward_error")
-        kept = ["label", "scene", "status", "verdict", "outcome"]
-        kept += [*figures, "iterations", "solve_s", "message"]
+        kept = ["label", "scene", "status", "verdict", "outcome", "displacement_error_mm", "limit_mm"]
+        kept += ["backward_error", "iterations", "solve_s", "message"]
         columns = [word("rung", "scene"), word("solver (form)", "label"), word("status", "status")]
         columns += [
-            number(name, key, power)
-            for name, key in zip(("error, mm", "limit, mm", "backward error"), figures, strict=True)
+            number("error, mm", "displacement_error_mm", power),
+            number("limit, mm", "limit_mm", power),
         ]
-        blocks.append(
-            Table("rungs-broken", "*Every measurement without a correct answer.*", broken[kept], columns)
-        )
+        columns.append(number("backward error", "backward_error", power))
+        caption = "*Every measurement without a correct answer.*"
+        blocks.append(Table("rungs-broken", caption, broken[kept], columns))
     if "refused" in known and known["refused"].notna().any():
         refused = known.loc[known["refused"].notna(), ["scene", "title", "refused"]]
         refused = refused.replace({"refused": {"": "**accepted, although the model does not cover it**"}})

@@ -14,13 +14,12 @@ import pandas as pd
 import pytest
 from browser import browser
 from conftest import pytest_terminal_summary
-from synthetic_results import everything, no_answer, row, write_rows
+from synthetic_results import everything, no_answer, results, row, write_rows
 from test_hostile_text import HOSTILE, MADE
 from test_series_report import made as made_series
 
 from report.analysis.remaining_gaps import QUANTILES, quantile_maps
-from report.figures import style
-from report.page import answer, comparison, maps, run
+from report.page import answer, comparison, maps
 from report.page.answer import headline
 from report.page.packed import packed
 from report.page.run import run_data
@@ -29,6 +28,7 @@ from report.results.reader import read
 from report.results.series import read as read_series
 from report.writers.series import write as write_series
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 DIRECTORIES = sorted(path.parent for path in PUBLISHED.glob("*/measurements.jsonl"))
 MOST_BYTES = 2_000_000
@@ -85,17 +85,20 @@ def test_every_cell_is_in_the_page_with_all_its_digits(tmp_path: Path) -> None:
     assert {scene["scene"] for scene in data["scenes"]} == set(cells["scene"])
 
 
-def test_the_bound_of_a_cell_is_the_largest_of_its_repeats(tmp_path: Path) -> None:
-    rows = [row(repeat=0, reference_bound_mm=3e-9), row(repeat=1, displacement_error_mm=2e-9)]
-    data = run_data(read(write_rows(tmp_path, rows)))
-    assert column(data, "bound_mm") == [3e-9]
-    assert column(data, "displacement_error_mm") == [2e-9]
-
-
-def test_a_limit_that_conditioning_eases_stays_and_others_do_not(tmp_path: Path) -> None:
+def test_repeats_limits_and_tolerances_of_the_cells(tmp_path: Path) -> None:
+    """The bound of a cell is the largest of its repeats; a limit that conditioning eases stays; every row is
+    counted, also those of tolerances tried in a search for one.
+    """
     rung = {"scene": "hard/made/1", "limit_asked_mm": 1e-7}
-    rows = [row() | rung | {"limit_mm": 3e-5}, row(solver="gi") | rung, row(limit_asked_mm=1e-7)]
-    assert column(run_data(read(write_rows(tmp_path, rows))), "least_mm") == [3e-5, None, None]
+    rows = [row(repeat=0, reference_bound_mm=3e-9), row(repeat=1, displacement_error_mm=2e-9)]
+    rows += [row() | rung | {"limit_mm": 3e-5}, row(solver="gi") | rung]
+    judged = ((7, "outside"), (8, "outside"), (9, "within"))
+    rows += [row(solver="a", tolerance=10.0**-k, searched=True, verdict=verdict) for k, verdict in judged]
+    data = run_data(results(tmp_path, rows))
+    assert column(data, "bound_mm")[0] == 3e-9
+    assert column(data, "displacement_error_mm")[0] == 2e-9
+    assert column(data, "least_mm") == [None, 3e-5, None, None]
+    assert data["banner"]["counts"].startswith("7 rows, 2 of them")
 
 
 @pytest.mark.parametrize("directory", DIRECTORIES, ids=lambda path: path.name)
@@ -109,10 +112,7 @@ def test_a_published_page_is_small_and_alone(directory: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(("made", "written"), MADE)
-def test_hostile_text_ends_no_script_and_begins_no_element(
-    made: Any, written: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(style, "DPI", 40)
+def test_hostile_text_ends_no_script_and_begins_no_element(made: Any, written: Any, tmp_path: Path) -> None:
     hostile = f"</script><script>alert(1)</script><!--<img src=x>{HOSTILE}"
     written(made(tmp_path, hostile))
     (path,) = tmp_path.rglob("index.html")
@@ -135,10 +135,9 @@ def test_an_array_keeps_four_digits_and_what_is_not_finite() -> None:
 def test_an_answer_outside_its_own_limit_has_seconds_from_the_scene(tmp_path: Path) -> None:
     """The page may judge it by a looser limit."""
     wrong = {"displacement_error_mm": 5e-7, "verdict": "outside"}
-    write_rows(tmp_path, [row(**wrong), row(form="sparse", model_s=3.0, **wrong)])
     problem = {"scene": "4386/0052", "build_s": {"condensation": 7.0, "cholesky": 1.0, "Q": 2.0}}
-    (tmp_path / "problems.jsonl").write_text(json.dumps(problem) + "\n")
-    seconds = column(run_data(read(tmp_path)), "scene_s")  # 0.3 to prepare and 1.35 to solve
+    found = results(tmp_path, [row(**wrong), row(form="sparse", model_s=3.0, **wrong)], problem)
+    seconds = column(run_data(found), "scene_s")  # 0.3 to prepare and 1.35 to solve
     assert seconds == pytest.approx([7.0 + 1.0 + 2.0 + 0.3 + 1.35, 3.0 + 0.3 + 1.35])
 
 
@@ -155,10 +154,7 @@ def test_maps_that_do_not_fit_are_named(tmp_path: Path, monkeypatch: pytest.Monk
     assert "11308/2500" in run_data(read(directory))["maps"]["left_out"]
 
 
-def test_a_series_has_its_quantiles_its_worst_case_and_a_curve_for_each_contact(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(style, "DPI", 40)
+def test_a_series_has_its_quantiles_its_worst_case_and_a_curve_for_each_contact(tmp_path: Path) -> None:
     gaps = made_series(tmp_path)
     write_series(tmp_path)
     (made,) = Page((tmp_path / "report" / "index.html").read_text("utf-8")).data["maps"]["maps"]
@@ -195,11 +191,6 @@ def test_of_more_contacts_than_a_map_holds_every_kth_is_in_the_page(
     assert len(unpacked(made["fields"][0]["values"])) == 731
 
 
-def test_the_banner_warns_of_mixed_code(tmp_path: Path) -> None:
-    rows = [row(commit="a" * 40), row(solver="gi", commit="b" * 40)]
-    assert "mix rows" in run._banner(read(write_rows(tmp_path, rows)))["warnings"][0]
-
-
 def test_a_directory_without_an_answer_has_a_page(tmp_path: Path) -> None:
     data = page_of(write_rows(tmp_path / "made", [row(**no_answer("crashed"))]), tmp_path / "index.html").data
     assert column(data, "load_case_s") == [None]
@@ -207,7 +198,9 @@ def test_a_directory_without_an_answer_has_a_page(tmp_path: Path) -> None:
     assert column(empty, "key") == []
 
 
-def test_the_banner_of_an_answer_and_of_a_comparison_names_the_code() -> None:
+def test_the_banners_name_the_code(tmp_path: Path) -> None:
+    mixed = results(tmp_path, [row(commit="a" * 40), row(solver="gi", commit="b" * 40)])
+    assert "mix rows" in run_data(mixed)["banner"]["warnings"][0]
     record = {"method": "newton", "machine": "CPU", "commit": "a" * 40, "recorded_at": "2026-01-02T03:04:05"}
     clean = answer._banner([record | {"clean": True}])
     assert (clean["machines"], clean["measured"]) == (["CPU"], "2026-01-02 03:04 UTC")
@@ -261,12 +254,3 @@ def test_an_answer_opens_with_its_largest_gap(exceeded: Any, kind: str, begins: 
     found = headline(record, arrays)
     assert found["kind"] == kind
     assert found["text"].startswith(begins)
-
-
-def test_every_row_is_counted(tmp_path: Path) -> None:
-    """Also those of tolerances tried in a search for one."""
-    rows = [
-        row(tolerance=10.0**-k, searched=True, verdict="within" if k > 8 else "outside") for k in (7, 8, 9)
-    ]
-    found = run_data(read(write_rows(tmp_path, [*rows, row(solver="gi")])))
-    assert found["banner"]["counts"].startswith("4 rows, 2 of them")

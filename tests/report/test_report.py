@@ -9,25 +9,19 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from matplotlib.image import imread
-from synthetic_results import everything, no_answer, row, write_rows
+from synthetic_results import no_answer, results, row, table, write_rows
 
 from report.analysis.precision import pareto
 from report.analysis.standings import shown, standings
 from report.document.numbers import significant
-from report.figures import style
 from report.figures.scoreboard import explained, scoreboard
-from report.results.reader import read
+from report.results.reader import Results, read
 from report.sections.speed import contacts
 from report.sections.summary import EACH, PREPARED, advice
 from report.writers.markdown import write
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 LOW, HIGH = "4386/0100", "4386/1000"
-
-
-@pytest.fixture(autouse=True)
-def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(style, "DPI", 40)
 
 
 def times(**seconds: float) -> dict[str, float]:
@@ -58,24 +52,19 @@ def tiny(tmp_path: Path) -> Path:
 
 
 def test_standings_of_a_tiny_run(tiny: Path) -> None:
-    table = standings(read(tiny).cells).set_index("method")
+    found = standings(read(tiny).cells).set_index("method")
+    assert found.index.tolist() == ["a (dual)", "b (primal)", "c (dual)", "d (dual)"]
     # a: sqrt(2 · 8) = 4; b: sqrt(1 · 36) = 6; c answers half of the scenes, d none: not compared
-    assert table["load_case_s_4386"].to_dict() == pytest.approx(
-        {"a (dual)": 4.0, "b (primal)": 6.0, "c (dual)": math.nan, "d (dual)": math.nan}, nan_ok=True
-    )
-    assert table["within"].to_dict() == {"a (dual)": 2, "b (primal)": 2, "c (dual)": 1, "d (dual)": 0}
-    assert table.loc["d (dual)", ["outside", "outside_claimed", "worst_error_mm"]].tolist() == [
-        2,
-        1,
-        3e-6,
-    ]
-    assert table.loc["c (dual)", ["no_answer", "no_answer_because"]].tolist() == [1, "1 time limit"]
+    assert found["load_case_s_4386"].tolist() == pytest.approx([4.0, 6.0, math.nan, math.nan], nan_ok=True)
+    assert found["within"].tolist() == [2, 2, 1, 0]
+    assert found.loc["d (dual)", ["outside", "outside_claimed", "worst_error_mm"]].tolist() == [2, 1, 3e-6]
+    assert found.loc["c (dual)", ["no_answer", "no_answer_because"]].tolist() == [1, "1 time limit"]
 
 
 def test_repeats_give_the_median_time_and_the_worst_verdict(tmp_path: Path) -> None:
     rows = [row(LOW, "a", repeat=k, **times(solve_s=t)) for k, t in enumerate((3.0, 1.0, 2.0))]
     rows += [row(HIGH, "a", repeat=0, **times(solve_s=1.0)), row(HIGH, "a", repeat=1, **no_answer("crashed"))]
-    cells = read(write_rows(tmp_path, rows)).cells.set_index("scene")
+    cells = results(tmp_path, rows).cells.set_index("scene")
     assert cells.loc[LOW, ["load_case_s", "verdict", "repeats"]].tolist() == [2.0, "within", 3]
     assert cells.loc[LOW, ["least_s", "most_s"]].tolist() == [1.0, 3.0]
     assert cells.loc[HIGH, ["verdict", "status"]].tolist() == ["no_answer", "crashed"]
@@ -95,8 +84,8 @@ def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
     text = write(tiny).read_text("utf-8")
     shown = re.findall(r"\[CSV\]\(([^)]+)\)\)\n\n((?:\|.*\n)+)", text)
     assert {name for name, _ in shown} == {path.name for path in (tiny / "report").glob("*.csv")}
-    for name, table in shown:
-        assert len(pd.read_csv(tiny / "report" / name)) == table.count("\n") - 2
+    for name, lines in shown:
+        assert len(pd.read_csv(tiny / "report" / name)) == lines.count("\n") - 2
     scene = pd.read_csv(tiny / "report" / "scene-4386_0100.csv").set_index("label")
     assert list(scene.index) == ["c (dual)", "b (primal)", "a (dual)", "d (dual)"]
     assert scene.loc["a (dual)", "total_s"] == 9.0
@@ -106,34 +95,7 @@ def test_every_table_stands_in_a_csv_with_all_digits(tiny: Path) -> None:
     line = next(line for line in of_scene.splitlines() if line.startswith("| a (dual)"))
     words = [word.strip() for word in line.strip("|").split("|")]
     assert words == ["a (dual)", "✓ within", "solved", "1.00e-9", "20", "2.00", "9.00", "512"]
-
-
-def test_an_unfinished_run_shows_its_limit(tiny: Path) -> None:
-    text = write(tiny).read_text("utf-8")
     assert re.search(r"\| c \(dual\) .* time limit .* > 60 s \(time limit\) \|", text)
-
-
-def test_sections_without_data_are_left_out(tmp_path: Path) -> None:
-    failed = write_rows(tmp_path / "failed", [row(LOW, "a", **no_answer("crashed"))])
-    text = write(failed).read_text("utf-8")
-    assert re.findall("^## (.*)", text, re.M) == [
-        "Summary",
-        "Every solver on every scene",
-        "Machine and method",
-    ]
-    assert not [*(failed / "report").glob("*.png")]
-    empty = write(write_rows(tmp_path / "empty", []))
-    assert "Nothing was measured" in empty.read_text("utf-8")
-
-
-def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> None:
-    text = write(everything(tmp_path, {4386: [107, 1074], 6112: [1500]})).read_text("utf-8")
-    assert len(re.findall("^## ", text, re.M)) == 7
-    for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
-        assert imread(tmp_path / "report" / name)[..., :3].std() > 0.05, f"{name} is blank"
-    assert re.search(r"\| +4386, 2193 \| +1074 \(49.0 %\) \| +2.63e6 \| +20.0 \|", text)
-    assert "nan" not in re.findall(r"\w+", text.lower())
-    assert "None" not in text
 
 
 def test_what_is_damaged_or_mixed_is_said(tmp_path: Path) -> None:
@@ -158,27 +120,20 @@ def test_what_is_damaged_or_mixed_is_said(tmp_path: Path) -> None:
 def test_several_tolerances_and_threads_stand_in_the_label(tmp_path: Path) -> None:
     rows = [row(LOW, "a", tolerance=tol) for tol in (1e-6, 1e-9)]
     rows += [row(LOW, "b", threads=k, threads_asked=k) for k in (1, 2)] + [row(LOW, "c", variant="direct")]
-    labels = set(read(write_rows(tmp_path, rows)).cells["label"])
-    assert labels == {
-        *(
-            "a (dual) 1e-6",
-            "a (dual) 1e-9",
-            "b (dual) × 1 thread",
-            "b (dual) × 2 threads",
-            "c (dual) direct",
-        ),
+    labels = {
+        "a (dual) 1e-6",
+        "a (dual) 1e-9",
+        "b (dual) × 1 thread",
+        "b (dual) × 2 threads",
+        "c (dual) direct",
     }
-
-
-def variants(counts: dict[str, int]) -> list[dict[str, Any]]:
-    """Rows of one solver, each variant on that many scenes."""
-    return [row(f"4386/{k:04d}", "a", variant=name) for name, most in counts.items() for k in range(most)]
+    assert set(results(tmp_path, rows).cells["label"]) == labels
 
 
 def test_the_scoreboard_continues_below_where_it_is_too_wide(tmp_path: Path) -> None:
     rows = [row(f"{n}/{k:04d}", "a") for n, most in ((4386, 12), (6112, 7), (11308, 7)) for k in range(most)]
     rows += [row("4386/0000", "b")]
-    cells = read(write_rows(tmp_path, rows)).cells
+    cells = results(tmp_path, rows).cells
     upper, lower = scoreboard(cells, standings(cells)).axes
     assert [[tick.get_text() for tick in axes.get_yticklabels()] for axes in (upper, lower)] == [
         ["a (dual)   26 of 26", "b (dual)   1 of 1"],
@@ -193,7 +148,7 @@ def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
     rows = [row(f"4386/{k}", "a", **times(solve_s=1.0)) for k in (100, 200, 400)]
     rows += [row("4386/300", "a", **no_answer("time_limit"))]
     rows += [row(f"4386/{k}", "b") for k in (100, 300)]
-    section = contacts(read(write_rows(tmp_path, rows)))
+    section = contacts(results(tmp_path, rows))
     (axes,) = section.blocks[0].drawing.axes[:1]  # type: ignore[union-attr]
     seconds = axes.lines[0].get_ydata()
     assert [math.isnan(s) for s in seconds] == [False, False, True, False]
@@ -204,19 +159,9 @@ def test_pareto_front() -> None:
     assert pareto(points).index.tolist() == [0, 1]
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0912, "0.0912"),
-        (12.34, "12.3"),
-        (999.6, "1000"),
-        (1234.0, "1230"),
-        (4.1e-9, "4.10e-9"),
-        (None, "–"),
-    ],
-)
-def test_significant_figures(value: float | None, text: str) -> None:
-    assert significant(value) == text
+def test_significant_figures() -> None:
+    texts = {0.0912: "0.0912", 12.34: "12.3", 999.6: "1000", 1234.0: "1230", 4.1e-9: "4.10e-9", None: "–"}
+    assert {value: significant(value) for value in texts} == texts
 
 
 def test_a_directory_without_measurements_is_named(tmp_path: Path) -> None:
@@ -227,42 +172,27 @@ def test_a_directory_without_measurements_is_named(tmp_path: Path) -> None:
 # Which solver to use, and what charts show.
 
 
-def advised(directory: Path, seconds: str = EACH) -> dict[str, Any]:
-    section = advice(read(directory))
-    data: pd.DataFrame = section.blocks[0].data  # type: ignore[union-attr, assignment]
-    return dict(data[data["seconds of"] == seconds].iloc[0])
+def advised(found: Results, seconds: str = EACH) -> pd.Series:
+    return table(advice(found)).data.set_index("seconds of").loc[seconds]
 
 
-def test_the_fastest_on_every_scene_is_advised(tiny: Path) -> None:
+def test_the_fastest_on_every_scene_is_advised(tiny: Path, tmp_path: Path) -> None:
     """c is faster, but on one scene only; the mean of a is sqrt(2 · 8) = 4, of b sqrt(1 · 36) = 6."""
-    line = advised(tiny)
-    assert [line[name] for name in ("use", "seconds", "next", "to_next")] == [
-        "a (dual)",
-        4.0,
-        "b (primal)",
-        1.5,
-    ]
-    assert advised(tiny, PREPARED)["use"] == "b (primal)"  # a prepares for 7 s on one of the scenes
-
-
-def test_nothing_is_advised_where_none_is_within_on_every_scene(tmp_path: Path) -> None:
+    line = advised(read(tiny))
+    assert line[["use", "seconds", "next", "to_next"]].tolist() == ["a (dual)", 4.0, "b (primal)", 1.5]
+    assert advised(read(tiny), PREPARED)["use"] == "b (primal)"  # a prepares for 7 s on one of the scenes
     rows = [row(LOW, "a"), row(HIGH, "a", **outside(1e-6)), row(LOW, "b", **outside(1e-6)), row(HIGH, "b")]
-    assert advised(write_rows(tmp_path, rows))["use"] == "none on every scene"
-
-
-def test_without_two_methods_there_is_no_advice(tmp_path: Path) -> None:
-    assert advice(read(write_rows(tmp_path, [row(LOW, "a"), row(HIGH, "a")]))) is None
+    assert advised(results(tmp_path / "none", rows))["use"] == "none on every scene"
 
 
 def test_charts_show_methods_run_on_half_of_the_scenes_and_name_the_others(tmp_path: Path) -> None:
-    rows = [
-        row(f"4386/{k:04d}", solver) for solver, most in (("a", 4), ("b", 2), ("c", 1)) for k in range(most)
-    ]
-    cells = read(write_rows(tmp_path / "some", rows)).cells
+    scenes = {"a": 4, "b": 2, "c": 1}
+    rows = [row(f"4386/{k:04d}", solver) for solver, most in scenes.items() for k in range(most)]
+    cells = results(tmp_path / "some", rows).cells
     assert set(shown(cells)["method"]) == {"a (dual)", "b (dual)"}
     caption = explained(shown(cells), standings(cells), "1e-7 mm")
     assert "Run on fewer than half of the scenes: c (dual)." in caption
-    alone = read(write_rows(tmp_path / "alone", [r for r in rows if r["solver"] != "b"])).cells
+    alone = results(tmp_path / "alone", [r for r in rows if r["solver"] != "b"]).cells
     assert shown(alone).empty
 
 

@@ -7,37 +7,21 @@ from typing import Any
 import pytest
 from accuracy_results import HIGH, LOW, answer, sweep
 from matplotlib.image import imread
-from synthetic_results import no_answer, row, write_rows
+from synthetic_results import no_answer, results, row, shown, table, write_rows
 
 from report.analysis.checks import planned_measurements
 from report.analysis.precision import swept, with_errors
 from report.analysis.standings import best_tolerances, fastest_first
-from report.document.blocks import Figure, Section, Table, Text
-from report.figures import style
-from report.results.reader import Results, read
-from report.sections import SECTIONS, accuracy, profiles, summary
+from report.document.blocks import Figure
+from report.results.reader import Results
+from report.sections import accuracy, profiles, summary
 from report.writers.markdown import write
 
-
-@pytest.fixture(autouse=True)
-def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(style, "DPI", 40)
-
-
-def results(directory: Path, rows: list[dict[str, Any]]) -> Results:
-    return read(write_rows(directory, rows))
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 
 def changed(rows: list[dict[str, Any]], solver: str, **figures: Any) -> list[dict[str, Any]]:
     return [r | figures if r["solver"] == solver else r for r in rows]
-
-
-def table(section: Section | None, name: str) -> Table:
-    return next(block for block in section.blocks if isinstance(block, Table) and block.name == name)
-
-
-def text(section: Section | None) -> str:
-    return "\n".join(block.markdown for block in section.blocks if isinstance(block, Text))
 
 
 def prices(found: Results) -> Any:
@@ -47,19 +31,6 @@ def prices(found: Results) -> Any:
 def advised(found: Results) -> Any:
     lines = table(summary.advice(found), "advice").data
     return lines[lines["seconds of"] == summary.EACH].set_index("accuracy_mm")
-
-
-@pytest.mark.parametrize("section", [accuracy.costs, accuracy.tolerances, accuracy.residuals])
-def test_without_a_sweep_there_is_no_section(tmp_path: Path, section: Any) -> None:
-    rows = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
-    assert section(results(tmp_path / "two", rows)) is None
-
-
-@pytest.mark.parametrize(
-    "section", [section for _, section in SECTIONS], ids=lambda of: f"{of.__module__}.{of.__name__}"
-)
-def test_no_section_is_made_of_nothing(tmp_path: Path, section: Any) -> None:
-    assert section(results(tmp_path, [])) is None
 
 
 def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> None:
@@ -145,12 +116,8 @@ def test_a_price_is_the_geometric_mean_over_the_scenes(tmp_path: Path) -> None:
 def test_what_was_not_reached_is_shown_as_such(tmp_path: Path) -> None:
     rows = [*sweep(), answer(LOW, "once", 9, 1.0, 1e-9)]
     rows += [row(s, "lost", tolerance=1e-6, **no_answer("crashed")) for s in (LOW, HIGH)]
-    found = table(accuracy.costs(results(tmp_path, rows)), "price-list")
-    shown = {record["method"]: record for record in found.data.to_dict("records")}
-    words = {
-        name: [column.show(line) for column in found.columns[2:6]]  # type: ignore[arg-type]
-        for name, line in shown.items()
-    }
+    lines = shown(table(accuracy.costs(results(tmp_path, rows)), "price-list"))
+    words = {line[1]: line[2:6] for line in lines}
     assert words["late (dual)"] == ["1.00 s", "> 68.0 s", "> 68.0 s", "> 68.0 s"]
     assert words["coarse (dual)"] == ["2.00 s", "2.00 s", "not reached (3.0e-6)", "not reached (3.0e-6)"]
     assert words["once (dual)"] == ["–"] * 4
@@ -210,8 +177,6 @@ def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
     assert counts.loc["b (dual)"].tolist() == [6, 5, 3, 4, 5]  # ratios 3, 2, 1, 1, 1 and none
     assert counts.loc["c (dual)"].tolist() == [6, 0, 0, 0, 0]
     assert "seldom (dual)" not in found.index
-    few = [r for r in rows if r["scene"] < "4386/104"]
-    assert profiles.section(results(tmp_path / "few", few)) is None
 
 
 def test_settings_must_reach_the_accuracy_on_every_scene(tmp_path: Path) -> None:

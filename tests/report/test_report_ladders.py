@@ -18,20 +18,14 @@ from report.analysis.outcomes import (
     UNJUDGED,
     WRONG_CLAIMED,
     WRONG_UNCLAIMED,
-    outcome,
 )
-from report.figures import style
 from report.results.reader import read
 from report.sections.ladders import rungs_in_order
 from report.writers.markdown import write
 
 EASY, MIDDLE, HARD, ODD = "hard/steep/1e1", "hard/steep/1e5", "hard/steep/1e9", "hard/odd/one"
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 WRONG = {"verdict": "outside", "displacement_error_mm": 3e-3, "limit_mm": 1e-6}
-
-
-@pytest.fixture(autouse=True)
-def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(style, "DPI", 40)
 
 
 def row(scene: str, solver: str, **figures: Any) -> dict[str, Any]:
@@ -67,21 +61,6 @@ def directory(tmp_path: Path) -> Path:
     lines = "".join(f'[[solver]]\nname = "{name}"\nforms = ["dual"]\n' for name in ("ipm", "a", "b"))
     (tmp_path / "suite.toml").write_text(f"name = 'made-up'\nscenes = {json.dumps(scenes)}\n{lines}", "utf-8")
     return tmp_path
-
-
-@pytest.mark.parametrize(
-    ("verdict", "status", "found"),
-    [
-        ("within", "solved", CORRECT),
-        ("within", "iteration_limit", CORRECT_UNCLAIMED),
-        ("outside", "inaccurate", WRONG_UNCLAIMED),
-        ("outside", "solved", WRONG_CLAIMED),
-        ("cannot_be_judged", "solved", UNJUDGED),
-        ("no_answer", "time_limit", NO_ANSWER),
-    ],
-)
-def test_outcomes(verdict: str, status: str, found: str) -> None:
-    assert outcome({"verdict": verdict, "status": status}) == found
 
 
 def test_the_worst_answer_is_counted_and_named(directory: Path) -> None:
@@ -139,12 +118,6 @@ def test_rungs_and_scenes_are_reported_apart(directory: Path) -> None:
     both = write(directory).read_text("utf-8")
     assert "## Summary" in both
     assert "hard/steep" not in both[both.index("## Summary") : both.index("## Machine")]
-
-
-def test_without_a_rung_there_is_no_section_on_ladders(tmp_path: Path) -> None:
-    text = write(write_rows(tmp_path, [any_row("4386/0052", "ipm")])).read_text("utf-8")
-    assert "Where each solver fails" not in text
-    assert not (tmp_path / "report" / "ladders.png").exists()
 
 
 def test_rungs_that_the_suite_does_not_list_come_as_they_were_measured(tmp_path: Path) -> None:

@@ -7,14 +7,11 @@ from typing import Any
 import pytest
 from synthetic_results import no_answer, row, write_rows
 
-from report.analysis import code
+from report.analysis import checks
 from report.analysis.checks import warnings
-from report.document.blocks import Section
 from report.figures import style
 from report.results.labels import in_order
-from report.results.reader import Results, read
-from report.sections import SECTIONS
-from report.writers import markdown
+from report.results.reader import read
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -25,20 +22,11 @@ HERE, OTHER = "0123456789" * 4, "abcdef0123" * 4
 
 @pytest.fixture(autouse=True)
 def _drawn_by_one_commit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(code, "commit", lambda: (HERE, True))
+    monkeypatch.setattr(checks, "commit", lambda: (HERE, True))
 
 
 def said(directory: Path, *rows: dict[str, Any]) -> list[str]:
     return warnings(read(write_rows(directory, list(rows))))
-
-
-def test_a_section_is_a_function_in_the_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def greeting(results: Results) -> Section:
-        return Section(f"Hello to {len(results.rows)} row", [])
-
-    monkeypatch.setattr(markdown, "SECTIONS", [("scenes", greeting), *SECTIONS])
-    text = write(write_rows(tmp_path / "out", [row(LOW, "a")])).read_text("utf-8")
-    assert re.findall("^## (.*)", text, re.M)[:2] == ["Hello to 1 row", "Summary"]
 
 
 def test_rows_are_taken_at_their_word(tmp_path: Path) -> None:

@@ -1,17 +1,16 @@
 """The section "from scene to answer": stages, totals, and who is the fastest in any form."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
-from synthetic_results import no_answer, row, write_rows
+from synthetic_results import no_answer, results, row, shown, table
 
 from harness.results import schema
 from problems.forms import names
 from report.analysis.roads import roads
-from report.results.reader import Results, read
+from report.results.reader import Results
 from report.sections import problems, summary
 from report.sections.steps import from_scene
 from report.writers.markdown import write
@@ -33,17 +32,15 @@ def dense(scene: str = LOW, solver: str = "newton", form: str = "dual", **figure
     return row(scene, solver, form, **(known | {"stages": "K factors Q"} | figures))
 
 
-def results(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> Results:
-    write_rows(directory, rows)
+def built(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> Results:
+    """The results of rows on scenes of a known cost."""
     known = {"n": 4386, "m": 2193, "build_s": BUILD, "stored_mib": STORED} | facts
     scenes = {r["scene"]: {"scene": r["scene"], "active": r["active"]} | known for r in rows}
-    (directory / "problems.jsonl").write_text("".join(json.dumps(p) + "\n" for p in scenes.values()), "utf-8")
-    return read(directory)
+    return results(directory, rows, *scenes.values())
 
 
-def line_of(lines: pd.DataFrame, method: str) -> pd.Series:
-    (line,) = (line for _, line in lines.iterrows() if line["method"] == method)
-    return line
+def lines(directory: Path, rows: list[dict[str, Any]], **facts: Any) -> pd.DataFrame:
+    return roads(built(directory, rows, **facts)).set_index("method")
 
 
 def totals(line: pd.Series) -> list[float]:
@@ -57,14 +54,13 @@ def test_the_reports_forms_are_those_of_the_problems() -> None:
 
 def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:
     rows = [sparse(), dense(), dense(solver="clarabel", form="primal", stages="K", form_s=None)]
-    lines = roads(results(tmp_path, rows))
-    assert totals(line_of(lines, "newton (sparse)")) == pytest.approx([0.9, 0.9 + 9 * 0.3, 0.9 + 999 * 0.3])
-    assert totals(line_of(lines, "newton (dual)")) == pytest.approx([11.9, 11.9 + 0.9, 11.9 + 99.9])
-    primal = line_of(lines, "clarabel (primal)")
+    found = lines(tmp_path, rows)
+    assert totals(found.loc["newton (sparse)"]) == pytest.approx([0.9, 0.9 + 9 * 0.3, 0.9 + 999 * 0.3])
+    assert totals(found.loc["newton (dual)"]) == pytest.approx([11.9, 11.9 + 0.9, 11.9 + 99.9])
+    primal = found.loc["clarabel (primal)"]
     assert totals(primal) == pytest.approx([8.5 + 0.37, 8.87 + 9 * 0.07, 8.87 + 999 * 0.07])
     assert (primal["factors_s"], primal["Q_s"], primal["stored_mib"]) == (0, 0, 80)
-    assert line_of(lines, "newton (dual)")["stored_mib"] == 200
-    assert line_of(lines, "newton (sparse)")["stored_mib"] == 0
+    assert found["stored_mib"][["newton (dual)", "newton (sparse)"]].tolist() == [200, 0]
 
 
 @pytest.mark.parametrize(
@@ -76,57 +72,40 @@ def test_of_a_run_that_does_not_say_its_form_tells_the_stages(
 ) -> None:
     """One that was stopped does not."""
     rows = [sparse(solver="other"), dense(solver="another"), dense(solver=solver, form=form, stages=None)]
-    assert totals(line_of(roads(results(tmp_path, rows)), f"{solver} ({form})"))[0] == pytest.approx(first)
+    assert totals(lines(tmp_path, rows).loc[f"{solver} ({form})"])[0] == pytest.approx(first)
 
 
-def test_only_answers_within_the_limit_have_a_total(tmp_path: Path) -> None:
+def test_only_answers_within_the_limit_at_a_known_cost_have_a_total(tmp_path: Path) -> None:
+    """A dense form whose condensation nobody timed wins nothing."""
     rows = [sparse(), dense(), dense(solver="piqp", verdict="outside"), dense(solver="osqp")]
     rows[-1] |= no_answer("time_limit")
-    lines = roads(results(tmp_path, rows))
-    for method in ("piqp (dual)", "osqp (dual)"):
-        assert not line_of(lines, method)[["total_1_s", "total_1000_s"]].notna().any()
-
-
-def test_matrices_of_unknown_cost_give_no_total(tmp_path: Path) -> None:
-    """A dense form whose condensation nobody timed wins nothing."""
-    lines = roads(results(tmp_path, [sparse(), dense()], build_s={"model": 0.4}))
-    assert pd.isna(line_of(lines, "newton (dual)")["total_1_s"])
-
-
-@pytest.mark.parametrize("forms", [("dual", "primal"), ("sparse",)])
-def test_it_takes_both_roads(tmp_path: Path, forms: tuple[str, ...]) -> None:
-    rows = [sparse() if form == "sparse" else dense(form=form) for form in forms]
-    assert from_scene(results(tmp_path, rows)) is None
-
-
-def test_series_and_forms_that_are_not_taken_do_not_count(tmp_path: Path) -> None:
-    """A later case of a series is neither cold, nor has it paid for the matrices."""
-    rows = [dense(), sparse(case=3), sparse(status="unsupported")]
-    assert from_scene(results(tmp_path, rows)) is None
+    found = lines(tmp_path / "known", rows)
+    assert not found.loc[["piqp (dual)", "osqp (dual)"], ["total_1_s", "total_1000_s"]].notna().any(axis=None)
+    unknown = lines(tmp_path / "unknown", [sparse(), dense()], build_s={"model": 0.4})
+    assert pd.isna(unknown.loc["newton (dual)", "total_1_s"])
 
 
 def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path: Path) -> None:
-    section = from_scene(results(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
-    (table,) = section.blocks
-    assert "(outside)" in table.markdown
+    section = from_scene(built(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
+    assert len(section.blocks) == 1
+    assert "(outside)" in table(section).markdown
 
 
 def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
     own = {"unknowns": 46956, "reference_bound_mm": 1.6e-11, "from_condensed_mm": 3e-12}
     facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
-    section = problems.section(results(tmp_path, [sparse(), dense()], **facts, sparse=own))
-    scenes = section.blocks[0]
+    scenes = table(problems.section(built(tmp_path, [sparse(), dense()], **facts, sparse=own)))
     assert scenes.data["sparse_unknowns"].tolist() == [46956]
     assert "difference of the two references, mm" in scenes.markdown
-    assert all(text in scenes.markdown for text in ("46956", "1.60e-11", "3.00e-12", "2.00e-12"))
+    assert {"46956", "1.60e-11", "3.00e-12", "2.00e-12"} <= {cell for line in shown(scenes) for cell in line}
     assert "condensation" in scenes.caption
-    without = problems.section(results(tmp_path / "dense", [dense()], **facts))
-    assert "sparse" not in without.blocks[0].markdown + without.blocks[0].caption
+    without = table(problems.section(built(tmp_path / "dense", [dense()], **facts)))
+    assert "sparse" not in without.markdown + without.caption
 
 
 def test_the_section_has_a_picture_and_a_table_of_all_stages(tmp_path: Path) -> None:
     rows = [r for s in (LOW, HIGH) for r in (sparse(s), dense(s), dense(s, "piqp", solve_s=6.1))]
-    section = from_scene(results(tmp_path, rows))
+    section = from_scene(built(tmp_path, rows))
     assert [block.name for block in section.blocks] == ["roads", "roads"]
     write(tmp_path)
     assert (tmp_path / "report" / "roads.png").stat().st_size > 10_000
@@ -138,12 +117,8 @@ def test_the_section_has_a_picture_and_a_table_of_all_stages(tmp_path: Path) -> 
 def test_the_advice_counts_from_the_scene_on_too(tmp_path: Path) -> None:
     """newton 0.9 s on the sparse form and 11.9 s on the dual; Clarabel 1.8 s on the sparse form."""
     rows = [sparse(), dense(), sparse(solver="clarabel", solve_s=1.1)]
-    section = summary.advice(results(tmp_path, rows))
-    lines = section.blocks[0].data.set_index("seconds of")
-    assert lines["use"].to_dict() == {
-        summary.EACH: "newton (dual)",
-        summary.PREPARED: "newton (dual)",
-        summary.FROM_SCENE: "newton (sparse)",
-    }
-    line = lines.loc[summary.FROM_SCENE]
+    advice = table(summary.advice(built(tmp_path, rows))).data.set_index("seconds of")
+    ways = [summary.EACH, summary.PREPARED, summary.FROM_SCENE]
+    assert advice["use"][ways].tolist() == ["newton (dual)", "newton (dual)", "newton (sparse)"]
+    line = advice.loc[summary.FROM_SCENE]
     assert (line["library"], line["to_library"]) == ("clarabel (sparse)", pytest.approx(1.8 / 0.9))

@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from synthetic_results import no_answer, row, write_rows
+from synthetic_results import no_answer, results, row, shown, table
 
 from report.figures import style
-from report.results.reader import read
 from report.sections import speed
 from report.sections.speed import load_cases
 
@@ -20,19 +19,16 @@ def timed(scene: str, solver: str, seconds: float, form: str = "dual", **figures
     return row(scene, solver, form, **(TIMES | known | figures))
 
 
-def results(directory: Path, rows: list[dict[str, Any]]):
-    return read(write_rows(directory, rows))
-
-
 def test_ratios_are_to_the_median_of_the_fastest_library(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0), timed(LOW, "piqp", 8.0), timed(LOW, "proxqp", 4.0, "primal")]
     rows += [timed(LOW, "newton", 2.0, repeat=1), timed(LOW, "piqp", 6.0, repeat=1)]
-    rows += [timed(HIGH, "newton", 1.0), timed(HIGH, "piqp", 10.0)]
-    rows += [timed(HIGH, "proxqp", 1.0, "primal", verdict="outside")]  # fast, and wrong
+    rows += [timed(HIGH, "newton", 1.0, threads=1), timed(HIGH, "piqp", 10.0, threads=1)]
+    rows += [timed(HIGH, "proxqp", 1.0, "primal", threads=1, verdict="outside")]  # fast, and wrong
     cases = load_cases(results(tmp_path, rows))
     mine = cases[cases["solver"] == "newton"].set_index(["scene", "repeat"])["to_library"]
     assert mine.to_dict() == pytest.approx({(LOW, 0): 1 / 4, (LOW, 1): 2 / 4, (HIGH, 0): 1 / 10})
     assert cases["to_cholesky"].tolist() == pytest.approx((cases["load_case_s"] / 0.5).tolist())
+    assert set(cases["method"]) == {"newton (dual)", "piqp (dual)", "proxqp (primal)"}  # without the threads
 
 
 def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
@@ -40,27 +36,19 @@ def test_the_table_gives_median_least_and_most(tmp_path: Path) -> None:
     seconds = {LOW: (1.0, 2.0, 3.0), HIGH: (4.0, 4.0, 4.0)}
     rows += [timed(scene, "newton", s, repeat=k) for scene in seconds for k, s in enumerate(seconds[scene])]
     found = results(tmp_path, rows)
-    section, machine = speed.relative(found), speed.machine(found)
-    (table,), (yardsticks,) = section.blocks, machine.blocks
-    line = table.data[table.data["method"] == "newton (dual)"].iloc[0]
-    found = [line[name] for name in ("to_library", "to_library_least", "to_library_most")]
-    assert found == pytest.approx([0.3, 0.1, 0.4])
+    ratios = table(speed.relative(found))
+    line = ratios.data.set_index("method").loc["newton (dual)"]
+    assert [line[f"to_library{end}"] for end in ("", "_least", "_most")] == pytest.approx([0.3, 0.1, 0.4])
     assert (line["scenes"], line["runs"]) == (2, 6)
-    assert "0.300 (0.10 to 0.40)" in table.markdown
-    known = yardsticks.data.iloc[0]
+    assert shown(ratios)[1][2:4] == ["newton (dual)", "0.300 (0.10 to 0.40)"]
+    known = table(speed.machine(found)).data.iloc[0]
     assert known["gflops"] == pytest.approx(2193**3 / 3 / 0.5 / 1e9)
     assert known["gb_per_s"] == pytest.approx(8 * 2193**2 / 0.01 / 1e9)
 
 
 def test_without_an_answering_library_there_is_no_ratio_to_it(tmp_path: Path) -> None:
     rows = [timed(LOW, "newton", 1.0), timed(LOW, "piqp", 8.0) | no_answer("time_limit")]
-    section = speed.relative(results(tmp_path, rows))
-    assert "–" in section.blocks[0].markdown
-
-
-def test_without_a_yardstick_there_is_no_section(tmp_path: Path) -> None:
-    assert speed.relative(results(tmp_path, [row(LOW, "newton")])) is None
-    assert speed.machine(results(tmp_path, [row(LOW, "newton")])) is None
+    assert shown(table(speed.relative(results(tmp_path, rows))))[1][3] == "–"
 
 
 def test_where_no_answer_is_within_the_limit_the_yardsticks_stand_alone(tmp_path: Path) -> None:
@@ -74,59 +62,39 @@ def test_with_preparation_the_ratio_is_to_the_library_that_is_fastest_with_its_o
     rows += [timed(LOW, "piqp", 10.0, convert_s=0.0, prepare_s=0.0)]
     rows += [timed(LOW, "proxqp", 8.0, convert_s=1.0, prepare_s=7.0)]
     cases = load_cases(results(tmp_path, rows)).set_index("solver")
-    assert cases.loc["newton", "to_library"] == pytest.approx(1 / 8)
-    assert cases.loc["newton", "total_to_library"] == pytest.approx(4 / 10)
-
-
-def test_lines_of_several_numbers_of_threads_are_named_without_it(tmp_path: Path) -> None:
-    rows = [timed(LOW, "newton", 1.0, threads=k) for k in (1, 2)]
-    cases = load_cases(results(tmp_path, rows))
-    assert cases["method"].tolist() == ["newton (dual)"] * 2
+    assert cases.loc["newton", ["to_library", "total_to_library"]].tolist() == pytest.approx([1 / 8, 4 / 10])
 
 
 def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path: Path) -> None:
     rows = [timed(LOW, "ipm-fast", 1.0), timed(HIGH, "ipm-fast", 10.0)]
     rows += [timed(scene, "ipm-fast", s, variant="no finish") for scene, s in ((LOW, 3.0), (HIGH, 20.0))]
     rows += [timed(LOW, "ipm-fast", 9.0, variant="bad", verdict="outside")]
-    section = speed.variants(results(tmp_path, rows))
-    data = section.blocks[0].data.set_index("method")
+    found = table(speed.variants(results(tmp_path, rows)))
+    data = found.data.set_index("method")
     line = data.loc["ipm-fast (dual) no finish"]
     assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
     assert data.loc["ipm-fast (dual) bad", "within"] == 0
-    assert "2.50 (2.0 to 3.0)" in section.blocks[0].markdown
+    assert "2.50 (2.0 to 3.0)" in found.markdown
 
 
 def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: Path) -> None:
+    """Nothing of order m × m is timed in the sparse form: it leaves the benchmarks of Q as they are."""
     rows = []
-    for n in (1000, 2000, 4000, 8000):
-        figures = {"cholesky_s": 1e-10 * n**3, "product_s": 1e-9 * n**2}
+    for n in (1000, 2000, 4000, 8000, 100_000):
+        grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
         memory = {"data_mib": 100.0, "peak_rss_mib": 100.0 + 1e-5 * n**2}
-        grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
-        rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
-    section = speed.scaling(results(tmp_path, rows))
-    data = section.blocks[1].data.set_index("method")
-    assert data.loc["newton (dual)", "load_case_s"] == pytest.approx(1.5)
-    assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
-    assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)
-    assert data.loc["one product Qv", "load_case_s"] == pytest.approx(2.0)
-    assert speed.scaling(results(tmp_path / "few", rows[:2])) is None
-
-
-def test_a_size_of_the_sparse_form_alone_leaves_the_benchmarks_of_q_as_they_are(tmp_path: Path) -> None:
-    """Nothing of order m × m is timed in the sparse form."""
-    rows = []
-    for n in (1000, 2000, 4000, 100_000):
-        grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
-        known = {"data_mib": 100.0, "peak_rss_mib": 100.0 + 1e-2 * n}
-        rows.append(timed(LOW, "newton", 1e-4 * n, "sparse", cholesky_s=None, product_s=None, **known) | grid)
+        none = {"cholesky_s": None, "product_s": None}
+        rows.append(timed(LOW, "newton", 1e-4 * n, "sparse", **none, **memory) | grid)
         if n < 100_000:
             figures = {"cholesky_s": 1e-10 * n**3, "product_s": 1e-9 * n**2}
-            rows.append(timed(LOW, "newton", 1e-6 * n**2, **figures, **known) | grid)
+            rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
     section = speed.scaling(results(tmp_path, rows))
-    data = section.blocks[1].data.set_index("method")
-    assert data.loc["newton (sparse)", "load_case_s"] == pytest.approx(1.0)
-    assert data.loc["newton (sparse)", "largest"] == 100_000
-    assert data.loc["one Cholesky of Q", ["sizes", "largest"]].tolist() == [3, 4000]
-    assert data.loc["one Cholesky of Q", "load_case_s"] == pytest.approx(3.0)
+    data = table(section).data.set_index("method")
+    assert data["load_case_s"].to_dict() == pytest.approx(
+        {"newton (sparse)": 1.0, "newton (dual)": 1.5, "one Cholesky of Q": 3.0, "one product Qv": 2.0}
+    )
+    assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
+    assert data["largest"].tolist() == [100_000, 8000, 8000, 8000]
     with style.applied():
         section.blocks[0].drawing.savefig(tmp_path / "scaling.png")
+    assert speed.scaling(results(tmp_path / "few", rows[:4])) is None

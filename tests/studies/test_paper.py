@@ -26,16 +26,12 @@ from paper_results import (
 )
 from synthetic_results import no_answer
 
-from report.figures import style
 from studies.paper import __main__ as paper
 from studies.paper import claims, printed
 from studies.paper.claims import EVIDENCE
 from studies.paper.figures5_7 import crossings
 
-
-@pytest.fixture(autouse=True)
-def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(style, "DPI", 40)
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 
 def word(directory: Path, rows: Rows, claim: str) -> str:
@@ -139,10 +135,7 @@ def test_a_crossing_stands_where_it_was_put(tmp_path: Path) -> None:
     ("limit", "text"),
     [
         (5.0, "at 10 % IPM is faster; between 10 and 40 % GI dual becomes faster"),
-        (
-            1.5,
-            "none: GI dual is faster from 40 to 80 % (1 not comparable)",
-        ),  # too early
+        (1.5, "none: GI dual is faster from 40 to 80 % (1 not comparable)"),  # too early
     ],
 )
 def test_a_crossing_beside_a_stopped_run_is_an_interval(tmp_path: Path, limit: float, text: str) -> None:

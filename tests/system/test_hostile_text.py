@@ -29,12 +29,8 @@ from report.writers.solution import write as write_solution
 
 HOSTILE = "<b>x</b>|![i](http://e)`c`$a_b$ *e*\n# h\x1b[31m\u202e\ud800"
 LITERAL = r"&lt;b&gt;x&lt;/b&gt;\|\!\[i\](http://e)&#96;c&#96;\$a_b\$ \*e\* \# h�\[31m��"
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 FORMULAS = ["+1+1", "-2+3", "@SUM(A1)", " =1"]
-
-
-@pytest.fixture(autouse=True)
-def _coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(style, "DPI", 40)
 
 
 def results(folder: Path, name: str) -> Path:

@@ -1,0 +1,120 @@
+"""What all sections have in common: each is left out without its rows, and can be linked to."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs
+
+import pandas as pd
+import pytest
+from matplotlib.image import imread
+from synthetic_results import everything, no_answer, results, row, write_rows
+
+from report.document.blocks import WIDEST, Section, Table, number
+from report.document.contents import contents
+from report.results.reader import Results, read
+from report.sections import SECTIONS, accuracy, drawn, methods, profiles, speed, steps, summary
+from report.writers import markdown
+from report.writers.markdown import write
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+LOW, HIGH = "4386/0100", "4386/1000"
+SWEEP = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
+FORMS = {form: row(LOW, "newton", form) for form in ("dual", "primal", "sparse")}
+COUNTED = row(LOW, "newton", details={"products": 15})
+
+
+def resolved(page: str) -> set[str]:
+    """What links within a page may lead to: its headings as GitHub names them, and named places."""
+    names: list[str] = []
+    for heading in re.findall(r"^#+ (.+)$", page, re.MULTILINE):
+        slug = re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+        count = sum(
+            name == slug or re.fullmatch(re.escape(slug) + r"-\d+", name) is not None for name in names
+        )
+        names.append(f"{slug}-{count}" if count else slug)
+    return {*names, *re.findall(r'<a id="([^"]+)"></a>', page)}
+
+
+@pytest.mark.parametrize(
+    "section", [of for _, of in SECTIONS], ids=lambda of: f"{of.__module__}.{of.__name__}"
+)
+def test_no_section_is_made_of_nothing(tmp_path: Path, section: Any) -> None:
+    assert section(results(tmp_path, [])) is None
+
+
+@pytest.mark.parametrize(
+    ("section", "rows"),
+    [
+        *((of, SWEEP) for of in (accuracy.costs, accuracy.tolerances, accuracy.residuals)),
+        *((of, [row(LOW, "newton")]) for of in (speed.relative, speed.machine)),  # without benchmarks
+        (summary.advice, [row(LOW, "a"), row(HIGH, "a")]),  # one method alone
+        (methods.section, [COUNTED, row(LOW, "piqp")]),  # one that counts is no comparison
+        (steps.from_scene, [FORMS["dual"], FORMS["primal"]]),  # it takes dense and sparse forms,
+        (steps.from_scene, [FORMS["sparse"]]),
+        (steps.from_scene, [FORMS["dual"], FORMS["sparse"] | {"case": 3}]),  # no case of a series, which has
+        (steps.from_scene, [FORMS["dual"], FORMS["sparse"] | {"status": "unsupported"}]),  # paid nothing
+        (profiles.section, [row(f"4386/{k}", s) for k in (100, 101, 102, 103) for s in "ab"]),  # four scenes
+    ],
+)
+def test_without_its_rows_there_is_no_section(tmp_path: Path, section: Any, rows: list[Any]) -> None:
+    assert section(results(tmp_path, rows)) is None
+
+
+def test_scenes_ladders_and_drawn_scenes_have_sections_of_their_own(tmp_path: Path) -> None:
+    found = results(tmp_path, [row(LOW, "a")])
+    assert drawn.section(found.about("drawn")) is None
+    assert found.about("ladders").rows.empty
+    text = write(write_rows(tmp_path / "failed", [row(LOW, "a", **no_answer("crashed"))])).read_text("utf-8")
+    titles = ["Summary", "Every solver on every scene", "Machine and method"]
+    assert re.findall("^## (.*)", text, re.M) == titles
+    assert not [*(tmp_path / "failed" / "report").glob("*.png")]
+    assert "Contents" not in text  # of a short report
+    assert "Nothing was measured" in write(write_rows(tmp_path / "empty", [])).read_text("utf-8")
+
+
+def test_a_whole_report_has_every_section_its_pictures_and_links_that_lead_somewhere(tmp_path: Path) -> None:
+    folder = everything(tmp_path, {4386: [107, 1074], 6112: [1500]})
+    lines = map(json.loads, (folder / "measurements.jsonl").read_text("utf-8").splitlines())
+    write_rows(folder, [line | {"key": f"{line['scene']} no={k}"} for k, line in enumerate([*lines])])
+    page, cells = write(folder).read_text("utf-8"), read(folder).cells
+    assert len(re.findall("^## ", page, re.M)) == 7
+    for name in re.findall(r"!\[.*?\]\((.*?)\)", page):
+        assert imread(folder / "report" / name)[..., :3].std() > 0.05, f"{name} is blank"
+    assert re.search(r"\| +4386, 2193 \| +1074 \(49.0 %\) \| +2.63e6 \| +20.0 \|", page)
+    assert not {"nan", "none"} & set(re.findall(r"\w+", page.lower().replace("none on every", "")))
+    links = re.findall(r"\]\(#([^)]+)\)", page)
+    assert {"summary", "machine-and-method"} <= set(links) <= resolved(page)
+    assert sum(link.startswith("scene-") for link in links) == 3
+    rows = [parse_qs(query)["row"][0] for query in re.findall(r"\]\(index\.html#([^)]+)\)", page)]
+    assert sorted(rows) == sorted(cells["key"])
+    assert page.index("Contents: ") < page.index("## Summary")
+    rules = re.findall(r"^\|[:|-]+\|$", page, re.MULTILINE)
+    assert len(rules) > 5
+    assert max(rule.count("|") - 1 for rule in rules) <= WIDEST
+
+
+def test_a_section_is_a_function_in_the_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def greeting(results: Results) -> Section:
+        return Section(f"Hello to {len(results.rows)} row", [])
+
+    monkeypatch.setattr(markdown, "SECTIONS", [("scenes", greeting), *SECTIONS])
+    text = write(write_rows(tmp_path / "out", [row(LOW, "a")])).read_text("utf-8")
+    assert re.findall("^## (.*)", text, re.M)[:2] == ["Hello to 1 row", "Summary"]
+
+
+def test_equal_titles_lead_to_a_heading_each() -> None:
+    page = "## One, two\n\n## Other\n\n## One, two\n"
+    found = re.findall(r"\(#([^)]+)\)", contents(["One, two", "Other", "One, two"]))
+    assert found == ["one-two", "other", "one-two-1"]
+    assert set(found) == resolved(page)
+
+
+def test_further_columns_continue_below_with_the_first_repeated() -> None:
+    data = pd.DataFrame({f"c{k}": [k] for k in range(12)})
+    table = Table("", "", data, [number(f"c{k}", f"c{k}") for k in range(12)], keys=2)
+    parts = [part.split("\n")[0].split("|")[1:-1] for part in table.markdown.split("\n\n")]
+    headings = [[cell.strip() for cell in part] for part in parts]
+    assert all(part[:2] == ["c0", "c1"] and len(part) <= WIDEST for part in headings)
+    assert [name for part in headings for name in part[2:]] == [f"c{k}" for k in range(2, 12)]
