@@ -120,11 +120,10 @@ def solver_class(module: ModuleType, path: Path) -> type[Solver]:
     complete = [cls for cls in own if not inspect.isabstract(cls)]
     if len(complete) == 1:
         return complete[0]
-    if len(complete) > 1:
-        names = ", ".join(cls.__name__ for cls in complete)
-        raise InputError.one(path, "Solver", names, "must be one subclass of Solver, not several")
+    names = ", ".join(cls.__name__ for cls in complete or own) or None
+    allowed = "the file must define a subclass of Solver (from solvers.base import Solver)"
     if own:
-        message = "the subclass of Solver must define solve(self, ready, load, tolerance)"
-        raise InputError.one(path, "Solver", own[0].__name__, message)
-    message = "the file must define a subclass of Solver (from solvers.base import Solver)"
-    raise InputError.one(path, "Solver", None, message)
+        allowed = "the subclass of Solver must define solve(self, ready, load, tolerance)"
+    if complete:
+        allowed = "must be one subclass of Solver, not several"
+    raise InputError.one(path, "Solver", names, allowed)
