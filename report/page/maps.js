@@ -36,7 +36,7 @@ async function mapView(main) {
   about.textContent = `${map.name}: ${field.name}, ${field.unit}. ${number(d3.min(values[0]))} to ${number(d3.max(values[0]))} ${field.unit} at ${map.contacts} contacts`
     + (map.every > 1 ? `, every ${map.every}th of which is drawn` : "") + (!map.marks.length ? "." : DATA.kind === "answer" ? ". Circles: fasteners and clamps." : ". Circles: fasteners.")
     + (map.exceeded ? " A click on a contact shows how often its gap is exceeded." : "")
-    + (leftOut.length ? ` Left out to keep the page small: ${leftOut.join(", ")}.` : "");
+    + (leftOut.length ? ` Left out, too large or damaged: ${leftOut.join(", ")}.` : "");
   if (map.exceeded && STATE.node) main.append(await exceedance(map, Number(STATE.node), nodes));
 }
 

@@ -1,4 +1,4 @@
-"""Accuracy: what it costs, whose tolerance and which residual can be trusted."""
+"""Accuracy: what it costs, and whose tolerance can be trusted."""
 
 from __future__ import annotations
 
@@ -11,8 +11,16 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from report.analysis.precision import ACCURACIES, CURVE_POINTS, curves, judged, pareto, swept
-from report.analysis.standings import fastest_first, geometric_mean
+from report.analysis.standings import (
+    ACCURACIES,
+    CURVE_POINTS,
+    curves,
+    fastest_first,
+    geometric_mean,
+    judged,
+    pareto,
+    swept,
+)
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.figures import style
@@ -187,26 +195,3 @@ def trust(results: Results) -> pd.DataFrame:
         solved=rows.groupby("method").size(), worst_ratio=rows.groupby("method")["worst_ratio"].max()
     )
     return lines.loc[in_order(rows, "method")].reset_index()
-
-
-def residuals(results: Results) -> Section | None:
-    """A small residual does not prove a small error."""
-    cells = swept(results).dropna(subset=["error", "primal_residual"])
-    if cells.empty:
-        return None
-    small = cells[cells["primal_residual"] <= cells["limit_mm"]]
-    outside = small[small["error"] > small["limit_mm"]]
-    lines = pd.DataFrame({"method": in_order(cells, "method")})
-    for name, runs in (("answers", cells), ("small_residual", small), ("outside", outside)):
-        lines[name] = lines["method"].map(runs["method"].value_counts()).fillna(0)
-    lines["worst_error_mm"] = lines["method"].map(small.groupby("method")["error"].max())
-    columns = [
-        word("solver (form)", "method"),
-        number("answers", "answers", whole),
-        number(f"primal residual ≤ {results.limit}", "small_residual", whole),
-        number("of these, error outside", "outside", whole),
-        number("their largest error, mm", "worst_error_mm", power),
-    ]
-    caption = "*What a primal residual within the limit implies*: how often the error was outside it."
-    table = Table("residual-error", caption, lines, columns)
-    return Section("Residuals and displacement error", [table])

@@ -9,14 +9,14 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.checks import commits_text
 from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
-from report.document.blocks import Block, Column, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import csv_frame, file_name
-from report.document.numbers import MISSING, as_number, counted, power, significant, whole
-from report.page.comparison import comparison_data
+from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
+from report.page.write import Data, banner
 from report.page.write import write as write_page
-
-from .pages import written
+from report.writers.pages import written
 
 
 @dataclass(frozen=True)
@@ -113,3 +113,54 @@ def _blocks(table: pd.DataFrame, summary: str, prefix: str) -> list[Block]:
     if len(solvers):
         blocks.append(Table(f"{prefix}solvers", "*Solver by solver.*", solvers, SOLVERS))
     return blocks
+
+
+#: name, heading, whether it is a number
+PAGE_COLUMNS = [
+    ("measurement", "measurement", False),
+    ("change", "change", False),
+    ("verdict_old", "verdict before", False),
+    ("verdict_new", "after", False),
+    ("error_mm_old", "error before, mm", True),
+    ("error_mm_new", "after, mm", True),
+    ("digits_lost", "digits lost", True),
+    ("iterations_old", "iterations before", True),
+    ("iterations_new", "after", True),
+    ("seconds_old", "seconds before", True),
+    ("seconds_new", "after", True),
+    ("ratio", "ratio of times", True),
+    ("ratio_least", "at least", True),
+    ("ratio_most", "at most", True),
+    ("status_old", "status before", False),
+    ("status_new", "after", False),
+]
+
+
+def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]], rows: pd.DataFrame) -> Data:
+    """What the page of a comparison shows. pairs : old, new, summary, and the table of each; rows : of all
+    runs, with their `side`.
+    """
+    return {
+        "kind": "compare",
+        "banner": _banner(rows),
+        "columns": [list(column) for column in PAGE_COLUMNS],
+        "comparisons": [
+            {"old": old, "new": new, "summary": summary, "lines": [_line(line) for line in records(table)]}
+            for old, new, summary, table in pairs
+        ],
+    }
+
+
+def _banner(rows: pd.DataFrame) -> Data:
+    sides = [(str(side), of_side) for side, of_side in rows.groupby("side", sort=False)]
+    changed = [side for side, of_side in sides if (of_side["clean"] == 0).any()]
+    warned = [f"Rows of {listed(changed)} were measured with uncommitted changes."] if changed else []
+    if rows["machine"].nunique() > 1:
+        warned.append("The rows come from several machines; times are compared within one machine only.")
+    code = "; ".join(f"{side}: {commits_text(of_side)}" for side, of_side in sides)
+    return banner(rows, commits=code, counts=f"{len(rows)} rows", warnings=warned)
+
+
+def _line(line: dict[str, Any]) -> Data:
+    names = ["group", *(name for name, *_ in PAGE_COLUMNS)]
+    return {name: None if pd.isna(line[name]) else line[name] for name in names}

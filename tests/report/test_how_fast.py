@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from synthetic_results import row, write_rows
 
-from report.analysis.how_fast import FROM_SCENE, ONE_MORE, how_fast
 from report.results.reader import Results, read
 from report.sections import how_fast as shown
+from report.sections.how_fast import FROM_SCENE, ONE_MORE, how_fast
 
 #: solver, form, owner, seconds to solve on scenes 0 and 1; None: outside the limit.
 LINES: list[tuple[str, str, str, tuple[float | None, float | None]]] = [

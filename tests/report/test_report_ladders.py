@@ -11,16 +11,16 @@ from matplotlib.image import imread
 from synthetic_results import no_answer, write_rows
 from synthetic_results import row as any_row
 
-from report.analysis.outcomes import (
+from report.results.reader import read
+from report.sections.ladders import (
     CORRECT,
     CORRECT_UNCLAIMED,
     NO_ANSWER,
     UNJUDGED,
     WRONG_CLAIMED,
     WRONG_UNCLAIMED,
+    rungs_in_order,
 )
-from report.results.reader import read
-from report.sections.ladders import rungs_in_order
 from report.writers.markdown import write
 
 EASY, MIDDLE, HARD, ODD = "hard/steep/1e1", "hard/steep/1e5", "hard/steep/1e9", "hard/odd/one"

@@ -65,20 +65,7 @@ def test_with_preparation_the_ratio_is_to_the_library_that_is_fastest_with_its_o
     assert cases.loc["newton", ["to_library", "total_to_library"]].tolist() == pytest.approx([1 / 8, 4 / 10])
 
 
-def test_what_is_left_out_is_compared_with_the_whole_on_the_same_scene(tmp_path: Path) -> None:
-    rows = [timed(LOW, "ipm-fast", 1.0), timed(HIGH, "ipm-fast", 10.0)]
-    rows += [timed(scene, "ipm-fast", s, variant="no finish") for scene, s in ((LOW, 3.0), (HIGH, 20.0))]
-    rows += [timed(LOW, "ipm-fast", 9.0, variant="bad", verdict="outside")]
-    found = table(speed.variants(results(tmp_path, rows)))
-    data = found.data.set_index("method")
-    line = data.loc["ipm-fast (dual) no finish"]
-    assert [line[f"ratio{end}"] for end in ("", "_least", "_most")] == pytest.approx([2.5, 2.0, 3.0])
-    assert data.loc["ipm-fast (dual) bad", "within"] == 0
-    assert "2.50 (2.0 to 3.0)" in found.markdown
-
-
 def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: Path) -> None:
-    """Nothing of order m × m is timed in the sparse form: it leaves the benchmarks of Q as they are."""
     rows = []
     for n in (1000, 2000, 4000, 8000, 100_000):
         grid = {"scene": f"scaling/{n}", "n": n, "m": n // 2}
@@ -90,11 +77,9 @@ def test_the_exponents_of_the_scaling_are_those_of_the_powers_put_in(tmp_path: P
             rows.append(timed(LOW, "newton", 1e-6 * n**1.5, **figures, **memory) | grid)
     section = speed.scaling(results(tmp_path, rows))
     data = table(section).data.set_index("method")
-    assert data["load_case_s"].to_dict() == pytest.approx(
-        {"newton (sparse)": 1.0, "newton (dual)": 1.5, "one Cholesky of Q": 3.0, "one product Qv": 2.0}
-    )
+    assert data["load_case_s"].to_dict() == pytest.approx({"newton (sparse)": 1.0, "newton (dual)": 1.5})
     assert data.loc["newton (dual)", "working_mib"] == pytest.approx(2.0)
-    assert data["largest"].tolist() == [100_000, 8000, 8000, 8000]
+    assert data["largest"].tolist() == [100_000, 8000]
     with style.applied():
         section.blocks[0].drawing.savefig(tmp_path / "scaling.png")
     assert speed.scaling(results(tmp_path / "few", rows[:4])) is None

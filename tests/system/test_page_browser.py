@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlencode
@@ -22,7 +21,6 @@ from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
 from report.results.series import read as read_series
-from report.sections.profiles import ratios
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
 
@@ -180,23 +178,6 @@ def test_the_ranking_is_by_the_share_within_then_by_time(
         assert within == lines["good"].sum()[name]
         if within:
             assert mean == pytest.approx(means[name])
-
-
-@pytest.mark.parametrize("limit", ["1e-7", "1e-9"])
-def test_the_profiles_are_those_of_the_report(chromium: Any, tmp_path: Path, limit: str) -> None:
-    found = read(everything(tmp_path, {4386: [100, 800, 1500], 6112: [300, 2000]}))
-    opened(chromium, write(tmp_path / "index.html", "Made up", run_data(found), tmp_path), f"limit={limit}")
-    asked = replace(found, cells=found.cells.assign(limit_mm=float(limit)))
-    times = ratios(asked.cells)
-    shown = chromium.execute_script(
-        "const {ratios, count} = profiles(filtered(), Number(STATE.limit));"
-        "const met = list => list.filter(Number.isFinite).sort(d3.ascending);"
-        "return [count, [...ratios].map(([name, list]) => [name, met(list)])]"
-    )
-    assert shown[0] == len(times) == 5
-    assert {name for name, _ in shown[1]} == set(times)
-    for name, values in shown[1]:
-        np.testing.assert_allclose(values, np.sort(times[name][np.isfinite(times[name])]))
 
 
 def test_the_csv_has_the_cells_shown_judged_at_the_limit(

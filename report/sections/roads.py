@@ -1,4 +1,4 @@
-"""The seconds of each step on the way to an answer: from the scene on, or those of the solver alone."""
+"""The seconds of every stage on the way from the scene to the answer."""
 
 from __future__ import annotations
 
@@ -6,20 +6,24 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure as Drawing
+from matplotlib.patches import Patch
 
 from report.analysis.roads import LOAD_CASES, STAGES, roads
 from report.analysis.seconds import seconds_text
-from report.analysis.standings import best_tolerances, shown
-from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.analysis.standings import best_tolerances
+from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
+from report.document.escape import short
 from report.document.numbers import counted, significant, whole
 from report.figures import style
-from report.figures.bars import Looks, stacked
 from report.results.labels import in_order
 from report.results.reader import Results
 
 MADE = ("model_s", "K_s", "factors_s", "Q_s")  # before the solver's own preparation
-FROM_SCENE: Looks = {
+#: Of each stage its name, colour and hatch.
+LOOKS = {
     "model_s": ("finite-element model", "#C9C9C9", None),
     "K_s": ("condensation", "#5A5A5A", None),
     "factors_s": ("factors of K", style.PURPLE, None),
@@ -28,17 +32,13 @@ FROM_SCENE: Looks = {
     "solving_s": ("set-up and solve", style.BLUE, None),
     "recovery_s": ("p and x of the dual", style.SKY, "...."),
 }
-STEPS: Looks = {
-    "convert_s": ("convert", "#B8B8B8", None),
-    "prepare_s": ("prepare, once per assembly", style.GREEN, None),
-    "setup_s": ("set up", style.ORANGE, "////"),
-    "solve_s": ("solve", style.BLUE, None),
-    "form_s": ("p and x of the dual", style.SKY, "...."),
-}
+MOST = 12  # lines of a panel
+LONGEST = 60  # characters of a name
+ROW, AROUND = 0.19, 0.6  # inches: a bar; the title and the axis of a panel
 
 
-def from_scene(results: Results) -> Section | None:
-    """The seconds of every stage, in a run with sparse and dense forms."""
+def section(results: Results) -> Section | None:
+    """In a run with sparse and dense forms."""
     lines = roads(results)
     if lines.empty:
         return None
@@ -66,7 +66,7 @@ def from_scene(results: Results) -> Section | None:
             "*From the scene to the answer of one load case*, the fastest first, in seconds; of each size, "
             "the scenes with the fewest and the most active contacts."
         )
-        blocks.insert(0, Figure("roads", caption, stacked(answered, "total_1_s", FROM_SCENE)))
+        blocks.insert(0, Figure("roads", caption, _stacked(answered)))
     return Section("From scene to answer", blocks)
 
 
@@ -82,15 +82,30 @@ def _at_the_ends(cells: pd.DataFrame) -> pd.DataFrame:
     return cells[cells["scene"].isin([*scenes.first(), *scenes.last()])]
 
 
-def steps(results: Results) -> Section | None:
-    """Where no stage before the solver is known: the solver's own steps."""
-    cells = best_tolerances(shown(results.cells))
-    cells = _at_the_ends(cells[(cells["verdict"] == "within") & (cells["total_s"] > 0)])
-    if cells.empty or len(roads(results)):
-        return None
-    caption = (
-        "*Where the time goes*, within the limit, the fastest first; of each size, the scenes with the "
-        "fewest and the most active contacts. The factor of K and Q, which the dense forms share, are not "
-        "included."
-    )
-    return Section("Where the time goes", [Figure("time-steps", caption, stacked(cells, "total_s", STEPS))])
+def _stacked(lines: pd.DataFrame) -> Drawing:
+    """A panel of bars for each scene, the fastest MOST lines of it."""
+    scenes = [
+        of.sort_values("total_1_s").head(MOST)
+        for _, of in lines.groupby(["n", "active", "scene"], dropna=False)
+    ]
+    heights = [AROUND + ROW * len(of) for of in scenes]
+    drawing = style.figure(sum(heights) + 0.5)
+    panels = drawing.subplots(len(scenes), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for axes, of in zip(panels, scenes, strict=True):
+        left = np.zeros(len(of))
+        for name, (_, color, hatch) in LOOKS.items():
+            look: Any = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.4}
+            axes.barh(np.arange(len(of)), of[name], left=left, height=0.74, **look)
+            left += of[name].to_numpy(dtype=float)
+        for place, line in enumerate(records(of)):
+            at: Any = {"textcoords": "offset points", "va": "center", "fontsize": 8}
+            axes.annotate(significant(line["total_1_s"]), (left[place], place), (4, 0), **at)
+        axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of) - 0.5, -0.5), xlabel="seconds")
+        axes.set_yticks(range(len(of)), [short(name, LONGEST) for name in of["method"]])
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+        axes.set_title(f"n = {whole(of['n'].iloc[0])}, {whole(of['active'].iloc[0])} active")
+    used = [look for name, look in LOOKS.items() if (lines[name] > 0).any()]
+    handles = [Patch(facecolor=color, hatch=hatch, label=text) for text, color, hatch in used]
+    drawing.legend(handles=handles, loc="outside lower center", ncols=4)
+    return drawing
