@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from report.results.labels import in_order
+from harness.results.schema import ANSWERED
+from report.document.numbers import MISSING, significant
 from report.results.reader import Results
+from report.results.rows import CELL, in_order
 
 #: The accuracies for which costs and settings are given, mm.
 ACCURACIES = (1e-3, 1e-5, 1e-7, 1e-9)
@@ -23,6 +26,13 @@ CURVE_POINTS = 3
 ZERO_ERROR_MM = 1e-16  # counts as an error of zero
 #: A reference whose error bound exceeds this share of an accuracy cannot judge it.
 BOUND_SHARE = 0.1
+#: Lines that take at most this many times as long as the fastest count as equally fast: single runs on a
+#: shared machine vary by as much.
+TIE = 1.15
+#: A chart shows the methods that were run on at least this share of its scenes.
+SHOWN = 0.5
+NOT_RUN = ("unsupported", "not_run")
+ROUND = ["scene", "threads"]
 
 
 def with_errors(cells: pd.DataFrame) -> pd.DataFrame:
@@ -62,14 +72,6 @@ def accurate(cells: pd.DataFrame, accuracy_mm: float) -> pd.Series[bool]:
 def judged(cells: pd.DataFrame, accuracy_mm: float) -> bool:
     """Whether the references of some cells are accurate enough to decide that an error is ≤ accuracy_mm."""
     return not cells["reference_bound_mm"].max() > BOUND_SHARE * accuracy_mm
-
-
-#: Lines that take at most this many times as long as the fastest count as equally fast: single runs on a
-#: shared machine vary by as much.
-TIE = 1.15
-#: A chart shows the methods that were run on at least this share of its scenes.
-SHOWN = 0.5
-NOT_RUN = ("unsupported", "not_run")
 
 
 def geometric_mean(values: pd.Series[float]) -> float:
@@ -166,3 +168,40 @@ def recommended(
             other = lines[among].iloc[0]
             line |= {name: other["label"], f"to_{name}": other["seconds"] / best["seconds"]}
     return line
+
+
+def timed(cells: pd.DataFrame) -> pd.DataFrame:
+    """With `at_least`: seconds per load case if the answer is within the limit; for a run ended by the time
+    limit or an iteration limit, the time it had taken by then; else missing. `cut`: it is only that lower
+    bound.
+    """
+    within = cells["verdict"] == "within"
+    late = (cells["status"] == "time_limit") & ~within
+    spent = (cells["status"] == "iteration_limit") & ~within
+    at_least = cells["load_case_s"].where(within | spent, cells["time_limit_s"].where(late))
+    return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
+
+
+def seconds_text(cell: Mapping[str, Any]) -> str:
+    """The seconds per load case, or why there is no answer within the limit."""
+    if cell["verdict"] == "within":
+        return significant(cell["load_case_s"])
+    if cell["verdict"] in ANSWERED:
+        return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
+    if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
+        return f"> {cell['time_limit_s']:.4g}"
+    return str(cell["status"]).replace("_", " ") or MISSING
+
+
+def of_fastest(owner: str, rows: pd.DataFrame, *names: str) -> pd.Series[float]:
+    """For each row the seconds of the fastest solver of that owner on its scene with as many threads: the
+    least of the medians of any of the names.
+    """
+    medians = rows[rows["owner"] == owner].groupby(CELL, dropna=False)[[*names]].median().min(axis=1)
+    return rows.join(medians.groupby(ROUND).min().rename("fastest"), on=ROUND)["fastest"]
+
+
+def spreads(rows: pd.DataFrame, by: list[str], names: list[str]) -> pd.DataFrame:
+    """The medians over the groups, and with the endings _least and _most the ranges."""
+    found = rows.groupby(by, dropna=False)[names].agg(["median", "min", "max"])
+    return found.set_axis([f"{name}{end}" for name in names for end in ("", "_least", "_most")], axis=1)

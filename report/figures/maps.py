@@ -32,6 +32,14 @@ MANY = 60
 MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", "#E8112D", "#444444"
 THINNEST = 0.02  # a map's shorter side over its longer one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
+# inches
+LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.3, 0.35, 0.5
+BESIDE, BELOW = 0.5, 0.4  # between maps; the title of the next one is below a map
+NAME_LEFT, NAME_BELOW = 0.6, 0.27  # of an axis, from the map
+LOWEST, TALLEST = 0.4, 5.5  # of a row, which has room for "y, mm"; of a map
+LETTER = 0.09  # of a title, an upper bound on average
+ENTRY, LINE = 1.7, 0.22  # of a legend
+BAR, FROM_MAPS, SHORTEST = 0.18, 0.25, 1.0  # of a colour bar: width, distance, least height
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,16 +165,6 @@ def outline(grid: Grid, inside: NDArray[np.bool_]) -> list[Array]:
 def _edges(nodes: Array) -> Array:
     """The borders of the nodes' cells: half-way between the nodes, and the ends of the grid."""
     return np.concatenate([nodes[:1], (nodes[1:] + nodes[:-1]) / 2, nodes[-1:]])
-
-
-# inches
-LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.3, 0.35, 0.5
-BESIDE, BELOW = 0.5, 0.4  # between maps; the title of the next one is below a map
-NAME_LEFT, NAME_BELOW = 0.6, 0.27  # of an axis, from the map
-LOWEST, TALLEST = 0.4, 5.5  # of a row, which has room for "y, mm"; of a map
-LETTER = 0.09  # of a title, an upper bound on average
-ENTRY, LINE = 1.7, 0.22  # of a legend
-BAR, FROM_MAPS, SHORTEST = 0.18, 0.25, 1.0  # of a colour bar: width, distance, least height
 
 
 @dataclass(frozen=True)

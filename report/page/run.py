@@ -22,9 +22,8 @@ from report.document.blocks import records
 from report.document.numbers import listed
 from report.figures.style import line_styles
 from report.page.write import Data, banner, column
-from report.results.labels import in_order
 from report.results.reader import Results
-from report.results.rows import CELL
+from report.results.rows import CELL, in_order
 
 from .maps import scene_maps
 

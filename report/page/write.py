@@ -23,12 +23,12 @@ SCRIPTS = (
     "matrix",
     "details",
     "plots",
-    "solver",
     "maps",
-    "curves",
     "compare",
     "page",
 )
+Data = dict[str, Any]
+DIGITS = 1 << 11  # what is dropped of a float32's mantissa: 3.6 decimal digits are left
 
 
 def write(path: Path, title: str, data: Data, directory: Path | None = None) -> Path:
@@ -75,10 +75,6 @@ def banner(rows: pd.DataFrame, **more: object) -> Data:
 
 def _minute(time: str) -> str:
     return f"{time[:16].replace('T', ' ')} UTC"
-
-
-Data = dict[str, Any]
-DIGITS = 1 << 11  # what is dropped of a float32's mantissa: 3.6 decimal digits are left
 
 
 def column(values: pd.Series[Any]) -> list[Any] | Data:

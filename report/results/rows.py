@@ -1,4 +1,4 @@
-"""The rows of a results directory as a data frame, and the repeats of a measurement merged into a cell.
+"""Rows as a data frame, and cells: their repeats merged, named in as few words as distinguish them.
 
 Of repeats, nothing looks better than it was.
 """
@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.results.schema import ANSWERED, STEPS, VERDICTS, of_kind
+from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, of_kind
 from report.document.escape import quoted
-from report.results.labels import named
+from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
 CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
+MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
+LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 
 def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
@@ -72,9 +74,7 @@ def _text(value: object) -> str:
     return "" if value is None or value != value else str(value)
 
 
-MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
 MEDIANS += ["solver_reported_s", "cholesky_s", "product_s"]
-LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 
 def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:
@@ -108,3 +108,55 @@ def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:
     cells["once_s"] = cells[["convert_s", "prepare_s"]].sum(axis=1).where(answered)
     cells["total_s"] = cells["load_case_s"] + cells["once_s"]
     return named(cells)
+
+
+def named(cells: pd.DataFrame) -> pd.DataFrame:
+    """Cells with `method`, 'solver (form)' with the variant if it has one and the number of threads
+    if several were used, and `label`, the same with the tolerance if there are several that were asked for.
+    """
+    variant = cells["variant"].map(lambda name: f" {name}" if name else "")
+    threads = cells["threads"].map(lambda k: f" × {counted(int(k), 'thread')}")
+    tolerance = cells["tolerance"].map(lambda value: f" {tidy_power(value)}")
+    by_line = cells.groupby(["solver", "form", "variant"], dropna=False)
+    threads = threads.where(by_line["threads"].transform("nunique") > 1, "")
+    several = by_line["tolerance"].transform("nunique") > 1
+    tolerance = tolerance.where(several & (cells["searched"] != 1.0), "")
+    method = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
+    return cells.assign(method=method, label=method + tolerance)
+
+
+def named_by(cells: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """Cells named group by group: for tables with columns for the `keys`, which the names then omit."""
+    groups = [named(group) for _, group in cells.groupby(keys)]
+    return pd.concat([named(cells.iloc[:0]), *groups], ignore_index=True)
+
+
+def lines_in_order(lines: pd.DataFrame, cells: pd.DataFrame, *first: str) -> pd.DataFrame:
+    """One line per `method` of some cells, indexed or not: sorted by what comes first, then in the order of
+    `in_order`.
+    """
+    places = {name: place for place, name in enumerate(in_order(cells, "method"))}
+    lines = lines.reset_index() if "method" in lines.index.names else lines
+    ordered = lines.assign(place=lines["method"].map(places)).sort_values(
+        [*first, "place"], ignore_index=True
+    )
+    return ordered.drop(columns="place")
+
+
+def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
+    """The labels (or method, or solvers) of some cells in the one order used everywhere: in the
+    order of OWNERS, then by name, and the forms of a solver in the order of FORMS.
+    """
+    lines = cells.drop_duplicates(name)
+    places = [
+        (OWNERS.index(owner), solver, form_place(form), str(label))
+        for owner, solver, form, label in zip(
+            lines["owner"], lines["solver"], lines["form"], lines[name], strict=True
+        )
+    ]
+    return [label for *_, label in sorted(places)]
+
+
+def form_place(form: str) -> int:
+    """The place of a form in the order of FORMS; a form not named there comes last."""
+    return FORMS.index(form) if form in FORMS else len(FORMS)

@@ -16,11 +16,11 @@ from matplotlib.patches import Patch
 
 from harness.results.schema import LADDERS, OWNERS
 from report.document.blocks import Block, Figure, Section, Table, Text, number, records, word
-from report.document.numbers import MISSING, as_number, counted, power, whole
+from report.document.numbers import as_number, counted, power, whole
 from report.figures.grid import Cell, Group, grid
 from report.figures.style import BLUE, VERMILLION
-from report.results.labels import in_order
 from report.results.reader import Results
+from report.results.rows import in_order
 
 CORRECT, CORRECT_UNCLAIMED = "correct, reported solved", "correct, not reported solved"
 WRONG_UNCLAIMED, WRONG_CLAIMED = "wrong, not reported solved", "wrong, reported solved"
@@ -36,7 +36,6 @@ OUTCOMES = {
     ("cannot_be_judged", True): UNJUDGED,
 }
 KINDS = list(dict.fromkeys(OUTCOMES.values()))
-NOT_RUN = "not run"
 
 ROW, LEGEND = 0.16, 0.5  # inches
 WIDEST = 66.0  # columns
@@ -84,7 +83,6 @@ def section(results: Results) -> Section | None:
             ladder_map(cells, order, ladders),
         ),
         honesty(cells, order),
-        breaking_points(cells, order, ladders),
     ]
     return Section("Where each solver fails, and whether it reports it", blocks)
 
@@ -168,29 +166,6 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
     columns.append(number("largest error / limit, reported solved", "worst_share", power))
     caption = "*Wrong answers reported as solved* are the worst outcome."
     return Table("honesty", caption, table.reset_index(), columns)
-
-
-def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Table:
-    by_line = {key: line for key, line in cells.groupby(["label", "ladder"])}
-    lines = [
-        {"label": label}
-        | {ladder: _first_broken(by_line.get((label, ladder)), rungs) for ladder, rungs in ladders.items()}
-        for label in order
-    ]
-    columns = [word("solver (form)", "label"), *(word(ladder, ladder) for ladder in ladders)]
-    caption = (
-        "*Breaking points: the first rung of each ladder without a correct answer.* ×: reported as solved. "
-        f"{MISSING}: correct on every rung that was run."
-    )
-    return Table("breaking-points", caption, pd.DataFrame(lines), columns)
-
-
-def _first_broken(line: pd.DataFrame | None, rungs: list[str]) -> str:
-    if line is None:
-        return NOT_RUN
-    broken = line[line["verdict"] != "within"].set_index("rung")["outcome"]
-    first = next((rung for rung in rungs if rung in broken), MISSING)
-    return f"{first} ×" if broken.get(first) == WRONG_CLAIMED else first
 
 
 def rungs(results: Results) -> Section | None:

@@ -1,8 +1,8 @@
-"""The seconds of every stage on the way from the scene to the answer."""
+"""How fast is it, from the scene on? Against libraries and textbook methods, and stage by stage."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -11,16 +11,18 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Patch
 
+from harness.results.schema import OWNERS
 from report.analysis.roads import LOAD_CASES, STAGES, roads
-from report.analysis.seconds import seconds_text
-from report.analysis.standings import best_tolerances
+from report.analysis.standings import best_tolerances, seconds_text
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.escape import short
 from report.document.numbers import counted, significant, whole
 from report.figures import style
-from report.results.labels import in_order
 from report.results.reader import Results
+from report.results.rows import in_order
 
+FROM_SCENE = "a load case, from the scene on"
+ONE_MORE = "one more load case on a known assembly"
 MADE = ("model_s", "K_s", "factors_s", "Q_s")  # before the solver's own preparation
 #: Of each stage its name, colour and hatch.
 LOOKS = {
@@ -35,6 +37,72 @@ LOOKS = {
 MOST = 12  # lines of a panel
 LONGEST = 60  # characters of a name
 ROW, AROUND = 0.19, 0.6  # inches: a bar; the title and the axis of a panel
+
+
+def how_fast(results: Results) -> Section | None:
+    """For every solver in every form: against libraries, against textbook methods, in seconds."""
+    table = ours_and_others(results)
+    if table.empty:
+        return None
+    columns = [
+        word("question", "question"),
+        number("n", "n", whole),
+        number("scenes", "scenes", whole),
+        Column("the fastest library takes", _times("library")),
+        Column("the fastest textbook method takes", _times("textbook")),
+        Column("the fastest of ours, s (worst scene)", _seconds),
+    ]
+    caption = (
+        "*How fast is it?* From the scene on: condensation, factors, Q and preparation included where a form "
+        "needs them. How many times as long as the fastest of ours: the median over the scenes (the least). "
+        "A scene on which none of them is within the limit counts as more than all others."
+    )
+    return Section("How fast is it?", [Table("how-fast", caption, table, columns, keys=2)])
+
+
+def _times(owner: str) -> Callable[[Mapping[str, Any]], str]:
+    def text(line: Mapping[str, Any]) -> str:
+        median, least = line[owner], line[f"{owner}_least"]
+        return f"{'more' if median == float('inf') else significant(median, 2)} × ({significant(least, 2)})"
+
+    return text
+
+
+def _seconds(line: Mapping[str, Any]) -> str:
+    return f"{significant(line['seconds'], 2)} ({significant(line['seconds_most'], 2)})"
+
+
+def ours_and_others(results: Results) -> pd.DataFrame:
+    """Per question and size n, over the scenes on which ours is within the limit:
+
+    seconds, seconds_most : of the fastest of ours, the median and the worst scene
+    library, library_least : how many times as long the fastest library takes, the median and the least
+    library_none : the scenes on which no library is within the limit; they count as more than all others
+    textbook, … : the same for the textbook methods
+
+    Empty unless libraries and textbook methods were measured on these scenes, in sparse and in dense forms.
+    """
+    ways = roads(results)
+    if ways.empty or not set(OWNERS) <= set(ways["owner"]):
+        return pd.DataFrame()
+    ways = ways[ways["verdict"] == "within"]
+    lines = []
+    for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
+        fastest = ways.groupby(["n", "scene", "owner"])[seconds].min().unstack("owner")
+        known = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
+        lines += [{"question": question, "n": n} | _line(of_size) for n, of_size in known.groupby("n")]
+    return pd.DataFrame(lines)
+
+
+def _line(fastest: pd.DataFrame) -> dict[str, Any]:
+    """fastest : seconds by scene and owner."""
+    line: dict[str, Any] = {"scenes": len(fastest), "seconds": fastest["ours"].median()}
+    line["seconds_most"] = fastest["ours"].max()
+    for owner in OWNERS[1:]:
+        times = fastest[owner] / fastest["ours"]
+        line |= {owner: times.fillna(float("inf")).median(), f"{owner}_least": times.min()}
+        line[f"{owner}_none"] = int(times.isna().sum())
+    return line
 
 
 def section(results: Results) -> Section | None:

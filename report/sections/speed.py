@@ -8,75 +8,22 @@ import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.fit import exponent
-from report.analysis.seconds import of_fastest, spreads
-from report.analysis.standings import best_tolerances, shown
+from report.analysis.standings import best_tolerances, shown, spreads
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import spread, whole
 from report.figures import style
 from report.figures.lines import MARKS, against_contacts, entries, styles_of, yardstick
-from report.results.labels import lines_in_order, named_by
 from report.results.reader import Results
+from report.results.rows import lines_in_order
 
 PANEL = 3.0  # inches
 FEWEST = 3  # sizes of a fit, and scenes of a size for a line against their contacts
-#: Whom a method is compared with, and their names in headings.
-OPPONENTS = {"library": "library", "textbook": "textbook method"}
 #: What grows with the size, its unit, and the smallest value that reflects the size of Q.
 GROWING = {
     "load_case_s": ("seconds per load case", 1e-2),
     "once_s": ("seconds of preparation per assembly", 1e-2),
     "working_mib": ("working memory, MiB", 8.0),
 }
-
-
-def load_cases(results: Results) -> pd.DataFrame:
-    """The rows within the limit, with `method`, the seconds per load case and their ratios.
-
-    load_case_s : set-up + solve + form
-    total_s : the same with the solver's own preparation, paid once per assembly
-    to_cholesky : load_case_s over one Cholesky factorisation of Q in the same process
-    to_library, total_to_library : over the fastest library on the same scene, in any form, by its median
-    to_textbook, total_to_textbook : the same over the fastest textbook method
-    """
-    rows = named_by(results.rows, ["threads"])
-    cases = rows[rows["verdict"] == "within"].copy()
-    cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
-    cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
-    cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
-    for owner in OPPONENTS:
-        cases[f"to_{owner}"] = cases["load_case_s"] / of_fastest(owner, cases, "load_case_s")
-        cases[f"total_to_{owner}"] = cases["total_s"] / of_fastest(owner, cases, "total_s")
-    return cases
-
-
-def relative(results: Results) -> Section | None:
-    """Per size and number of threads, in a run with machine benchmarks."""
-    cases = load_cases(results)
-    if cases.empty or not cases["cholesky_s"].notna().any():
-        return None
-    by, names = ["n", "threads", "method"], ["to_cholesky"]
-    names += [f"{of}{owner}" for owner in OPPONENTS for of in ("to_", "total_to_")]
-    table = spreads(cases, by, names)
-    table[names] = cases.groupby([*by, "scene"])[names].median().groupby(by).median()
-    table = table.assign(scenes=cases.groupby(by)["scene"].nunique(), runs=cases.groupby(by).size())
-    columns = [
-        number("n", "n", whole),
-        number("threads", "threads", whole),
-        word("solver (form)", "method"),
-        *(
-            Column(f"{what} / fastest {name}", spread(of + group))
-            for group, name in OPPONENTS.items()
-            for what, of in (("per load case", "to_"), ("with preparation", "total_to_"))
-        ),
-        Column("per load case / one Cholesky of Q", spread("to_cholesky")),
-    ]
-    caption = (
-        "*Relative times within the limit*: over those of the fastest library and of the fastest textbook "
-        "method on the same scene in any form, and over one Cholesky factorisation of Q in the same process. "
-        "The median over the scenes (range of all runs); 0.1 is ten times as fast."
-    )
-    table = lines_in_order(table, cases, "n", "threads")
-    return Section("Relative speed", [Table("speed-ratios", caption, table, columns, keys=3)])
 
 
 def machine(results: Results) -> Section | None:

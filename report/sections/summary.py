@@ -18,6 +18,10 @@ from report.figures.grid import Cell, Group, grid
 from report.results.reader import Results
 
 EACH, PREPARED, FROM_SCENE = "each load case", "one, with preparation", "one, from the scene on"
+ROW = 0.26  # inches
+WIDEST = 19.0  # columns
+SLOWEST = 100.0  # times as long as the fastest of a scene: the pale end of the shading
+SHORT = {"memory_limit": "memory", "iteration_limit": "iterations", "unsupported": "n/a"}
 
 
 def advice(results: Results) -> Section | None:
@@ -96,12 +100,6 @@ def _outside(row: Mapping[str, Any]) -> str:
 
 def _no_answer(row: Mapping[str, Any]) -> str:
     return f"{row['no_answer']} ({row['no_answer_because']})" if row["no_answer"] else "0"
-
-
-ROW = 0.26  # inches
-WIDEST = 19.0  # columns
-SLOWEST = 100.0  # times as long as the fastest of a scene: the pale end of the shading
-SHORT = {"memory_limit": "memory", "iteration_limit": "iterations", "unsupported": "n/a"}
 
 
 def explained(cells: pd.DataFrame, standings: pd.DataFrame, limit: str) -> str:

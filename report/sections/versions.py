@@ -8,13 +8,12 @@ import pandas as pd
 
 from report.analysis.checks import asked_for
 from report.analysis.comparison import MISSING, WORSE, compared
-from report.analysis.seconds import seconds_text
+from report.analysis.standings import seconds_text
 from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import QUOTED, file_name, short
 from report.document.numbers import counted, power, tidy_power, whole
-from report.results.labels import form_place
 from report.results.reader import Results
-from report.results.rows import cells_of
+from report.results.rows import cells_of, form_place
 
 MEANING = (
     "Worse than the version above: a verdict lost, an error more than ten times as large, or more than 10 % "
@@ -22,6 +21,8 @@ MEANING = (
     "version that failed could not be installed, or has another interface than its adapter calls."
 )
 LONGEST = 300  # characters of a reason
+MAX_DIGITS_LOST = 1.0  # an error ten times as large
+MAX_SLOWDOWN = 1.1
 
 
 def section(results: Results) -> Section | None:
@@ -59,10 +60,6 @@ def _blocks(solver: str, cells: pd.DataFrame) -> list[Block]:
         f"- {solver} {cell['solver_version']}: {line}" for cell, line in zip(failed, first, strict=True)
     ]
     return [*blocks, Text("\n".join(dict.fromkeys(reasons)))] if reasons else blocks
-
-
-MAX_DIGITS_LOST = 1.0  # an error ten times as large
-MAX_SLOWDOWN = 1.1
 
 
 def of_versions(results: Results) -> dict[str, pd.DataFrame]:

@@ -18,6 +18,18 @@ from report.page.write import Data, banner
 from report.page.write import write as write_page
 from report.writers.pages import written
 
+NOTE = (
+    "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
+    "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
+    "fewer than three are taken to vary by 15 %."
+)
+#: Columns of the page; those of texts first.
+TEXTS = ("measurement", "change", "verdict_old", "verdict_new", "status_old", "status_new")
+NUMBERS = (
+    *("error_mm_old", "error_mm_new", "digits_lost", "iterations_old", "iterations_new"),
+    *("seconds_old", "seconds_new", "ratio", "ratio_least", "ratio_most"),
+)
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -81,11 +93,6 @@ SOLVERS = [
     number("most", "most_digits_lost"),
     number("ratio of times, geometric mean", "ratio"),
 ]
-NOTE = (
-    "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
-    "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
-    "fewer than three are taken to vary by 15 %."
-)
 
 
 def write(out: Path, comparisons: list[Comparison]) -> Path:
@@ -115,27 +122,6 @@ def _blocks(table: pd.DataFrame, summary: str, prefix: str) -> list[Block]:
     return blocks
 
 
-#: name, heading, whether it is a number
-PAGE_COLUMNS = [
-    ("measurement", "measurement", False),
-    ("change", "change", False),
-    ("verdict_old", "verdict before", False),
-    ("verdict_new", "after", False),
-    ("error_mm_old", "error before, mm", True),
-    ("error_mm_new", "after, mm", True),
-    ("digits_lost", "digits lost", True),
-    ("iterations_old", "iterations before", True),
-    ("iterations_new", "after", True),
-    ("seconds_old", "seconds before", True),
-    ("seconds_new", "after", True),
-    ("ratio", "ratio of times", True),
-    ("ratio_least", "at least", True),
-    ("ratio_most", "at most", True),
-    ("status_old", "status before", False),
-    ("status_new", "after", False),
-]
-
-
 def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]], rows: pd.DataFrame) -> Data:
     """What the page of a comparison shows. pairs : old, new, summary, and the table of each; rows : of all
     runs, with their `side`.
@@ -143,7 +129,7 @@ def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]], rows: pd.Da
     return {
         "kind": "compare",
         "banner": _banner(rows),
-        "columns": [list(column) for column in PAGE_COLUMNS],
+        "columns": [[name, name.replace("_", " "), name in NUMBERS] for name in (*TEXTS, *NUMBERS)],
         "comparisons": [
             {"old": old, "new": new, "summary": summary, "lines": [_line(line) for line in records(table)]}
             for old, new, summary, table in pairs
@@ -162,5 +148,4 @@ def _banner(rows: pd.DataFrame) -> Data:
 
 
 def _line(line: dict[str, Any]) -> Data:
-    names = ["group", *(name for name, *_ in PAGE_COLUMNS)]
-    return {name: None if pd.isna(line[name]) else line[name] for name in names}
+    return {name: None if pd.isna(line[name]) else line[name] for name in ("group", *TEXTS, *NUMBERS)}

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.checks import code_warnings
-from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
 from report.document.blocks import Figure, Section, Table, number, word
 from report.document.escape import file_name
 from report.document.numbers import counted, significant, tidy_power
@@ -19,7 +18,7 @@ from report.figures.maps import Map, drawn, rooted
 from report.page.maps import series_maps
 from report.page.write import Data, banner
 from report.page.write import write as write_page
-from report.results.series import Array, Series, read
+from report.results.series import QUANTILES, Array, Series, convergence, exceedance, quantile_maps, read
 from report.writers.pages import emptied, written
 
 MAPPED = (0.5, 0.95, 0.99)
@@ -27,6 +26,7 @@ PERCENT = {q: f"{100 * q:g} % quantile" for q in QUANTILES}
 LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))
 GAPS = {"max_gap_mm": "largest gap per case", "mean_gap_mm": "mean gap per case"}
 STEPS = {"setup_s": "update or set-up", "solve_s": "solve", "form_s": "x, gaps, residuals, error bound"}
+CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": "contacts, mean of the cases"}
 
 
 def write(directory: Path) -> Path:
@@ -159,14 +159,11 @@ def _axes() -> tuple[Drawing, Axes]:
     return drawing, drawing.subplots()
 
 
-CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": "contacts, mean of the cases"}
-
-
 def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.DataFrame) -> Data:
     """What the page of a series shows.
 
     quantiles : (len(names), m), mm, the maps; curve : the exceedance over all contacts, as in
-    report.analysis.remaining_gaps.
+    report.results.series.
     """
     facts = series.facts
     versions = facts.get("versions") or {}

@@ -18,12 +18,12 @@ from synthetic_results import everything, no_answer, results, row, write_rows
 from test_hostile_text import HOSTILE, MADE
 from test_series_report import made as made_series
 
-from report.analysis.remaining_gaps import QUANTILES, quantile_maps
 from report.page import answer, maps
 from report.page.answer import headline
 from report.page.run import run_data
 from report.page.write import packed, write
 from report.results.reader import read
+from report.results.series import QUANTILES, quantile_maps
 from report.results.series import read as read_series
 from report.writers import comparison
 from report.writers.series import write as write_series

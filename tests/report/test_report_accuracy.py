@@ -1,6 +1,5 @@
 """The sections on what accuracy costs, from rows whose facts were planted."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -90,14 +89,6 @@ def test_prices_are_the_fastest_measured_run_that_is_accurate_enough(tmp_path: P
     line = prices(results(tmp_path, sweep())).loc["honest (dual)"]
     # errors are half the tolerance: 10^-k is first met at k digits, which take 0.01 · 2^k s
     assert [line[f"seconds_1e-{k}"] for k in (3, 5, 7, 9)] == pytest.approx([0.08, 0.32, 1.28, 5.12])
-    assert line["factor_per_digit"] == pytest.approx(2.0)
-
-
-def test_the_factor_per_digit_follows_the_times(tmp_path: Path) -> None:
-    rows = [answer(LOW, "a", k, 0.01 * 5**k, 10.0**-k) for k in (3, 4, 5, 6)]
-    assert prices(results(tmp_path / "a", rows)).loc["a (dual)", "factor_per_digit"] == pytest.approx(5.0)
-    short = [answer(LOW, "a", k, 0.01 * 5**k, 10.0 ** (-3 - k / 10)) for k in (3, 4, 5, 6)]
-    assert math.isnan(prices(results(tmp_path / "b", short)).loc["a (dual)", "factor_per_digit"])
 
 
 def test_a_price_is_the_geometric_mean_over_the_scenes(tmp_path: Path) -> None:

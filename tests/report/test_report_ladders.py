@@ -82,17 +82,6 @@ def test_the_worst_answer_is_counted_and_named(directory: Path) -> None:
     assert table.loc["ipm (dual)", "worst_share"] == pytest.approx(1e-2)
 
 
-def test_each_ladder_breaks_at_its_first_wrong_rung(directory: Path) -> None:
-    write(directory)
-    table = pd.read_csv(directory / "report" / "breaking-points.csv", keep_default_na=False)
-    assert list(table) == ["label", "odd", "steep"]  # as the suite lists them
-    assert table.to_numpy().tolist() == [
-        ["ipm (dual)", "–", "–"],
-        ["a (dual)", "one", "1e5"],
-        ["b (dual)", "one", "1e9 ×"],
-    ]
-
-
 def test_wrong_answers_reported_as_solved_are_counted_apart(directory: Path) -> None:
     text = write(directory).read_text("utf-8")
     assert "solved: 0 of 4 rows of our solvers, 2 of 8 rows of libraries." in text

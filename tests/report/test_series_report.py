@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 
 from harness.results import series_file
-from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
-from report.results.series import Series, read
+from report.results.series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
 from report.writers.series import write
 
 CASES, M = 240, 12
