@@ -196,20 +196,6 @@ def test_the_csv_has_the_cells_shown_judged_at_the_limit(
     np.testing.assert_array_equal(table["load_case_s"].astype(float), wanted["load_case_s"])
 
 
-def test_a_share_counts_before_a_number_and_time_after_both(chromium: Any, tmp_path: Path) -> None:
-    scenes = ["4386/0100", "4386/1000", "4386/2000"]
-    rows = [row(scene, "slow", solve_s=9.0) for scene in scenes]
-    rows += [
-        row(scene, "quick", displacement_error_mm=1e-5 if scene == scenes[2] else 1e-9) for scene in scenes
-    ]
-    rows += [row(scenes[0], "seldom", solve_s=5.0)]
-    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows)), tmp_path))
-    ranked = f"{RANKED}.map(line => line.solver)"
-    assert chromium.execute_script(ranked) == ["slow", "seldom", "quick"]
-    opened(chromium, tmp_path / "index.html", "limit=1e-3")
-    assert chromium.execute_script(ranked) == ["quick", "slow", "seldom"]
-
-
 def test_filters_a_baseline_and_the_address(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
     cells, page = made
     opened(chromium, page)
@@ -264,16 +250,6 @@ def test_a_map_of_a_series_has_its_worst_case_and_curves(chromium: Any, tmp_path
     chromium.execute_script("document.getElementById('about-map').textContent = ''")
     chromium.execute_script("document.getElementById('worst').click()")
     assert f"case {worst}, mm" in eventually(chromium, "document.getElementById('about-map').textContent")
-
-
-def test_headings_stay_in_sight(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
-    opened(chromium, made[1], "rows=all")
-    chromium.execute_script("document.querySelector('.scroll').style.maxHeight = '200px'")
-    top = "document.querySelector('thead th').getBoundingClientRect().top"
-    before = chromium.execute_script(f"return {top}")
-    chromium.execute_script("document.querySelector('.scroll').scrollTop = 150")
-    assert chromium.execute_script("return document.querySelector('.scroll').scrollTop") > 50
-    assert chromium.execute_script(f"return {top}") == pytest.approx(before, abs=1)
 
 
 def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:
