@@ -23,12 +23,13 @@ NOTE = (
     "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
     "fewer than three are taken to vary by 15 %."
 )
-#: Columns of the page; those of texts first.
-TEXTS = ("measurement", "change", "verdict_old", "verdict_new", "status_old", "status_new")
-NUMBERS = (
-    *("error_mm_old", "error_mm_new", "digits_lost", "iterations_old", "iterations_new"),
-    *("seconds_old", "seconds_new", "ratio", "ratio_least", "ratio_most"),
+#: Columns of the page.
+ON_PAGE = (
+    *("measurement", "change", "verdict_old", "verdict_new", "error_mm_old", "error_mm_new", "digits_lost"),
+    *("iterations_old", "iterations_new", "seconds_old", "seconds_new", "ratio", "ratio_least", "ratio_most"),
+    *("status_old", "status_new"),
 )
+TEXTS = ("measurement", "change", "verdict", "status")
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]], rows: pd.Da
     return {
         "kind": "compare",
         "banner": _banner(rows),
-        "columns": [[name, name.replace("_", " "), name in NUMBERS] for name in (*TEXTS, *NUMBERS)],
+        "columns": [[name, name.replace("_", " "), not name.startswith(TEXTS)] for name in ON_PAGE],
         "comparisons": [
             {"old": old, "new": new, "summary": summary, "lines": [_line(line) for line in records(table)]}
             for old, new, summary, table in pairs
@@ -148,4 +149,4 @@ def _banner(rows: pd.DataFrame) -> Data:
 
 
 def _line(line: dict[str, Any]) -> Data:
-    return {name: None if pd.isna(line[name]) else line[name] for name in ("group", *TEXTS, *NUMBERS)}
+    return {name: None if pd.isna(line[name]) else line[name] for name in ("group", *ON_PAGE)}
