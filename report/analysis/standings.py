@@ -2,6 +2,7 @@
 
 Advised is the fastest line whose answer is good on every scene of a size, by the geometric mean of its
 seconds over these scenes. Good: within the limit, or with an error of at most a given accuracy.
+Seconds are those per load case; of a run that was stopped, only a lower bound is known.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Maps of the junction: fields on its nodes in true proportions, with outlines of some of them and marks.
 
-Scales are linear, or those of the square root, so that small values are visible; their labels say so.
+Scales are linear, or those of the square root, so that small values are visible; their labels say so. All
+sizes of a sheet are known in advance: a layout engine would find them by drawing every label several times,
+which takes longer than the picture.
 """
 
 from __future__ import annotations

@@ -28,20 +28,8 @@ from report.results.rows import CELL, in_order
 from .maps import scene_maps
 
 TEXTS = (
-    *(
-        "scene",
-        "method",
-        "label",
-        "solver",
-        "owner",
-        "form",
-        "variant",
-        "status",
-        "verdict",
-        "machine",
-        "message",
-    ),
-    *("solver_version", "solver_code", "commit", "recorded_at", "key"),
+    *("scene", "method", "label", "solver", "owner", "form", "variant", "status", "verdict", "machine"),
+    *("message", "solver_version", "solver_code", "commit", "recorded_at", "key"),
 )
 NUMBERS = (
     *("n", "m", "active", "tolerance", "threads", "repeats", "iterations", "inner_iterations"),
