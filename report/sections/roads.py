@@ -36,7 +36,7 @@ LOOKS = {
 }
 MOST = 12  # lines of a panel
 LONGEST = 60  # characters of a name
-ROW, AROUND = 0.19, 0.6  # inches: a bar; the title and the axis of a panel
+ROW, AROUND = 0.19, 0.45  # inches: a bar; the title and the axis of a panel
 
 
 def how_fast(results: Results) -> Section | None:
@@ -168,11 +168,12 @@ def _stacked(lines: pd.DataFrame) -> Drawing:
         for place, line in enumerate(records(of)):
             at: Any = {"textcoords": "offset points", "va": "center", "fontsize": 8}
             axes.annotate(significant(line["total_1_s"]), (left[place], place), (4, 0), **at)
-        axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of) - 0.5, -0.5), xlabel="seconds")
+        axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of) - 0.5, -0.5))
         axes.set_yticks(range(len(of)), [short(name, LONGEST) for name in of["method"]])
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
         axes.set_title(f"n = {whole(of['n'].iloc[0])}, {whole(of['active'].iloc[0])} active")
+    axes.set_xlabel("seconds")
     used = [look for name, look in LOOKS.items() if (lines[name] > 0).any()]
     handles = [Patch(facecolor=color, hatch=hatch, label=text) for text, color, hatch in used]
     drawing.legend(handles=handles, loc="outside lower center", ncols=4)
