@@ -37,19 +37,8 @@ STAGED = ROOT / "results" / "publishing"
 SERIES = {"gaps": ("4386/1074", "--cases", "1000", "--sd", "0.2", "--correlation-length", "150")}
 #: In the order of measurement; the other suites are for a user's own runs and for the CI.
 NAMES = (
-    *(
-        "default",
-        "speed",
-        "libraries",
-        "series",
-        "gaps",
-        "methods",
-        "uncondensed",
-        "scaling",
-        "hard",
-        "hard-full",
-    ),
-    *("drawn", "outside", "paper", "accuracy"),
+    *("default", "speed", "libraries", "series", "gaps", "methods", "uncondensed", "scaling"),
+    *("hard", "hard-full", "drawn", "outside", "paper", "accuracy"),
 )
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
 #: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.

@@ -15,9 +15,11 @@ SHOWN = 5  # contacts on the terminal
 
 def check(directory: Path, allowed_mm: float, console: Console) -> int:
     """Print the outcome, write DIRECTORY/allowed-gap.csv and .png; returns the exit code."""
-    from report.analysis.allowed_gap import exceeding  # slow to import: not before the first row
     from report.results.series import read
-    from report.writers.allowed_gap import write
+    from report.writers.allowed_gap import (
+        exceeding,  # slow to import: not before the first row
+        write,
+    )
 
     series = read(directory)
     found = exceeding(series, allowed_mm)

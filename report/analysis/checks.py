@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from fnmatch import fnmatchcase
-from itertools import product
-from typing import Any
 
 import pandas as pd
 
 from harness.results.provenance import commit
 from report.document.numbers import counted, listed
 from report.results.reader import Results
-
-from .versions import asked_for
 
 DIGITS = 10  # of a commit, in sentences
 
@@ -40,6 +36,12 @@ def warnings(results: Results) -> list[str]:
             "threads in effect was not the requested one; the tables give the one in effect."
         )
     return [*found, *results.warnings]
+
+
+def asked_for(rows: pd.DataFrame) -> pd.Series[bool]:
+    """Whether the version of a row is the one that its variant names."""
+    pairs = zip(rows["variant"], rows["solver_version"], strict=True)
+    return pd.Series([bool(v) and variant.endswith(v) for variant, v in pairs], rows.index, dtype=bool)
 
 
 def code_warnings(rows: pd.DataFrame) -> list[str]:
@@ -91,39 +93,19 @@ def _short(name: str) -> str:
 
 def _unfinished(results: Results) -> list[str]:
     """The suite's scenes count without those that the model rejects, as it should."""
-    problems, suite = results.problems, results.suite
+    problems, suite, line = results.problems, results.suite, ["solver", "variant", "scene", "form"]
     refused = set(problems.loc[problems["refused"].notna(), "scene"]) if "refused" in problems else set()
-    scenes = [scene for scene in suite.get("scenes", []) if scene not in refused]
-    made, planned = len(results.rows), planned_measurements(suite | {"scenes": scenes})
-    if made >= planned:
+    planned = {
+        (solver.get("name"), solver.get("variant", ""), *solver.get("with", []), scene, form)
+        for solver in suite.get("solver", [])
+        for scene in suite.get("scenes", [])
+        if scene not in refused and any(fnmatchcase(scene, glob) for glob in solver.get("scenes", ["*"]))
+        for form in solver.get("forms", [None])
+    }
+    made = len(results.rows.drop_duplicates(line))
+    if made >= len(planned):
         return []
     return [
-        f"The run is not finished: {made} of {planned} measurements of {suite.get('name', 'the suite')} "
-        "are done. Run it again with the same directory to continue."
+        f"The run is not finished: {made} of {len(planned)} combinations of scene, solver and form of "
+        f"{suite.get('name', 'the suite')} are measured. Run it again with the same directory to continue."
     ]
-
-
-def planned_measurements(suite: dict[str, Any]) -> int:
-    """How many rows the expanded suite file plans at least; what two entries plan counts once."""
-    planned = set()
-    for solver in suite.get("solver", []):
-
-        def given(name: str, default: Any, entry: dict[str, Any] = solver) -> Any:
-            return entry.get(name, suite.get(name, default))
-
-        patterns = solver.get("scenes", ["*"])
-        scenes = [s for s in suite.get("scenes", []) if any(fnmatchcase(s, glob) for glob in patterns)]
-        tolerances, rounds = given("tolerances", [None]), given("repeats", 1)
-        cases = solver.get("cases", suite.get("series", {}).get("cases", 1))
-        planned |= {
-            *product(
-                [(solver.get("name"), solver.get("variant", ""), *solver.get("with", []))],
-                scenes,
-                solver.get("forms", [None]),
-                [tolerances] if tolerances == "auto" else tolerances,
-                given("threads", [None]),
-                range(1 if rounds == "auto" else rounds),
-                range(cases),
-            )
-        }
-    return len(planned)

@@ -20,7 +20,7 @@ import pandas as pd
 
 from harness.results.digits import digits_lost, floor_mm
 from harness.results.schema import VERDICTS
-from report.results.cells import cells_of
+from report.results.rows import cells_of
 
 from .standings import TIE
 

@@ -11,6 +11,7 @@ Matrices that came from the cache count with the seconds that it took to make th
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,8 @@ import pandas as pd
 from harness.results.schema import BUILDING, DENSE_FORMS
 from report.document.blocks import records
 from report.document.numbers import as_number
-from report.results.cells import cells_of
 from report.results.reader import Results
+from report.results.rows import cells_of
 
 LOAD_CASES = (1, 10, 1000)
 #: The stages in their order, the last two per load case.
@@ -28,6 +29,7 @@ STAGES = ("model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery
 PER_LOAD_CASE = 2
 
 
+@lru_cache(maxsize=4)  # several sections ask for the same
 def roads(results: Results) -> pd.DataFrame:
     """The cells of single load cases with the seconds of each stage, 0 where there is none, `total_<k>_s` for
     each k of LOAD_CASES (missing unless the answer is within the limit and all stages are known), and

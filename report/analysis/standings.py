@@ -2,27 +2,77 @@
 
 Advised is the fastest line whose answer is good on every scene of a size, by the geometric mean of its
 seconds over these scenes. Good: within the limit, or with an error of at most a given accuracy.
+Seconds are those per load case; of a run that was stopped, only a lower bound is known.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from report.results.labels import in_order
+from harness.results.schema import ANSWERED
+from report.document.numbers import MISSING, significant
+from report.results.reader import Results
+from report.results.rows import CELL, in_order
 
-from .precision import accurate, judged
-
+#: The accuracies for which costs and settings are given, mm.
+ACCURACIES = (1e-3, 1e-5, 1e-7, 1e-9)
+#: The fewest tolerances of one method on one scene that make a curve.
+CURVE_POINTS = 3
+ZERO_ERROR_MM = 1e-16  # counts as an error of zero
+#: A reference whose error bound exceeds this share of an accuracy cannot judge it.
+BOUND_SHARE = 0.1
 #: Lines that take at most this many times as long as the fastest count as equally fast: single runs on a
 #: shared machine vary by as much.
 TIE = 1.15
 #: A chart shows the methods that were run on at least this share of its scenes.
 SHOWN = 0.5
 NOT_RUN = ("unsupported", "not_run")
+ROUND = ["scene", "threads"]
+
+
+def with_errors(cells: pd.DataFrame) -> pd.DataFrame:
+    """The cells with `error`, mm: the displacement error, at least the reference error bound; missing if
+    there was no answer.
+    """
+    bound = cells.groupby("scene")["reference_bound_mm"].transform("max")
+    measured = cells["displacement_error_mm"].where(cells["load_case_s"].notna())
+    return cells.assign(reference_bound_mm=bound, error=measured.clip(lower=bound).clip(lower=ZERO_ERROR_MM))
+
+
+def curves(cells: pd.DataFrame) -> set[str]:
+    """The methods with at least CURVE_POINTS tolerances on a scene."""
+    tolerances = cells.groupby(["method", "scene"])["tolerance"].nunique()
+    return set(tolerances.index.get_level_values("method")[tolerances >= CURVE_POINTS])
+
+
+def swept(results: Results) -> pd.DataFrame:
+    """The cells that were run, with errors; none if no method has a curve."""
+    cells = results.cells[~results.cells["status"].isin(["unsupported", "not_run"])]
+    return with_errors(cells) if curves(cells) else with_errors(cells.iloc[:0])
+
+
+def pareto(points: pd.DataFrame) -> pd.DataFrame:
+    """The points that no other beats in both `error` and `load_case_s`, by increasing error."""
+    ordered = points.sort_values(["error", "load_case_s"])
+    return ordered[ordered["load_case_s"] < ordered["load_case_s"].cummin().shift(fill_value=math.inf)]
+
+
+def accurate(cells: pd.DataFrame, accuracy_mm: float) -> pd.Series[bool]:
+    """Where the error is at most accuracy_mm, and the reference accurate enough to say so."""
+    cells = with_errors(cells)
+    unknown = cells["reference_bound_mm"] > BOUND_SHARE * accuracy_mm
+    return (cells["error"] <= accuracy_mm) & ~unknown
+
+
+def judged(cells: pd.DataFrame, accuracy_mm: float) -> bool:
+    """Whether the references of some cells are accurate enough to decide that an error is ≤ accuracy_mm."""
+    return not cells["reference_bound_mm"].max() > BOUND_SHARE * accuracy_mm
 
 
 def geometric_mean(values: pd.Series[float]) -> float:
@@ -119,3 +169,40 @@ def recommended(
             other = lines[among].iloc[0]
             line |= {name: other["label"], f"to_{name}": other["seconds"] / best["seconds"]}
     return line
+
+
+def timed(cells: pd.DataFrame) -> pd.DataFrame:
+    """With `at_least`: seconds per load case if the answer is within the limit; for a run ended by the time
+    limit or an iteration limit, the time it had taken by then; else missing. `cut`: it is only that lower
+    bound.
+    """
+    within = cells["verdict"] == "within"
+    late = (cells["status"] == "time_limit") & ~within
+    spent = (cells["status"] == "iteration_limit") & ~within
+    at_least = cells["load_case_s"].where(within | spent, cells["time_limit_s"].where(late))
+    return cells.assign(at_least=at_least, cut=(late | spent) & at_least.notna())
+
+
+def seconds_text(cell: Mapping[str, Any]) -> str:
+    """The seconds per load case, or why there is no answer within the limit."""
+    if cell["verdict"] == "within":
+        return significant(cell["load_case_s"])
+    if cell["verdict"] in ANSWERED:
+        return f"{significant(cell['load_case_s'])} ({str(cell['verdict']).replace('_', ' ')})"
+    if cell["status"] == "time_limit" and cell["time_limit_s"] > 0:
+        return f"> {cell['time_limit_s']:.4g}"
+    return str(cell["status"]).replace("_", " ") or MISSING
+
+
+def of_fastest(owner: str, rows: pd.DataFrame, *names: str) -> pd.Series[float]:
+    """For each row the seconds of the fastest solver of that owner on its scene with as many threads: the
+    least of the medians of any of the names.
+    """
+    medians = rows[rows["owner"] == owner].groupby(CELL, dropna=False)[[*names]].median().min(axis=1)
+    return rows.join(medians.groupby(ROUND).min().rename("fastest"), on=ROUND)["fastest"]
+
+
+def spreads(rows: pd.DataFrame, by: list[str], names: list[str]) -> pd.DataFrame:
+    """The medians over the groups, and with the endings _least and _most the ranges."""
+    found = rows.groupby(by, dropna=False)[names].agg(["median", "min", "max"])
+    return found.set_axis([f"{name}{end}" for name in names for end in ("", "_least", "_most")], axis=1)

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from harness.results.schema import ANSWERED
-from report.results.labels import in_order
+from report.results.rows import in_order
 
 from . import style
 

@@ -1,7 +1,7 @@
 """One look for all figures, readable in greyscale and by colour-blind readers.
 
 A solver keeps its colour and marker in every figure of every report. Its forms differ in dashes and in the
-face of the marker, its variants in dashes, tint and the part of the marker that is filled. The colours are
+face of the marker, its variants in tint and the part of the marker that is filled. The colours are
 those of Okabe and Ito (2008), without their yellow; those of our solvers are told apart without their markers
 too, also by colour-blind readers (tests/report/test_figures.py).
 """
@@ -66,14 +66,13 @@ VARIANTS: tuple[tuple[float, float, Literal["full", "bottom", "left", "top", "ri
     (5.5, 0.45, "top"),
     (8.5, 0.3, "right"),
 )
-#: Dashes of the same variants, by form; an unknown form looks like the last.
-DASHES: dict[str, tuple[Any, ...]] = {
-    "dual": ("-", (0, (1, 1.2)), (0, (7, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)), (0, (10, 2))),
-    "primal": ((0, (4, 2)), (0, (2, 1, 1, 1)), (0, (6, 2, 1, 2, 1, 2)), (0, (1, 3)), (0, (8, 4))),
-    "sparse": ((0, (6, 1.5, 1.5, 1.5)), (0, (2, 2)), (0, (9, 2, 2, 2)), (0, (1, 2, 3, 2)), (0, (12, 4))),
+#: By form its dashes, and the tint of the marker's face: filled, hollow, pale. An unknown form looks like the
+#: last.
+LOOKS: dict[str, tuple[Any, float]] = {
+    "dual": ("-", 0.0),
+    "primal": ((0, (4, 2)), 1.0),
+    "sparse": ((0, (6, 1.5, 1.5, 1.5)), 0.65),
 }
-#: Tint of the marker's face, by form: filled, hollow, pale.
-FACES = {"dual": 0.0, "primal": 1.0, "sparse": 0.65}
 #: The same in words, for captions.
 FORMS = {
     "dual": "solid and filled: dual form",
@@ -138,7 +137,7 @@ def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
     styles: dict[str, dict[str, Any]] = {}
     for (solver, form), lines in cells.groupby(["solver", "form"]):
         full, marker = looks[solver]
-        known = form if form in FORMS else "sparse"
+        dashes, face = LOOKS.get(str(form), LOOKS["sparse"])
         for i, method in enumerate(sorted(lines["method"].unique())):
             size, tint, filled = VARIANTS[i % len(VARIANTS)]
             color = _tinted(full, tint)
@@ -147,11 +146,11 @@ def line_styles(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
                 "marker": marker,
                 "markersize": size,
                 "markeredgecolor": color,
-                "markerfacecolor": _tinted(color, FACES[known]),
+                "markerfacecolor": _tinted(color, face),
                 "markeredgewidth": 1.3,
                 "fillstyle": filled,
                 "markerfacecoloralt": "white",
-                "linestyle": DASHES[known][i % len(VARIANTS)],
+                "linestyle": dashes,
                 "linewidth": 1.6,
             }
     return styles

@@ -5,12 +5,11 @@ from __future__ import annotations
 import pandas as pd
 
 from report.document.numbers import listed, significant
+from report.page.write import Data, banner
 from report.results.answers import Answer, fasteners, pair_name
 from report.results.series import Array
 
-from .banner import banner
 from .maps import answer_maps, two_answers_maps
-from .packed import Data
 
 CODE = ("machine", "commit", "clean", "recorded_at")
 

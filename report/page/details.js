@@ -1,4 +1,4 @@
-// What is said of one cell: in a few lines beside the pointer, and in full with its command.
+// What is said of one cell, in a few lines and in full with its command; all that was measured of one solver.
 function described(cell) {
   const limit = Number(STATE.limit), spread = cell.least_s < cell.most_s ? ` (${number(cell.least_s, 2)} to ${number(cell.most_s, 2)})` : "";
   const inner = cell.inner_iterations ? ` (${number(cell.inner_iterations)} inner)` : "";
@@ -37,4 +37,44 @@ function openRow(cell) {
     el("button", {type: "button", onclick: () => dialog.close()}, "close"));
   if (!dialog.open) dialog.showModal();
   remember({row: cell.key ?? ""});
+}
+
+// All that was measured of one solver.
+function solverView(main) {
+  const names = known(CELLS);
+  const chosen = names.includes(STATE.solver) ? STATE.solver : names[0];
+  const limit = Number(STATE.limit), {fastest} = ranking(filtered(), limit);
+  const cells = filtered().filter(cell => cell.method === chosen);
+  main.append(el("p", {}, options("solver", "solver", names.map(name => [name, name]), "")));
+  document.getElementById("solver").value = chosen;
+  if (!cells.length) return main.append(el("p", {}, "None of its measurements passes the filters."));
+  const counts = Object.entries(VERDICTS).map(([name, [text]]) => [cells.filter(cell => verdict(cell, limit) === name).length, text]).filter(([count]) => count);
+  const versions = [...new Set(cells.map(cell => [cell.solver_version && `version ${cell.solver_version}`, cell.solver_code && `code ${cell.solver_code}`].filter(Boolean).join(", ")))];
+  main.append(el("p", {}, `${cells.length} measurements at the limit ${tidy(limit)} mm: ${counts.map(([count, text]) => `${count} ${text}`).join(", ")}. ${versions.filter(Boolean).join("; ")}`),
+    breaks(cells, limit), el("p", {class: "note"}, "A row can be opened by a click or Enter."));
+  const columns = [
+    ["scene", cell => cell.scene], ["tolerance", cell => tidy(cell.tolerance), 1], ["threads", cell => number(cell.threads), 1],
+    ["verdict", cell => VERDICTS[verdict(cell, limit)][0]], ["reported", cell => words(cell.status)],
+    ["error, mm", cell => number(cell.displacement_error_mm), 1], ["error / limit", cell => number(cell.displacement_error_mm == null ? null : cell.displacement_error_mm / limitOf(cell, limit)), 1],
+    ["bound, mm", cell => number(cell.bound_mm), 1], ["steps", cell => number(cell.iterations), 1],
+    ["load case, s", cell => number(cell.load_case_s), 1], ["spread, s", cell => cell.least_s < cell.most_s ? `${number(cell.least_s, 2)} to ${number(cell.most_s, 2)}` : "", 1],
+    ["with preparation, s", cell => number(cell.total_s), 1], ["× fastest", cell => verdict(cell, limit) === "within" ? number(timeOf(cell) / fastest.get(cell.scene)) : "–", 1],
+    ["peak, MiB", cell => number(cell.peak_rss_mib), 1],
+  ];
+  const table = tableOf(columns, cells, {cell: (cell, k) => ({
+    class: `${columns[k][2] ? "number" : ""} ${k === 3 ? verdict(cell, limit) : ""}`, "data-key": cell.key, tabindex: k ? "-1" : "0", cell,
+  })});
+  moves(table);
+  main.append(el("div", {class: "scroll"}, table));
+}
+
+// On ladders: the first rung of each without a correct answer.
+function breaks(cells, limit) {
+  const rungs = DATA.scenes.filter(scene => scene.ladder && cells.some(cell => cell.scene === scene.scene));
+  if (!rungs.length) return "";
+  const missed = scene => !cells.some(cell => cell.scene === scene.scene && verdict(cell, limit) === "within");
+  const first = d3.nest().key(scene => scene.ladder).entries(rungs).map(({key, values}) => [key, values.find(missed)]);
+  const at = first.filter(([, scene]) => scene).map(([, scene]) => scene.scene.split("/").slice(1).join("/"));
+  const never = first.filter(([, scene]) => !scene).map(([name]) => name);
+  return el("p", {id: "breaks"}, el("b", {}, at.length ? `Breaks at ${at.join(", ")}. ` : ""), never.length ? `Correct on every rung of ${never.join(", ")}.` : "");
 }

@@ -10,11 +10,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from report.page.write import Data, exact, packed
 from report.results.answers import pair_name
 from report.results.reader import Results
 from report.results.series import Array, Series
-
-from .packed import Data, exact, packed
 
 NO_MARKS = np.zeros((0, 2))
 BUDGET = 1_100_000  # characters of all maps of a page
@@ -28,7 +27,10 @@ def scene_maps(results: Results) -> Data:
     """The maps of a run's scenes as far as they fit, and the names of those left out."""
     page = _empty()
     for scene in results.cells.sort_values(["n", "active", "scene"])["scene"].unique():
-        if arrays := results.scene_arrays(scene):
+        arrays = results.scene_arrays(scene)
+        if arrays == {}:  # damaged
+            page["left_out"].append(scene)
+        elif arrays:
             fields = {text: arrays[name] for name, text in FIELDS.items() if name in arrays}
             marks = arrays.get("fasteners", NO_MARKS)
             if not _added(page, scene, arrays["contact_nodes"], fields, marks, BUDGET):

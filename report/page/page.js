@@ -1,12 +1,11 @@
 // The banner, the views and their controls.
 const VIEWS = {
-  run: {...((DATA.scenes ?? []).some(scene => scene.ladder) ? {ladders: ["Ladders", ladderView]} : {}), matrix: ["Matrix", matrix], precision: ["Work and precision", precision], profiles: ["Performance profiles", profileView],
-    solver: ["One solver", solverView], maps: ["Gap maps", mapView]},
+  run: {...((DATA.scenes ?? []).some(scene => scene.ladder) ? {ladders: ["Ladders", ladderView]} : {}), matrix: ["Matrix", matrix], precision: ["Work and precision", precision], solver: ["One solver", solverView], maps: ["Gap maps", mapView]},
   answer: {maps: ["Gap maps", mapView], answer: ["Answer", answerView]},
   series: {maps: ["Gap maps", mapView], curves: ["Exceedance", curveView]},
   compare: {compare: ["Comparison", compareView]},
 }[DATA.kind];
-const JUDGED = ["ladders", "matrix", "precision", "profiles", "solver"];
+const JUDGED = ["ladders", "matrix", "precision", "solver"];
 
 function banner() {
   const facts = DATA.banner, box = document.getElementById("banner"), warned = facts.warnings.length > 0;

@@ -21,29 +21,15 @@ from report.analysis.roads import STAGES, roads
 from report.document.blocks import records
 from report.document.numbers import listed
 from report.figures.style import line_styles
-from report.results.labels import in_order
+from report.page.write import Data, banner, column
 from report.results.reader import Results
-from report.results.rows import CELL
+from report.results.rows import CELL, in_order
 
-from .banner import banner
 from .maps import scene_maps
-from .packed import Data, column
 
 TEXTS = (
-    *(
-        "scene",
-        "method",
-        "label",
-        "solver",
-        "owner",
-        "form",
-        "variant",
-        "status",
-        "verdict",
-        "machine",
-        "message",
-    ),
-    *("solver_version", "solver_code", "commit", "recorded_at", "key"),
+    *("scene", "method", "label", "solver", "owner", "form", "variant", "status", "verdict", "machine"),
+    *("message", "solver_version", "solver_code", "commit", "recorded_at", "key"),
 )
 NUMBERS = (
     *("n", "m", "active", "tolerance", "threads", "repeats", "iterations", "inner_iterations"),

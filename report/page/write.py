@@ -1,30 +1,25 @@
-"""Puts a page together: template, style, scripts, D3 and the data, in one file."""
+"""Puts a page together, in one file: template, style, scripts, D3, the banner, and the data in few bytes."""
 
 from __future__ import annotations
 
+import zlib
+from base64 import b64encode
 from pathlib import Path
+from typing import Any
 
 import jinja2
+import numpy as np
+import pandas as pd
 from mpld3 import urls  # ships D3
 
+from report.analysis.checks import commits_text
 from report.document.escape import plain, quoted, script_json, short
-
-from .packed import Data
+from report.results.series import Array
 
 HERE = Path(__file__).parent
-SCRIPTS = (
-    "state",
-    "judge",
-    "matrix",
-    "details",
-    "plots",
-    "lines",
-    "solver",
-    "maps",
-    "curves",
-    "compare",
-    "page",
-)
+SCRIPTS = ("state", "judge", "matrix", "details", "plots", "maps", "compare", "page")
+Data = dict[str, Any]
+DIGITS = 1 << 11  # what is dropped of a float32's mantissa: 3.6 decimal digits are left
 
 
 def write(path: Path, title: str, data: Data, directory: Path | None = None) -> Path:
@@ -50,3 +45,47 @@ def _named(directory: Path) -> str:
     whole = directory.resolve()
     near = whole.relative_to(Path.cwd()) if whole.is_relative_to(Path.cwd()) else Path(whole.name)
     return str(quoted(near.as_posix()))
+
+
+def banner(rows: pd.DataFrame, **more: object) -> Data:
+    """rows : with `machine`, `commit`, `clean` and `recorded_at`. more : `counts`, `versions`, `warnings`, or
+    other words for any of the banner's lines.
+    """
+    rows = rows.assign(clean=rows["clean"].astype(float))  # true, false or not known
+    times = sorted(time for time in rows["recorded_at"] if time)
+    lines = {
+        "machines": [name or "not recorded" for name in rows["machine"].unique()],
+        "commits": commits_text(rows) if len(rows) else "",
+        "measured": " to ".join(dict.fromkeys([_minute(times[0]), _minute(times[-1])])) if times else "",
+        "versions": [],
+        "counts": "",
+        "warnings": [],
+    }
+    return lines | more
+
+
+def _minute(time: str) -> str:
+    return f"{time[:16].replace('T', ' ')} UTC"
+
+
+def column(values: pd.Series[Any]) -> list[Any] | Data:
+    """Numbers as they are, missing ones null; texts as their distinct values and the place of each."""
+    if pd.api.types.is_numeric_dtype(values.dtype):
+        return [None if pd.isna(value) else float(value) for value in values]
+    texts = ["" if value is None or value != value else str(value) for value in values]
+    distinct = {text: place for place, text in enumerate(dict.fromkeys(texts))}
+    return {"distinct": list(distinct), "places": [distinct[text] for text in texts]}
+
+
+def packed(values: Array) -> str:
+    """An array for a map, of about four digits: base64 of deflated little-endian float32."""
+    bits = np.ascontiguousarray(values, "<f4").view("<u4")
+    finite = np.isfinite(values).ravel()
+    rounded = bits.ravel().copy()
+    rounded[finite] = (rounded[finite] + DIGITS // 2) & ~np.uint32(DIGITS - 1)
+    return b64encode(zlib.compress(rounded.tobytes(), 9)).decode()
+
+
+def exact(values: Array) -> str:
+    """The same with all digits of a float32, for coordinates."""
+    return b64encode(zlib.compress(np.ascontiguousarray(values, "<f4").tobytes(), 9)).decode()

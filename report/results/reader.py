@@ -20,15 +20,15 @@ from numpy.typing import NDArray
 from harness.results.schema import CRC, DRAWN, LADDERS
 from report.document.escape import plain, quoted
 from report.document.numbers import tidy_power
+from report.results.rows import cells_of
 
-from .cells import cells_of
 from .rows import frame
 
 MOST_SHOWN = 40  # scenes drawn at random: more have a section of their own alone
 FAR_AWAY = 1e15  # mm: no picture is so large
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Results:
     """One directory of results: `rows` and `cells` as above, the rest as read from its files."""
 

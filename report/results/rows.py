@@ -1,18 +1,25 @@
-"""The rows of a results directory as a data frame with one row per measurement."""
+"""Rows as a data frame, and cells: their repeats merged, named in as few words as distinguish them.
+
+Of repeats, nothing looks better than it was.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from harness.results.schema import of_kind
+from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, of_kind
 from report.document.escape import quoted
+from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.
 CELL = ["machine", "scene", "solver", "form", "variant", "tolerance", "threads"]
+MEDIANS = [*STEPS, "model_s", "iterations", "inner_iterations"]
+LARGEST = ["displacement_error_mm", "reference_bound_mm", "contact_mismatch", "peak_rss_mib", "working_mib"]
 
 
 def frame(records: list[dict[str, Any]], problems: pd.DataFrame, suite: dict[str, Any]) -> pd.DataFrame:
@@ -65,3 +72,91 @@ def of_records(records: list[dict[str, Any]]) -> pd.DataFrame:
 
 def _text(value: object) -> str:
     return "" if value is None or value != value else str(value)
+
+
+MEDIANS += ["solver_reported_s", "cholesky_s", "product_s"]
+
+
+def cells_of(rows: pd.DataFrame, by: Sequence[str] = CELL) -> pd.DataFrame:
+    """One line per scene, solver, form, variant, tolerance and number of threads, or of what else is given.
+
+    Of the repeats: the worst verdict with its status, the largest error and memory, and the median of each
+    time over those that have it. Adds, in seconds,
+
+        load_case_s        set-up + solve + form: the time per load case, its median over the repeats
+        least_s, most_s    the least and the largest of it
+        once_s             convert + prepare: paid once per assembly
+        total_s            load_case_s + once_s
+
+    and `repeats`, their number; `label`, the name of the line; and `method`, that name without the
+    tolerance.
+    """
+    timed = rows["verdict"].isin(ANSWERED) & rows["solve_s"].notna()
+    rows = rows.assign(load_case_s=rows[["setup_s", "solve_s", "form_s"]].sum(axis=1).where(timed))
+    cell = rows.groupby([*by], dropna=False, sort=False).ngroup()
+    severity = rows["verdict"].map({verdict: i for i, verdict in enumerate(VERDICTS)}).fillna(len(VERDICTS))
+    ranked = rows.assign(cell=cell, severity=severity).sort_values("severity", ascending=False, kind="stable")
+    cells = ranked.drop_duplicates("cell").set_index("cell").sort_index().drop(columns="severity")
+    repeats = rows.groupby(cell)
+    cells[MEDIANS] = repeats[MEDIANS].median()
+    cells[LARGEST] = repeats[LARGEST].max()
+    cells["repeats"] = repeats.size()
+    cells["verdict"] = cells["verdict"].where(cells["verdict"].isin(VERDICTS), "no_answer")
+    answered = cells["verdict"].isin(ANSWERED) & cells["solve_s"].notna()
+    for name, figure in (("load_case_s", "median"), ("least_s", "min"), ("most_s", "max")):
+        cells[name] = repeats["load_case_s"].agg(figure).where(answered)
+    cells["once_s"] = cells[["convert_s", "prepare_s"]].sum(axis=1).where(answered)
+    cells["total_s"] = cells["load_case_s"] + cells["once_s"]
+    return named(cells)
+
+
+def named(cells: pd.DataFrame) -> pd.DataFrame:
+    """Cells with `method`, 'solver (form)' with the variant if it has one and the number of threads
+    if several were used, and `label`, the same with the tolerance if there are several that were asked for.
+    """
+    variant = cells["variant"].map(lambda name: f" {name}" if name else "")
+    threads = cells["threads"].map(lambda k: f" × {counted(int(k), 'thread')}")
+    tolerance = cells["tolerance"].map(lambda value: f" {tidy_power(value)}")
+    by_line = cells.groupby(["solver", "form", "variant"], dropna=False)
+    threads = threads.where(by_line["threads"].transform("nunique") > 1, "")
+    several = by_line["tolerance"].transform("nunique") > 1
+    tolerance = tolerance.where(several & (cells["searched"] != 1.0), "")
+    method = cells["solver"] + " (" + cells["form"] + ")" + variant + threads
+    return cells.assign(method=method, label=method + tolerance)
+
+
+def named_by(cells: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """Cells named group by group: for tables with columns for the `keys`, which the names then omit."""
+    groups = [named(group) for _, group in cells.groupby(keys)]
+    return pd.concat([named(cells.iloc[:0]), *groups], ignore_index=True)
+
+
+def lines_in_order(lines: pd.DataFrame, cells: pd.DataFrame, *first: str) -> pd.DataFrame:
+    """One line per `method` of some cells, indexed or not: sorted by what comes first, then in the order of
+    `in_order`.
+    """
+    places = {name: place for place, name in enumerate(in_order(cells, "method"))}
+    lines = lines.reset_index() if "method" in lines.index.names else lines
+    ordered = lines.assign(place=lines["method"].map(places)).sort_values(
+        [*first, "place"], ignore_index=True
+    )
+    return ordered.drop(columns="place")
+
+
+def in_order(cells: pd.DataFrame, name: str = "label") -> list[str]:
+    """The labels (or method, or solvers) of some cells in the one order used everywhere: in the
+    order of OWNERS, then by name, and the forms of a solver in the order of FORMS.
+    """
+    lines = cells.drop_duplicates(name)
+    places = [
+        (OWNERS.index(owner), solver, form_place(form), str(label))
+        for owner, solver, form, label in zip(
+            lines["owner"], lines["solver"], lines["form"], lines[name], strict=True
+        )
+    ]
+    return [label for *_, label in sorted(places)]
+
+
+def form_place(form: str) -> int:
+    """The place of a form in the order of FORMS; a form not named there comes last."""
+    return FORMS.index(form) if form in FORMS else len(FORMS)

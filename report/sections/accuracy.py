@@ -1,28 +1,30 @@
-"""Accuracy: what it costs, whose tolerance and which residual can be trusted."""
+"""Accuracy: what it costs, and whose tolerance can be trusted."""
 
 from __future__ import annotations
 
-import math
 from operator import itemgetter
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from report.analysis.precision import ACCURACIES, CURVE_POINTS, curves, judged, pareto, swept
-from report.analysis.standings import fastest_first, geometric_mean
+from report.analysis.standings import (
+    ACCURACIES,
+    curves,
+    fastest_first,
+    judged,
+    pareto,
+    swept,
+)
 from report.document.blocks import Column, Figure, Section, Table, number, word
 from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.figures import style
 from report.figures.lines import styles_of
-from report.results.labels import in_order, named
 from report.results.reader import Results
+from report.results.rows import in_order, named
 
-DIGITS = 2  # the fewest that a Pareto front spans for a factor to be fitted
 LARGEST_ERROR_MM = 1.0  # larger errors are drawn there
-PANEL = 2.7  # inches
 DOTTED: dict[str, Any] = {"color": "black", "linewidth": 1.1, "linestyle": (0, (1, 1.5))}
 STAIRCASE: dict[str, Any] = {"color": "#CFCFCF", "linewidth": 3.5, "zorder": 1, "drawstyle": "steps-post"}
 
@@ -36,11 +38,10 @@ def costs(results: Results) -> Section | None:
     columns = [number("n", "n", whole), word("solver (form)", "method")]
     for accuracy in map(tidy_power, ACCURACIES):
         columns.append(Column(f"≤ {accuracy} mm", itemgetter(f"price_{accuracy}")))
-    columns.append(number("time factor per digit", "factor_per_digit"))
     caption = (
         "*Price list*: seconds per load case of the fastest run on each scene with an error of at most that "
         "of the heading, the geometric mean over the scenes; >: stopped at the time limit; not reached: "
-        "with the smallest error on the worst scene. Last column: from the solver's own Pareto front."
+        "with the smallest error on the worst scene."
     )
     table = Table("price-list", caption, pd.concat([_prices(of_size) for of_size in sizes]), columns)
     figures = [_diagram(of_size, results.limit) for of_size in sizes if curves(of_size)]
@@ -49,11 +50,7 @@ def costs(results: Results) -> Section | None:
 
 def _prices(cells: pd.DataFrame) -> pd.DataFrame:
     """One line per method at one size: the seconds and their text for each of ACCURACIES."""
-    factors = pd.Series(
-        {key: factor_per_digit(runs) for key, runs in cells.groupby(["method", "scene"])}, dtype=float
-    )
     lines = pd.DataFrame({"n": cells["n"].iloc[0], "method": in_order(cells, "method")})
-    lines["factor_per_digit"] = lines["method"].map(factors.groupby(level=0).agg(geometric_mean))
     scenes = cells["scene"].nunique()
     for accuracy in ACCURACIES:
         name = tidy_power(accuracy)
@@ -78,17 +75,6 @@ def _missed(runs: pd.DataFrame, accuracy: float, scenes: int) -> str:
         return f"> {significant(runs.loc[late, 'time_limit_s'].min())} s"
     best = runs.groupby("scene")["error"].min()
     return "no answer" if best.isna().any() else f"not reached ({power(best.max(), 2)})"
-
-
-def factor_per_digit(runs: pd.DataFrame) -> float:
-    """10 to the slope of log10 time against −log10 error along the Pareto front of one method on one scene;
-    missing for a front of too few points or digits.
-    """
-    front = pareto(runs.dropna(subset=["error"]))
-    if len(front) < CURVE_POINTS or front["error"].max() < 10**DIGITS * front["error"].min():
-        return math.nan
-    slope = np.polyfit(-np.log10(front["error"]), np.log10(front["load_case_s"]), 1)[0]
-    return float(10**slope)
 
 
 def _diagram(cells: pd.DataFrame, limit: str) -> Figure:
@@ -131,8 +117,7 @@ def _diagram(cells: pd.DataFrame, limit: str) -> Figure:
 
 def tolerances(results: Results) -> Section | None:
     """Whose tolerance can be trusted."""
-    cells = swept(results).dropna(subset=["error", "tolerance"])
-    if cells.empty:
+    if swept(results).dropna(subset=["error", "tolerance"]).empty:
         return None
     columns = [
         word("solver (form)", "method"),
@@ -146,28 +131,8 @@ def tolerances(results: Results) -> Section | None:
         "*Whose tolerance can be trusted*: the runs that the solver reported as solved, counting every "
         "repeat. The reference error bound is subtracted from the error, in the solver's favour."
     )
-    words = (
-        "*Error against the requested tolerance*, the worst over the scenes of each size. Solvers apply "
-        "their tolerance to different quantities, so only the slope matters: parallel to the dotted "
-        "diagonal, or level."
-    )
-    sizes, styles = sorted(cells["n"].unique()), styles_of(cells)
-    handles = style.legend_entries(styles)
-    drawing, panels = style.panels(len(sizes), PANEL, handles, sharex=True, sharey=True)
-    panels[0].set(xscale="log", yscale="log")
-    panels[0].xaxis.set_major_locator(LogLocator(numticks=20))
-    for axes, n in zip(panels, sizes, strict=True):
-        worst = cells[cells["n"] == n].groupby(["method", "tolerance"], as_index=False)["error"].max()
-        for method, look in styles.items():
-            line = worst[worst["method"] == method]
-            axes.plot(line["tolerance"], line["error"].clip(upper=LARGEST_ERROR_MM), **look)
-        axes.axline((1e-6, 1e-6), (1e-5, 1e-5), **DOTTED)
-        axes.set(title=f"n = {n:.0f}", ylabel="displacement error, mm")
-    panels[-1].set_xlabel("requested tolerance")
     table = Table("asked-achieved", caption, trust(results), columns)
-    return Section(
-        "Requested tolerance and achieved error", [Figure("asked-achieved", words, drawing), table]
-    )
+    return Section("Requested tolerance and achieved error", [table])
 
 
 def trust(results: Results) -> pd.DataFrame:
@@ -187,26 +152,3 @@ def trust(results: Results) -> pd.DataFrame:
         solved=rows.groupby("method").size(), worst_ratio=rows.groupby("method")["worst_ratio"].max()
     )
     return lines.loc[in_order(rows, "method")].reset_index()
-
-
-def residuals(results: Results) -> Section | None:
-    """A small residual does not prove a small error."""
-    cells = swept(results).dropna(subset=["error", "primal_residual"])
-    if cells.empty:
-        return None
-    small = cells[cells["primal_residual"] <= cells["limit_mm"]]
-    outside = small[small["error"] > small["limit_mm"]]
-    lines = pd.DataFrame({"method": in_order(cells, "method")})
-    for name, runs in (("answers", cells), ("small_residual", small), ("outside", outside)):
-        lines[name] = lines["method"].map(runs["method"].value_counts()).fillna(0)
-    lines["worst_error_mm"] = lines["method"].map(small.groupby("method")["error"].max())
-    columns = [
-        word("solver (form)", "method"),
-        number("answers", "answers", whole),
-        number(f"primal residual ≤ {results.limit}", "small_residual", whole),
-        number("of these, error outside", "outside", whole),
-        number("their largest error, mm", "worst_error_mm", power),
-    ]
-    caption = "*What a primal residual within the limit implies*: how often the error was outside it."
-    table = Table("residual-error", caption, lines, columns)
-    return Section("Residuals and displacement error", [table])

@@ -9,10 +9,9 @@ from urllib.parse import urlencode
 import pandas as pd
 
 from harness.results.schema import VERDICTS
-from report.document.blocks import Block, Column, Section, Table, Text, number, word
-from report.document.contents import scene_anchor
+from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import file_name, plain
-from report.document.numbers import MISSING, power, significant, whole
+from report.document.numbers import MISSING, as_number, power, significant, whole
 from report.results.reader import Results
 
 FIGURES = [
@@ -29,17 +28,21 @@ MARKS = {"within": "✓ within", "outside": "✗ outside", "cannot_be_judged": "
 def section(results: Results) -> Section | None:
     if results.cells.empty:
         return None
+    facts = {problem.get("scene"): problem for problem in records(results.problems)}
     blocks: list[Block] = []
     for n in [*results.sizes, None]:
         of_size = results.cells[results.cells["n"].isna() if n is None else results.cells["n"] == n]
         if len(of_size):
             blocks.append(Text("### Size not recorded" if n is None else f"### n = {n}"))
         ordered = of_size.sort_values(["active", "scene"])
-        blocks += [_table(str(scene), cells) for scene, cells in ordered.groupby("scene", sort=False)]
+        blocks += [
+            _table(str(scene), of, facts.get(scene, {})) for scene, of in ordered.groupby("scene", sort=False)
+        ]
     return Section("Every solver on every scene", blocks)
 
 
-def _table(scene: str, cells: pd.DataFrame) -> Table:
+def _table(scene: str, cells: pd.DataFrame, problem: Mapping[str, Any]) -> Table:
+    """problem : the row of the scene in problems.jsonl, if there is one."""
     rank = cells["verdict"].map(VERDICTS.index) + (cells["status"] == "unsupported")
     ordered = cells.assign(rank=rank).sort_values(["rank", "total_s", "solver", "form"], kind="stable")
     columns = [
@@ -54,9 +57,10 @@ def _table(scene: str, cells: pd.DataFrame) -> Table:
     ]
     active, m = cells["active"].max(), cells["m"].max()
     share = f" ({100 * active / m:.0f} % of {m:.0f})" if active == active and m > 0 else ""
-    title = f'<a id="{scene_anchor(scene)}"></a>**Scene {scene}**' + (
-        f": {active:.0f} active contacts{share}" if active == active else ""
-    )
+    known = [str(problem.get("title") or "")]
+    known += [f"{active:.0f} active contacts{share}"] if active == active else []
+    known += [f"cond(K) = {power(problem['cond_K'])}"] if as_number(problem.get("cond_K")) else []
+    title = f"**Scene {scene}**: {', '.join(filter(None, known))}"
     return Table(f"scene-{file_name(scene)}", title, ordered[["label", *FIGURES, "key"]], columns)
 
 

@@ -11,8 +11,8 @@ from report.document.blocks import Block, Column, Figure, Section, Table, number
 from report.document.numbers import power, whole
 from report.figures import style
 from report.figures.lines import against_contacts, entries, styles_of
-from report.results.labels import in_order
 from report.results.reader import Results
+from report.results.rows import in_order
 
 PANEL = 3.0  # inches
 

@@ -1,19 +1,70 @@
-"""The ladders: where each solver fails, and whether it reports the failure."""
+"""The ladders: where each solver fails, and whether it reports the failure.
+
+In the picture a wrong answer says by how much: k if its error is up to 10ᵏ times the limit, ∞ beyond 10⁹⁹.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 import pandas as pd
+from matplotlib.figure import Figure as Drawing
+from matplotlib.patches import Patch
 
 from harness.results.schema import LADDERS, OWNERS
-from report.analysis.outcomes import OUTCOMES, WRONG_CLAIMED, with_outcomes
-from report.document.blocks import Block, Figure, Section, Table, Text, number, word
-from report.document.numbers import MISSING, as_number, counted, power, whole
-from report.figures.ladder_map import ladder_map
-from report.results.labels import in_order
+from report.document.blocks import Block, Figure, Section, Table, Text, number, records, word
+from report.document.numbers import as_number, counted, power, whole
+from report.figures.grid import Cell, Group, grid
+from report.figures.style import BLUE, VERMILLION
 from report.results.reader import Results
+from report.results.rows import in_order
 
+CORRECT, CORRECT_UNCLAIMED = "correct, reported solved", "correct, not reported solved"
+WRONG_UNCLAIMED, WRONG_CLAIMED = "wrong, not reported solved", "wrong, reported solved"
+NO_ANSWER, UNJUDGED = "no answer", "cannot be judged"
+#: By verdict, and whether the solver reported it as solved. Correct: within the row's limit.
+OUTCOMES = {
+    ("within", True): CORRECT,
+    ("within", False): CORRECT_UNCLAIMED,
+    ("outside", False): WRONG_UNCLAIMED,
+    ("outside", True): WRONG_CLAIMED,
+    ("no_answer", False): NO_ANSWER,
+    ("cannot_be_judged", False): UNJUDGED,
+    ("cannot_be_judged", True): UNJUDGED,
+}
 KINDS = list(dict.fromkeys(OUTCOMES.values()))
-NOT_RUN = "not run"
+
+ROW, LEGEND = 0.16, 0.5  # inches
+WIDEST = 66.0  # columns
+#: Text, face, ink and hatch of an outcome, distinct in greyscale too; a wrong answer's text is its size.
+LOOKS = {
+    CORRECT: Cell("", BLUE),
+    CORRECT_UNCLAIMED: Cell("", "#A9CFE8"),
+    UNJUDGED: Cell("?", "white"),
+    NO_ANSWER: Cell("–", "#E6E6E6"),
+    WRONG_UNCLAIMED: Cell("", "white", "black", "//////"),
+    WRONG_CLAIMED: Cell("", VERMILLION, "white"),
+}
+WRONG = (WRONG_UNCLAIMED, WRONG_CLAIMED)
+LARGEST = 1e99  # times the limit: the cell has room for two digits
+
+#: What the rungs of a ladder count, and its unit.
+COUNTED = {
+    "coincident": "tie, N/mm",
+    "conditioning": "cond(K)",
+    "contact_scale": "2^±k in g",
+    "degeneracy": "weak, %",
+    "duplicates": "apart",
+    "pivoting": "family, m",
+    "refinement": "nodes along",
+    "supports": "spring, N/mm",
+    "thickness": "times as thick",
+    "together": "cond(K)",
+    "units": "of K and A",
+}
 
 
 def section(results: Results) -> Section | None:
@@ -32,7 +83,6 @@ def section(results: Results) -> Section | None:
             ladder_map(cells, order, ladders),
         ),
         honesty(cells, order),
-        breaking_points(cells, order, ladders),
     ]
     return Section("Where each solver fails, and whether it reports it", blocks)
 
@@ -45,6 +95,47 @@ def rungs_in_order(results: Results, cells: pd.DataFrame) -> dict[str, list[str]
         _, ladder, rung = scene.split("/")
         ladders.setdefault(ladder, []).append(rung)
     return ladders
+
+
+def with_outcomes(cells: pd.DataFrame) -> pd.DataFrame:
+    """Cells on rungs with `ladder`, `rung` and `outcome`, without the forms that a solver does not take."""
+    taken = cells[cells["status"] != "unsupported"]
+    names = taken["scene"].str.split("/", expand=True)
+    ends = zip(taken["verdict"], taken["status"] == "solved", strict=True)
+    return taken.assign(
+        ladder=names[1], rung=names[2], outcome=[OUTCOMES.get(end, NO_ANSWER) for end in ends]
+    )
+
+
+def ladder_map(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Drawing:
+    """cells : with outcomes. order : labels, the rows. ladders : the rungs of each ladder, the columns."""
+    groups = [
+        Group(name, {f"{name}/{rung}": rung for rung in rungs}, COUNTED.get(name, ""))
+        for name, rungs in ladders.items()
+    ]
+    found = {(cell["label"], f"{cell['ladder']}/{cell['rung']}"): _cell(cell) for cell in records(cells)}
+    drawing = grid({label: label for label in order}, groups, found, ROW, WIDEST)
+    handles = [
+        Patch(
+            facecolor=look.face,
+            hatch=look.hatch,
+            edgecolor="#888888",
+            linewidth=0.5,
+            label=f"{name} {look.text}",
+        )
+        for name, look in LOOKS.items()
+    ]
+    drawing.set_figheight(drawing.get_figheight() + LEGEND)
+    drawing.legend(handles=handles, loc="outside lower center", ncols=3)
+    return drawing
+
+
+def _cell(cell: Mapping[str, Any]) -> Cell:
+    look = LOOKS[cell["outcome"]]
+    if cell["outcome"] not in WRONG:
+        return look
+    share = cell["displacement_error_mm"] / cell["limit_mm"]
+    return replace(look, text=f"{math.ceil(math.log10(share))}" if 1 <= share < LARGEST else "∞")
 
 
 def claims(cells: pd.DataFrame) -> str:
@@ -77,31 +168,8 @@ def honesty(cells: pd.DataFrame, order: list[str]) -> Table:
     return Table("honesty", caption, table.reset_index(), columns)
 
 
-def breaking_points(cells: pd.DataFrame, order: list[str], ladders: dict[str, list[str]]) -> Table:
-    by_line = {key: line for key, line in cells.groupby(["label", "ladder"])}
-    lines = [
-        {"label": label}
-        | {ladder: _first_broken(by_line.get((label, ladder)), rungs) for ladder, rungs in ladders.items()}
-        for label in order
-    ]
-    columns = [word("solver (form)", "label"), *(word(ladder, ladder) for ladder in ladders)]
-    caption = (
-        "*Breaking points: the first rung of each ladder without a correct answer.* ×: reported as solved. "
-        f"{MISSING}: correct on every rung that was run."
-    )
-    return Table("breaking-points", caption, pd.DataFrame(lines), columns)
-
-
-def _first_broken(line: pd.DataFrame | None, rungs: list[str]) -> str:
-    if line is None:
-        return NOT_RUN
-    broken = line[line["verdict"] != "within"].set_index("rung")["outcome"]
-    first = next((rung for rung in rungs if rung in broken), MISSING)
-    return f"{first} ×" if broken.get(first) == WRONG_CLAIMED else first
-
-
 def rungs(results: Results) -> Section | None:
-    """The rungs themselves, the measurements without a correct answer, and what the model rejects."""
+    """The rungs themselves, and what the model rejects."""
     if results.cells.empty or "scene" not in results.problems:
         return None
     known = results.problems[results.problems["scene"].str.startswith(LADDERS)]
@@ -121,18 +189,6 @@ def rungs(results: Results) -> Section | None:
     blocks: list[Block] = [
         Table("rungs", "*The measured rungs.* Bound 0: the reference is exact.", taken, columns)
     ]
-    broken = with_outcomes(results.cells).query("verdict != 'within'").sort_values(["scene", "label"])
-    if len(broken):
-        kept = ["label", "scene", "status", "verdict", "outcome", "displacement_error_mm", "limit_mm"]
-        kept += ["backward_error", "iterations", "solve_s", "message"]
-        columns = [word("rung", "scene"), word("solver (form)", "label"), word("status", "status")]
-        columns += [
-            number("error, mm", "displacement_error_mm", power),
-            number("limit, mm", "limit_mm", power),
-        ]
-        columns.append(number("backward error", "backward_error", power))
-        caption = "*Every measurement without a correct answer.*"
-        blocks.append(Table("rungs-broken", caption, broken[kept], columns))
     if "refused" in known and known["refused"].notna().any():
         refused = known.loc[known["refused"].notna(), ["scene", "title", "refused"]]
         refused = refused.replace({"refused": {"": "**accepted, although the model does not cover it**"}})

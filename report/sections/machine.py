@@ -9,8 +9,8 @@ import pandas as pd
 from report.analysis.checks import commits_text
 from report.document.blocks import Block, Section, Table, Text, word
 from report.document.numbers import listed, tidy_power
-from report.results.labels import in_order
 from report.results.reader import Results
+from report.results.rows import in_order
 
 MEANING = """\
 Each measurement runs in its own process; the clock starts after the imports.

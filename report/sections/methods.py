@@ -7,12 +7,11 @@ from typing import Any
 
 import pandas as pd
 
-from report.analysis.seconds import seconds_text
-from report.analysis.standings import best_tolerances
+from report.analysis.standings import best_tolerances, seconds_text
 from report.document.blocks import Column, Section, Table, records, word
 from report.document.numbers import whole
-from report.results.labels import in_order
 from report.results.reader import Results
+from report.results.rows import in_order
 
 CAPTION = (
     "*Time and products with Q*: seconds per load case, and in brackets the products with Q per load case, "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from report.analysis.seconds import seconds_text
+from report.analysis.standings import seconds_text
 from report.document.blocks import Column, Section, Table, number, records, word
 from report.document.numbers import MISSING, power, significant, whole
 from report.results.reader import Results

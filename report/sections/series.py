@@ -5,12 +5,11 @@ from __future__ import annotations
 import pandas as pd
 
 from harness.results.schema import ANSWERED
-from report.analysis.seconds import ROUND, of_fastest, spreads
+from report.analysis.standings import ROUND, of_fastest, spreads
 from report.document.blocks import Column, Section, Table, number, word
 from report.document.numbers import power, spread, whole
-from report.results.labels import named_by
 from report.results.reader import Results
-from report.results.rows import CELL
+from report.results.rows import CELL, named_by
 
 CASE = ["setup_s", "solve_s", "form_s"]
 

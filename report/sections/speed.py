@@ -2,84 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.fit import exponent
-from report.analysis.seconds import of_fastest, spreads
-from report.analysis.standings import best_tolerances, shown
-from report.analysis.versions import asked_for
+from report.analysis.standings import best_tolerances, shown, spreads
 from report.document.blocks import Column, Figure, Section, Table, number, word
-from report.document.numbers import MISSING, spread, whole
+from report.document.numbers import spread, whole
 from report.figures import style
 from report.figures.lines import MARKS, against_contacts, entries, styles_of, yardstick
-from report.results.labels import lines_in_order, named_by
 from report.results.reader import Results
+from report.results.rows import lines_in_order
 
 PANEL = 3.0  # inches
 FEWEST = 3  # sizes of a fit, and scenes of a size for a line against their contacts
-#: Whom a method is compared with, and their names in headings.
-OPPONENTS = {"library": "library", "textbook": "textbook method"}
 #: What grows with the size, its unit, and the smallest value that reflects the size of Q.
 GROWING = {
     "load_case_s": ("seconds per load case", 1e-2),
     "once_s": ("seconds of preparation per assembly", 1e-2),
     "working_mib": ("working memory, MiB", 8.0),
 }
-
-
-def load_cases(results: Results) -> pd.DataFrame:
-    """The rows within the limit, with `method`, the seconds per load case and their ratios.
-
-    load_case_s : set-up + solve + form
-    total_s : the same with the solver's own preparation, paid once per assembly
-    to_cholesky : load_case_s over one Cholesky factorisation of Q in the same process
-    to_library, total_to_library : over the fastest library on the same scene, in any form, by its median
-    to_textbook, total_to_textbook : the same over the fastest textbook method
-    """
-    rows = named_by(results.rows, ["threads"])
-    cases = rows[rows["verdict"] == "within"].copy()
-    cases["load_case_s"] = cases[["setup_s", "solve_s", "form_s"]].sum(axis=1)
-    cases["total_s"] = cases["load_case_s"] + cases[["convert_s", "prepare_s"]].sum(axis=1)
-    cases["to_cholesky"] = cases["load_case_s"] / cases["cholesky_s"]
-    for owner in OPPONENTS:
-        cases[f"to_{owner}"] = cases["load_case_s"] / of_fastest(owner, cases, "load_case_s")
-        cases[f"total_to_{owner}"] = cases["total_s"] / of_fastest(owner, cases, "total_s")
-    return cases
-
-
-def relative(results: Results) -> Section | None:
-    """Per size and number of threads, in a run with machine benchmarks."""
-    cases = load_cases(results)
-    if cases.empty or not cases["cholesky_s"].notna().any():
-        return None
-    by, names = ["n", "threads", "method"], ["to_cholesky"]
-    names += [f"{of}{owner}" for owner in OPPONENTS for of in ("to_", "total_to_")]
-    table = spreads(cases, by, names)
-    table[names] = cases.groupby([*by, "scene"])[names].median().groupby(by).median()
-    table = table.assign(scenes=cases.groupby(by)["scene"].nunique(), runs=cases.groupby(by).size())
-    columns = [
-        number("n", "n", whole),
-        number("threads", "threads", whole),
-        word("solver (form)", "method"),
-        *(
-            Column(f"{what} / fastest {name}", spread(of + group))
-            for group, name in OPPONENTS.items()
-            for what, of in (("per load case", "to_"), ("with preparation", "total_to_"))
-        ),
-        Column("per load case / one Cholesky of Q", spread("to_cholesky")),
-    ]
-    caption = (
-        "*Relative times within the limit*: over those of the fastest library and of the fastest textbook "
-        "method on the same scene in any form, and over one Cholesky factorisation of Q in the same process. "
-        "The median over the scenes (range of all runs); 0.1 is ten times as fast."
-    )
-    table = lines_in_order(table, cases, "n", "threads")
-    return Section("Relative speed", [Table("speed-ratios", caption, table, columns, keys=3)])
 
 
 def machine(results: Results) -> Section | None:
@@ -126,60 +70,20 @@ def contacts(results: Results) -> Section | None:
     return Section("Time against active contacts", [Figure("time-active", caption, drawing)])
 
 
-def variants(results: Results) -> Section | None:
-    """A solver without one of its ingredients, relative to the complete solver."""
-    cells = named_by(results.cells[results.cells["status"] != "unsupported"], ["threads"])
-    cells = cells[~asked_for(cells)]
-    keys = ["solver", "form", "scene", "threads", "tolerance"]
-    plain = cells[(cells["variant"] == "") & (cells["verdict"] == "within")]
-    both = cells[cells["variant"] != ""].merge(plain, on=keys, suffixes=("", "_plain"))
-    if both.empty or both["cholesky_s"].isna().all():
-        return None
-    within = both["verdict"] == "within"
-    ratio = (both["load_case_s"] / both["load_case_s_plain"]).where(within)
-    both = pd.concat([both, ratio.rename("ratio"), within.rename("within")], axis=1)
-    groups = both.groupby("method")
-    lines = spreads(both, ["method"], ["ratio"]).assign(
-        scenes=groups.size(), within=groups["within"].sum(), error_mm=groups["displacement_error_mm"].max()
-    )
-    lines = lines.join(groups[["iterations", "iterations_plain"]].median())
-    columns = [
-        word("solver (form), variant", "method"),
-        number("scenes", "scenes", whole),
-        number("within", "within", whole),
-        Column("time relative to the complete solver", spread("ratio")),
-        number("iterations", "iterations", whole),
-        number("complete", "iterations_plain", whole),
-        number("largest error, mm", "error_mm"),
-    ]
-    caption = (
-        "*One ingredient omitted or replaced*: seconds per load case over those of the complete solver on "
-        "the same scene, the median (range)."
-    )
-    table = Table("ingredients", caption, lines_in_order(lines, both), columns)
-    return Section("What each ingredient contributes", [table])
-
-
 def scaling(results: Results) -> Section | None:
     """Exponents in n for the scenes scaling/…, one joint on finer and finer grids."""
     cells = best_tolerances(results.cells[results.cells["scene"].str.startswith("scaling/")])
     within = cells[cells["verdict"] == "within"].sort_values("n")
     if not cells["cholesky_s"].notna().any() or cells["n"].nunique() < FEWEST:
         return None
-
-    lines = [_exponents(of, method, [*GROWING]) for method, of in within.groupby("method")]
+    lines = [_exponents(method, of) for method, of in within.groupby("method")]
     table = lines_in_order(pd.DataFrame(lines), within)
-    once = within.dropna(subset=["cholesky_s"]).drop_duplicates("scene")  # not timed in the sparse form
-    for name, what in (("cholesky_s", "one Cholesky of Q"), ("product_s", "one product Qv")):
-        line = _exponents(once.assign(load_case_s=once[name]), what, ["load_case_s"], shortest=0.0)
-        table = pd.concat([table, pd.DataFrame([line])], ignore_index=True)
     columns = [
         word("solver (form)", "method"),
         number("sizes", "sizes", whole),
         number("largest n", "largest", whole),
+        *(word(f"exponent of {what}", f"{name} shown") for name, (what, _) in GROWING.items()),
     ]
-    for name, (what, _) in GROWING.items():
-        columns.append(Column(f"exponent of {what}", partial(_exponent, name=f"{name} shown")))
     caption = (
         "*Exponents in n*: slopes in log–log with their standard errors, within the limit, without times "
         "below 10 ms and memory below 8 MiB."
@@ -192,18 +96,13 @@ def scaling(results: Results) -> Section | None:
     )
 
 
-def _exponents(cells: pd.DataFrame, method: object, names: list[str], shortest: float | None = None) -> Any:
-    """The exponent in n of each name and its text, without values below the smallest of GROWING."""
+def _exponents(method: object, cells: pd.DataFrame) -> dict[str, Any]:
+    """The exponent in n of each of GROWING and its text, without values that are too small."""
     found: dict[str, Any] = {"method": method, "sizes": len(cells), "largest": cells["n"].max()}
-    for name in names:
-        least = GROWING[name][1] if shortest is None else shortest
-        fit = exponent(cells["n"].tolist(), cells[name].where(cells[name] >= least, 0.0).tolist())
-        found |= {name: fit and fit.slope, f"{name} shown": str(fit) if fit else MISSING}
+    for name, (_, least) in GROWING.items():
+        fit = exponent(cells["n"].tolist(), cells[name].where(cells[name] >= least).tolist())
+        found |= {name: fit and fit.slope, f"{name} shown": str(fit or "")}
     return found
-
-
-def _exponent(line: Mapping[str, Any], name: str) -> str:
-    return line[name] if isinstance(line[name], str) else MISSING
 
 
 def _growth(within: pd.DataFrame) -> Drawing:

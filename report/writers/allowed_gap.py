@@ -1,16 +1,58 @@
-"""Writes where the gaps of a series are larger than allowed: a table of the contacts, and a map."""
+"""In how many cases of a series the remaining gap is larger than allowed, and at which contacts.
+
+The gaps of a case are known up to its gap_error_mm. It exceeds the allowed gap if its largest gap does by
+more than that, and is undecided if it does by less, or if its row does not say how well its gaps are known.
+The gaps of the contacts are stored as float32, whose rounding, 6e-8 of the gap, is added.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 from matplotlib.colors import Normalize
 
-from report.analysis.allowed_gap import Exceeding
 from report.figures import style
 from report.figures.maps import Map, Scale, drawn
-from report.results.series import Series
+from report.results.series import Array, Series
+
+ROUNDING = 2.0**-24
+
+
+@dataclass(frozen=True)
+class Exceeding:
+    """cases : those that exceed the allowed gap, the worst first, of `answered`. shares : (m,), at each
+    contact, the share of the answered cases whose gap there is larger. largest : (m,) mm, of the cases above.
+    """
+
+    allowed_mm: float
+    answered: int
+    cases: pd.DataFrame
+    undecided: int
+    uncertainty_mm: float
+    shares: Array
+    largest: Array
+
+
+def exceeding(series: Series, allowed_mm: float) -> Exceeding:
+    """The check of a series."""
+    known = series.cases["gap_error_mm"].fillna(np.inf).to_numpy()
+    gaps = series.cases["max_gap_mm"].to_numpy()
+    e = known + ROUNDING * abs(gaps)
+    told = allowed_mm >= e
+    larger = told & (gaps - e > allowed_mm)
+    undecided = ~told | (~larger & (gaps + e > allowed_mm))
+    cases = series.cases.assign(e=e)[larger].sort_values("max_gap_mm", ascending=False, kind="stable")
+    counts, largest = np.zeros(series.gaps.m), np.zeros(series.gaps.m)
+    for block, some in series.of_cases(cases):
+        counts += (some - block["e"].to_numpy()[:, None] > allowed_mm).sum(axis=0)
+        largest = np.maximum(largest, some.max(axis=0))
+    shares = counts / max(len(gaps), 1)
+    return Exceeding(
+        allowed_mm, len(gaps), cases, int(undecided.sum()), float(e.max(initial=0.0)), shares, largest
+    )
 
 
 def write(directory: Path, series: Series, found: Exceeding) -> Path:

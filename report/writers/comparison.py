@@ -9,14 +9,27 @@ from typing import Any
 
 import pandas as pd
 
+from report.analysis.checks import commits_text
 from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
-from report.document.blocks import Block, Column, Section, Table, Text, number, word
+from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import csv_frame, file_name
-from report.document.numbers import MISSING, as_number, counted, power, significant, whole
-from report.page.comparison import comparison_data
+from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
+from report.page.write import Data, banner
 from report.page.write import write as write_page
+from report.writers.pages import written
 
-from .pages import written
+NOTE = (
+    "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
+    "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
+    "fewer than three are taken to vary by 15 %."
+)
+#: Columns of the page.
+ON_PAGE = (
+    *("measurement", "change", "verdict_old", "verdict_new", "error_mm_old", "error_mm_new", "digits_lost"),
+    *("iterations_old", "iterations_new", "seconds_old", "seconds_new", "ratio", "ratio_least", "ratio_most"),
+    *("status_old", "status_new"),
+)
+TEXTS = ("measurement", "change", "verdict", "status")
 
 
 @dataclass(frozen=True)
@@ -81,11 +94,6 @@ SOLVERS = [
     number("most", "most_digits_lost"),
     number("ratio of times, geometric mean", "ratio"),
 ]
-NOTE = (
-    "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
-    "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
-    "fewer than three are taken to vary by 15 %."
-)
 
 
 def write(out: Path, comparisons: list[Comparison]) -> Path:
@@ -113,3 +121,32 @@ def _blocks(table: pd.DataFrame, summary: str, prefix: str) -> list[Block]:
     if len(solvers):
         blocks.append(Table(f"{prefix}solvers", "*Solver by solver.*", solvers, SOLVERS))
     return blocks
+
+
+def comparison_data(pairs: list[tuple[str, str, str, pd.DataFrame]], rows: pd.DataFrame) -> Data:
+    """What the page of a comparison shows. pairs : old, new, summary, and the table of each; rows : of all
+    runs, with their `side`.
+    """
+    return {
+        "kind": "compare",
+        "banner": _banner(rows),
+        "columns": [[name, name.replace("_", " "), not name.startswith(TEXTS)] for name in ON_PAGE],
+        "comparisons": [
+            {"old": old, "new": new, "summary": summary, "lines": [_line(line) for line in records(table)]}
+            for old, new, summary, table in pairs
+        ],
+    }
+
+
+def _banner(rows: pd.DataFrame) -> Data:
+    sides = [(str(side), of_side) for side, of_side in rows.groupby("side", sort=False)]
+    changed = [side for side, of_side in sides if (of_side["clean"] == 0).any()]
+    warned = [f"Rows of {listed(changed)} were measured with uncommitted changes."] if changed else []
+    if rows["machine"].nunique() > 1:
+        warned.append("The rows come from several machines; times are compared within one machine only.")
+    code = "; ".join(f"{side}: {commits_text(of_side)}" for side, of_side in sides)
+    return banner(rows, commits=code, counts=f"{len(rows)} rows", warnings=warned)
+
+
+def _line(line: dict[str, Any]) -> Data:
+    return {name: None if pd.isna(line[name]) else line[name] for name in ("group", *ON_PAGE)}

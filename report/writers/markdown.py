@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 from report.analysis.checks import warnings
 from report.document.blocks import Block, Section, Text
-from report.document.contents import contents
 from report.figures import style
 from report.page.run import run_data
 from report.page.write import write as write_page
@@ -40,6 +42,18 @@ def write(directory: Path) -> Path:
         intro.append(f"Contents: {contents([section.title for section in sections])}")
     write_page(target / "index.html", results.title, run_data(results), directory)
     return written(target / "report.md", results.title, sections, [text for text in intro if text])
+
+
+def contents(titles: Iterable[str]) -> str:
+    """Links to headings of these titles, in one paragraph; equal titles lead to one heading each, in turn."""
+    seen: Counter[str] = Counter()
+    links = []
+    for title in titles:
+        anchor = re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")  # as GitHub names it
+        again = f"-{seen[anchor]}" if seen[anchor] else ""
+        seen[anchor] += 1
+        links.append(f"[{title}](#{anchor}{again})")
+    return " · ".join(links)
 
 
 def _made(results: Results, machine: int | None) -> list[Section]:

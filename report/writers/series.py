@@ -9,23 +9,24 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
+from report.analysis.checks import code_warnings
 from report.document.blocks import Figure, Section, Table, number, word
 from report.document.escape import file_name
 from report.document.numbers import counted, significant, tidy_power
 from report.figures import style
 from report.figures.maps import Map, drawn, rooted
-from report.page.series import CURVES, series_data
+from report.page.maps import series_maps
+from report.page.write import Data, banner
 from report.page.write import write as write_page
-from report.results.series import Array, Series, read
-
-from .pages import emptied, written
+from report.results.series import QUANTILES, Array, Series, convergence, exceedance, quantile_maps, read
+from report.writers.pages import emptied, written
 
 MAPPED = (0.5, 0.95, 0.99)
 PERCENT = {q: f"{100 * q:g} % quantile" for q in QUANTILES}
 LOOKS = ((style.BLUE, "-"), (style.VERMILLION, "--"), (style.BLACK, ":"))
 GAPS = {"max_gap_mm": "largest gap per case", "mean_gap_mm": "mean gap per case"}
 STEPS = {"setup_s": "update or set-up", "solve_s": "solve", "form_s": "x, gaps, residuals, error bound"}
+CURVES = {"share_of_cases": "cases, by their largest gap", "share_of_contacts": "contacts, mean of the cases"}
 
 
 def write(directory: Path) -> Path:
@@ -156,3 +157,36 @@ def _swept(series: Series, key: str) -> Figure:
 def _axes() -> tuple[Drawing, Axes]:
     drawing = style.figure(3.2)
     return drawing, drawing.subplots()
+
+
+def series_data(series: Series, quantiles: Array, names: list[str], curve: pd.DataFrame) -> Data:
+    """What the page of a series shows.
+
+    quantiles : (len(names), m), mm, the maps; curve : the exceedance over all contacts, as in
+    report.results.series.
+    """
+    facts = series.facts
+    versions = facts.get("versions") or {}
+    identity = facts["identity"]
+    known = {"machine": str(facts["machine"]), "recorded_at": "", "solver": identity["solver"]}
+    rows = series.code.assign(**known, solver_code=identity.get("solver_code") or "")
+    rows["clean"] = rows["clean"].astype(float)
+    return {
+        "kind": "series",
+        "banner": banner(
+            rows,
+            warnings=code_warnings(rows),
+            counts=f"{len(series.cases)} of {facts['cases']} load cases answered",
+            versions=[f"{name} {version}" for name, version in versions.items()],
+        ),
+        "curves": [
+            {
+                "name": name,
+                "points": [
+                    [gap, 100 * share] for gap, share in zip(curve["gap_mm"], curve[key], strict=True)
+                ],
+            }
+            for key, name in CURVES.items()
+        ],
+        "maps": series_maps(series, quantiles, names),
+    }

@@ -17,8 +17,7 @@ from report.page.answer import two_answers_data
 from report.page.write import write as write_page
 from report.results.answers import Answer, contacts, fasteners, pair_name, read
 from report.results.series import Array
-
-from .pages import written
+from report.writers.pages import written
 
 SIDES = ("first", "second")
 CAPTIONS = {

@@ -8,17 +8,26 @@ from pathlib import Path
 from report.figures import style
 from report.writers.pages import emptied, written
 
-from . import claims, figures5_7, table1, table2, table3, table4
+from . import claims, figures5_7, table3, tables
 from .rows import study
 
 TITLE = "The paper's claims, tables and figures, beside its published numbers"
+
+SECTIONS = (
+    claims.section,
+    tables.cg_iterations,
+    tables.starting_points,
+    table3.section,
+    tables.test_problems,
+    figures5_7.section,
+)
 
 
 def write(directory: Path) -> Path:
     """Returns the path of the page. Raises FileNotFoundError, ValueError."""
     found = study(directory)
     with style.applied():
-        made = [part.section(found) for part in (claims, table1, table2, table3, table4, figures5_7)]
+        made = [section(found) for section in SECTIONS]
     target = emptied(directory / "study") / "study.md"
     return written(target, TITLE, [section for section in made if section])
 

@@ -13,9 +13,7 @@ from report.document.blocks import Section
 from . import systems_and_starts as one
 from . import table3
 from . import two_methods as two
-from .lines import table
-from .rows import FORMS, METHODS, Study
-from .times import Evidence
+from .rows import FORMS, METHODS, Evidence, Study, table
 
 #: Name, section, claim, the rule by which it holds in a case, and the paper's figure.
 CLAIMS = Path(__file__).parent / "claims.csv"

@@ -13,8 +13,7 @@ from report.document.blocks import Block, Figure, Section
 from report.figures import style
 from report.figures.lines import MARKS, against_contacts, entries
 
-from .lines import table
-from .rows import METHODS, Study
+from .rows import METHODS, Study, table
 from .table3 import LOOKS
 
 FIGURES = {4386: 5, 6112: 6, 11308: 7}

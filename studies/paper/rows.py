@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from report.analysis.seconds import seconds_text, timed
+from report.analysis.standings import TIE, seconds_text, timed
+from report.document.blocks import Column, Table
+from report.document.numbers import as_number, significant
 from report.results.reader import read
 
 Row = dict[str, Any]
@@ -143,3 +146,54 @@ def counts(row: Mapping[str, Any] | None) -> Counts | None:
     if row is None or not cg or not cg["predictor"]:
         return None
     return Counts(cg["predictor"], cg.get("corrector", []), row["status"] == "iteration_limit")
+
+
+LARGE = 1e5  # numbers from here on have a power of ten
+
+
+def table(name: str, caption: str, lines: Sequence[Mapping[str, Any]], keys: int = 1) -> Table:
+    """keys : the columns that a table repeats where it continues below."""
+    frame = pd.DataFrame(lines, dtype=object)
+    texts = {key: all(isinstance(cell, str) for cell in frame[key]) for key in lines[0]}
+    columns = [Column(key, partial(_shown, key=key), "left" if texts[key] else "right") for key in lines[0]]
+    return Table(name, caption, frame, columns, keys)
+
+
+def _shown(line: Mapping[str, Any], key: str) -> str:
+    cell = line[key]
+    if isinstance(cell, str):
+        return cell.replace("|", r"\|")
+    number = as_number(cell)
+    whole = number is not None and number.is_integer() and abs(number) < LARGE
+    return f"{number:.0f}" if whole else significant(number)
+
+
+#: For each case (a scene, a size, a form …) whether the claim holds there, None if the rows leave that open,
+#: and the figures that decide it.
+Evidence = Iterator[tuple[str, bool | None, str]]
+
+
+def pairs(a: ByScene, b: ByScene) -> list[tuple[Row, Row]]:
+    """Rows on the same scenes, both with a time or a lower bound of it."""
+    pairs = [(a[scene], b[scene]) for scene in a if scene in b]
+    return [(mine, other) for mine, other in pairs if mine["at_least"] and other["at_least"]]
+
+
+def clearly_faster(a: Row, b: Row) -> bool | None:
+    """None if they take about as long, or a lower bound leaves it open."""
+    if TIE * a["at_least"] < b["at_least"]:
+        return None if a["cut"] else True
+    if TIE * b["at_least"] < a["at_least"]:
+        return None if b["cut"] else False
+    return None
+
+
+def merged(rows: Iterable[Row], how: Callable[[list[float]], float]) -> Row:
+    """The seconds of several rows as one."""
+    rows = list(rows)
+    return {"at_least": how([row["at_least"] for row in rows]), "cut": any(row["cut"] for row in rows)}
+
+
+def against(mine: Row, other: Row) -> str:
+    a, b = (f"{'> ' * row['cut']}{significant(row['at_least'])}" for row in (mine, other))
+    return f"{a} against {b} s"

@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable
 
 from report.document.numbers import power, span
 
-from .rows import SYSTEMS, ByScene, Study, counts
-from .table2 import RIVALS, STARTS, iterations, loads
-from .times import Evidence, against, clearly_faster, merged, pairs
+from .rows import SYSTEMS, ByScene, Evidence, Study, against, clearly_faster, counts, merged, pairs
+from .tables import RIVALS, STARTS, iterations, loads
 
 # The thresholds that claims.csv states.
 RATIO, HUNDREDS, LATE = 20, 100, 40  # CG iterations

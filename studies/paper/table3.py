@@ -13,8 +13,7 @@ from report.document.blocks import Figure, Section
 from report.document.numbers import MISSING
 from report.figures import style
 
-from .lines import table
-from .rows import METHODS, Row, Study
+from .rows import METHODS, Row, Study, table
 
 SHORTEST_S = 1e-3  # a shorter time does not show how the work grows
 #: Name in the tables → the order in n that the paper gives each family, if it gives one.

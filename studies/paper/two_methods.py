@@ -11,8 +11,7 @@ from report.analysis.fit import Exponent
 from report.document.numbers import power, significant, whole
 
 from . import table3
-from .rows import BETTER, FORMS, METHODS, Row, Study
-from .times import Evidence, against, clearly_faster, merged, pairs
+from .rows import BETTER, FORMS, METHODS, Evidence, Row, Study, against, clearly_faster, merged, pairs
 
 # The thresholds that claims.csv states.
 CLOSE = 0.3  # exponents

@@ -21,7 +21,7 @@ from harness.results.records import read_arrays
 from harness.scene.solve import solve
 from problems.build import load_case, model_of, prepared
 from problems.scene import read_scene
-from report.writers.vtu import grid_with_fields, write_vtu
+from report.writers.solution import grid_with_fields, write_vtu
 
 ROOT = Path(__file__).parents[2]
 SCENE = """

@@ -10,11 +10,9 @@ from matplotlib.colors import to_rgb
 from synthetic_results import results, row
 
 from problems.manufactured.ladder import ladders
-from report.analysis.outcomes import with_outcomes
 from report.figures import style
-from report.figures.ladder_map import COUNTED, ladder_map
 from report.figures.maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
-from report.sections.steps import steps
+from report.sections.ladders import COUNTED, ladder_map, with_outcomes
 from solvers.registry import modules, owner_of
 
 NAMED = {"floating", "loads", "parts"}  # ladders whose rungs are words
@@ -63,17 +61,6 @@ def test_a_wrong_answer_on_a_rung_says_by_how_much(tmp_path: Path, error: float,
     (axes,) = ladder_map(cells, list(cells["label"]), {"conditioning": ["1e+10"]}).axes
     assert {shown, "cond(K)", "conditioning"} <= {text.get_text() for text in axes.texts}
     assert axes.get_xticklabels()[0].get_text() == "1e+10"
-
-
-def test_the_picture_of_steps_shows_seconds_the_fastest_first(tmp_path: Path) -> None:
-    rows = [row(solver="newton", solve_s=0.5), row(solver="gi", solve_s=54.0)]
-    found = results(tmp_path, rows)
-    section = steps(found)
-    (axes,) = section.blocks[0].drawing.axes  # type: ignore[union-attr]
-    assert [text.get_text() for text in axes.get_yticklabels()] == ["newton (dual)", "gi (dual)"]
-    rows = [[bar for bar in axes.patches if round(bar.get_y() + 0.4) == k] for k in (0, 1)]
-    ends = [max(bar.get_x() + bar.get_width() for bar in bars) for bars in rows]
-    assert ends == pytest.approx(found.cells.sort_values("total_s")["total_s"].tolist())
 
 
 def test_many_marks_hide_no_field() -> None:

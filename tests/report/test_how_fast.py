@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from synthetic_results import row, write_rows
 
-from report.analysis.how_fast import FROM_SCENE, ONE_MORE, how_fast
 from report.results.reader import Results, read
-from report.sections import how_fast as shown
+from report.sections import roads
+from report.sections.roads import FROM_SCENE, ONE_MORE, ours_and_others
 
 #: solver, form, owner, seconds to solve on scenes 0 and 1; None: outside the limit.
 LINES: list[tuple[str, str, str, tuple[float | None, float | None]]] = [
@@ -44,7 +44,7 @@ def results(folder: Path, made: list[dict[str, Any]]) -> Results:
 
 
 def table(folder: Path, made: list[dict[str, Any]]) -> pd.DataFrame:
-    found = how_fast(results(folder, made))
+    found = ours_and_others(results(folder, made))
     return found.set_index("question") if len(found) else found
 
 
@@ -62,7 +62,7 @@ def test_the_fastest_of_each_owner_scene_by_scene(tmp_path: Path) -> None:
 
 def test_what_no_library_solves_counts_as_more(tmp_path: Path) -> None:
     made = [r | ({"verdict": "outside"} if r["owner"] == "library" else {}) for r in rows()]
-    section = shown.section(results(tmp_path, made))
+    section = roads.how_fast(results(tmp_path, made))
     assert section is not None
     (text,) = (block.markdown for block in section.blocks)
     assert "more × (–)" in text

@@ -11,13 +11,11 @@ import pandas as pd
 import pytest
 from synthetic_results import no_answer, results, row, table, write_rows
 
-from report.analysis.precision import pareto
-from report.analysis.standings import shown, standings
+from report.analysis.standings import pareto, shown, standings
 from report.document.numbers import significant
-from report.figures.scoreboard import explained, scoreboard
 from report.results.reader import Results, read
 from report.sections.speed import contacts
-from report.sections.summary import EACH, PREPARED, advice
+from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard
 from report.writers.markdown import write
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -106,12 +104,9 @@ def test_what_is_damaged_or_mixed_is_said(tmp_path: Path) -> None:
     plan = f'scenes = ["{LOW}", "{HIGH}"]\n[[solver]]\nname = "a"\nforms = ["dual", "primal"]\n'
     (tmp_path / "suite.toml").write_text(plan, "utf-8")
     (tmp_path / "machine.json").write_text('{"machine": "Made', "utf-8")
-    (tmp_path / "scenes").mkdir()
-    (tmp_path / "scenes" / "4386_1000.npz").write_bytes(b"PK torn")
     text = write(tmp_path).read_text("utf-8")
     assert "machine.json could not be read" in text
-    assert "The file of scene 4386/1000 could not be read." in text
-    assert "2 of 4 measurements" in text
+    assert "2 of 4 combinations of scene, solver and form" in text
     assert "a was run in several versions: 1.0 and 1.1." in text
     assert "In 1 row (a) the number of threads in effect was not the requested one" in text
     assert "measurements.jsonl, line 3, could not be read" in text

@@ -1,6 +1,5 @@
 """The sections on what accuracy costs, from rows whose facts were planted."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +8,10 @@ from accuracy_results import HIGH, LOW, answer, sweep
 from matplotlib.image import imread
 from synthetic_results import no_answer, results, row, shown, table, write_rows
 
-from report.analysis.checks import planned_measurements
-from report.analysis.precision import swept, with_errors
-from report.analysis.standings import best_tolerances, fastest_first
+from report.analysis.standings import best_tolerances, fastest_first, swept, with_errors
 from report.document.blocks import Figure
 from report.results.reader import Results
-from report.sections import accuracy, profiles, summary
+from report.sections import accuracy, summary
 from report.writers.markdown import write
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -35,13 +32,8 @@ def advised(found: Results) -> Any:
 
 def test_a_whole_report_has_every_section_and_its_pictures(tmp_path: Path) -> None:
     rows = [answer(LOW, "honest", 7, 1.3, 5e-8, repeat=1), *sweep()]
-    rows += [answer(f"4386/{k}", "honest", 7, 1.0, 1e-9) for k in (200, 300, 400)]
-    rows += [answer(f"4386/{k}", "liar", 7, 2.0, 1e-9) for k in (200, 300, 400)]
     written = write(write_rows(tmp_path, rows)).read_text("utf-8")
-    for title in (
-        *("Which solver to use", "The cost of accuracy", "Requested tolerance and achieved error"),
-        *("Residuals and displacement error", "Performance profiles"),
-    ):
+    for title in ("Which solver to use", "The cost of accuracy", "Requested tolerance and achieved error"):
         assert f"## {title}\n" in written
     for picture in (tmp_path / "report").glob("*.png"):
         assert imread(picture)[..., :3].std() > 0.04, f"{picture} is blank"
@@ -97,14 +89,6 @@ def test_prices_are_the_fastest_measured_run_that_is_accurate_enough(tmp_path: P
     line = prices(results(tmp_path, sweep())).loc["honest (dual)"]
     # errors are half the tolerance: 10^-k is first met at k digits, which take 0.01 · 2^k s
     assert [line[f"seconds_1e-{k}"] for k in (3, 5, 7, 9)] == pytest.approx([0.08, 0.32, 1.28, 5.12])
-    assert line["factor_per_digit"] == pytest.approx(2.0)
-
-
-def test_the_factor_per_digit_follows_the_times(tmp_path: Path) -> None:
-    rows = [answer(LOW, "a", k, 0.01 * 5**k, 10.0**-k) for k in (3, 4, 5, 6)]
-    assert prices(results(tmp_path / "a", rows)).loc["a (dual)", "factor_per_digit"] == pytest.approx(5.0)
-    short = [answer(LOW, "a", k, 0.01 * 5**k, 10.0 ** (-3 - k / 10)) for k in (3, 4, 5, 6)]
-    assert math.isnan(prices(results(tmp_path / "b", short)).loc["a (dual)", "factor_per_digit"])
 
 
 def test_a_price_is_the_geometric_mean_over_the_scenes(tmp_path: Path) -> None:
@@ -154,31 +138,6 @@ def test_what_the_reference_leaves_open_is_in_the_solvers_favour(tmp_path: Path)
     assert trust.loc["a (dual)", "above_tolerance"] == 0
 
 
-def test_small_residuals_beside_a_large_error_are_counted(tmp_path: Path) -> None:
-    tiny = {"primal_residual": 1e-15, "dual_residual": 1e-12, "duality_gap": 1e-13}
-    section = accuracy.residuals(results(tmp_path, changed(sweep(), "coarse", **tiny)))
-    line = table(section, "residual-error").data.set_index("method").loc["coarse (dual)"]
-    assert [line["small_residual"], line["outside"], line["worst_error_mm"]] == [8, 8, 5e-3]
-
-
-def test_profiles_count_what_failed_as_never(tmp_path: Path) -> None:
-    seconds = {"a": (1.0, 1.0, 1.0, 6.0, 8.0), "b": (3.0, 2.0, 1.0, 2.0, 1.0), "c": (0.1,) * 5}
-    rows = [
-        answer(f"4386/{k}", solver, 7, t, 1e-6 if solver == "c" else 1e-9)
-        for solver, times in seconds.items()
-        for k, t in enumerate(times, start=100)
-    ]
-    rows += [answer("4386/100", "seldom", 7, 0.01, 1e-9), answer("4386/100", "a", 9, 5.0, 1e-10)]
-    late = answer("4386/105", "b", 7, 9.0, 1e-9) | no_answer("time_limit")
-    rows += [answer("4386/105", "a", 7, 9.0, 1e-9), late, answer("4386/105", "c", 7, 0.1, 1e-6)]
-    found = table(profiles.section(results(tmp_path, rows)), "profiles").data.set_index("method")
-    counts = found[["load_cases", "answered", "within_1", "within_2", "within_10"]]
-    assert counts.loc["a (dual)"].tolist() == [6, 6, 4, 4, 6]  # ratios 1, 1, 1, 3, 8 and 1
-    assert counts.loc["b (dual)"].tolist() == [6, 5, 3, 4, 5]  # ratios 3, 2, 1, 1, 1 and none
-    assert counts.loc["c (dual)"].tolist() == [6, 0, 0, 0, 0]
-    assert "seldom (dual)" not in found.index
-
-
 def test_settings_must_reach_the_accuracy_on_every_scene(tmp_path: Path) -> None:
     rows = [r for r in sweep() if r["solver"] == "honest"]
     rows += [answer(LOW, "lucky", 7, 0.001, 1e-9), answer(HIGH, "lucky", 7, 0.001, 1e-6)]
@@ -209,18 +168,3 @@ def test_the_best_of_several_tolerances_stands_for_a_solver(tmp_path: Path) -> N
     methods = table(summary.summary(found), "summary").data["method"]
     assert methods.tolist()[:2] == ["honest (dual)", "liar (dual)"]
     assert methods.is_unique
-
-
-def test_what_two_entries_of_a_suite_ask_for_is_planned_once() -> None:
-    one = {"name": "a", "forms": ["dual"], "tolerances": [1e-3, 1e-5, 1e-7]}
-    again = {"name": "a", "forms": ["dual"], "tolerances": [1e-5], "scenes": ["4386/*"], "repeats": 3}
-    suite = {"scenes": [LOW, "6112/0600"], "threads": [2], "solver": [one, again]}
-    assert planned_measurements(suite) == 2 * 3 + 2
-
-
-def test_an_entry_with_its_own_threads_or_cases_plans_no_more_than_those() -> None:
-    own = {"name": "a", "forms": ["dual"], "threads": [2], "cases": 3}
-    rest = {"name": "b", "forms": ["dual"]}
-    suite = {"scenes": [LOW], "tolerances": [1e-9], "threads": [1, 2], "solver": [own, rest]}
-    assert planned_measurements(suite | {"series": {"cases": 5}}) == 3 + 2 * 5
-    assert planned_measurements(suite | {"solver": [rest]}) == 2

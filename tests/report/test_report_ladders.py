@@ -11,16 +11,16 @@ from matplotlib.image import imread
 from synthetic_results import no_answer, write_rows
 from synthetic_results import row as any_row
 
-from report.analysis.outcomes import (
+from report.results.reader import read
+from report.sections.ladders import (
     CORRECT,
     CORRECT_UNCLAIMED,
     NO_ANSWER,
     UNJUDGED,
     WRONG_CLAIMED,
     WRONG_UNCLAIMED,
+    rungs_in_order,
 )
-from report.results.reader import read
-from report.sections.ladders import rungs_in_order
 from report.writers.markdown import write
 
 EASY, MIDDLE, HARD, ODD = "hard/steep/1e1", "hard/steep/1e5", "hard/steep/1e9", "hard/odd/one"
@@ -80,17 +80,6 @@ def test_the_worst_answer_is_counted_and_named(directory: Path) -> None:
     }
     assert table.loc["a (dual)", "worst_share"] == pytest.approx(3e3)
     assert table.loc["ipm (dual)", "worst_share"] == pytest.approx(1e-2)
-
-
-def test_each_ladder_breaks_at_its_first_wrong_rung(directory: Path) -> None:
-    write(directory)
-    table = pd.read_csv(directory / "report" / "breaking-points.csv", keep_default_na=False)
-    assert list(table) == ["label", "odd", "steep"]  # as the suite lists them
-    assert table.to_numpy().tolist() == [
-        ["ipm (dual)", "–", "–"],
-        ["a (dual)", "one", "1e5"],
-        ["b (dual)", "one", "1e9 ×"],
-    ]
 
 
 def test_wrong_answers_reported_as_solved_are_counted_apart(directory: Path) -> None:

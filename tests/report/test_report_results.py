@@ -10,8 +10,8 @@ from synthetic_results import no_answer, row, write_rows
 from report.analysis import checks
 from report.analysis.checks import warnings
 from report.figures import style
-from report.results.labels import in_order
 from report.results.reader import read
+from report.results.rows import in_order
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0100", "4386/1000"

@@ -5,14 +5,14 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from synthetic_results import no_answer, results, row, shown, table
+from synthetic_results import no_answer, results, row, table
 
 from harness.results import schema
 from problems.forms import names
 from report.analysis.roads import roads
 from report.results.reader import Results
-from report.sections import problems, summary
-from report.sections.steps import from_scene
+from report.sections import summary
+from report.sections.roads import section as from_scene
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0107", "4386/1471"
@@ -89,18 +89,6 @@ def test_without_an_answer_within_the_limit_the_stages_are_still_shown(tmp_path:
     section = from_scene(built(tmp_path, [sparse(verdict="outside"), dense(verdict="outside")]))
     assert len(section.blocks) == 1
     assert "(outside)" in table(section).markdown
-
-
-def test_the_problems_have_the_facts_of_the_sparse_form(tmp_path: Path) -> None:
-    own = {"unknowns": 46956, "reference_bound_mm": 1.6e-11, "from_condensed_mm": 3e-12}
-    facts = {"reference_bound_mm": 2e-12, "title": "A scene", "reference_route": "proven"}
-    scenes = table(problems.section(built(tmp_path, [sparse(), dense()], **facts, sparse=own)))
-    assert scenes.data["sparse_unknowns"].tolist() == [46956]
-    assert "difference of the two references, mm" in scenes.markdown
-    assert {"46956", "1.60e-11", "3.00e-12", "2.00e-12"} <= {cell for line in shown(scenes) for cell in line}
-    assert "condensation" in scenes.caption
-    without = table(problems.section(built(tmp_path / "dense", [dense()], **facts)))
-    assert "sparse" not in without.markdown + without.caption
 
 
 def test_the_section_has_a_picture_and_a_table_of_all_stages(tmp_path: Path) -> None:

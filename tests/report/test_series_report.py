@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 
 from harness.results import series_file
-from report.analysis.remaining_gaps import QUANTILES, convergence, exceedance, quantile_maps
-from report.results.series import Series, read
+from report.results.series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
 from report.writers.series import write
 
 CASES, M = 240, 12
@@ -101,9 +100,17 @@ def test_the_report_and_its_files(swept: bool, tmp_path: Path) -> None:
     assert "76.9 cases per second of work" in text
 
 
-def test_a_series_without_an_answer_or_nodes(tmp_path: Path) -> None:
+def test_a_series_without_nodes_has_no_map(tmp_path: Path) -> None:
     made(tmp_path)
-    np.savez(tmp_path / "contacts.npz", m=M)
-    assert "exceedance.png" in write(tmp_path).read_text()
-    (tmp_path / "cases.jsonl").write_text('{"case": 1, "verdict": "no_answer"}\n')
-    assert "1 no answer" in write(tmp_path).read_text()
+    series_file.write_contacts(tmp_path, {"m": np.array(M)})
+    text = write(tmp_path).read_text()
+    assert "exceedance.png" in text
+    assert "quantile-maps" not in text
+
+
+def test_a_series_without_an_answer_has_a_summary_alone(tmp_path: Path) -> None:
+    made(tmp_path)
+    series_file.append(tmp_path, [({"case": k, "verdict": "no_answer"}, None) for k in range(CASES)])
+    text = write(tmp_path).read_text()
+    assert f"{CASES} no answer" in text
+    assert text.count("## ") == 1

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlencode
@@ -22,7 +21,6 @@ from report.page.run import run_data
 from report.page.write import write
 from report.results.reader import read
 from report.results.series import read as read_series
-from report.sections.profiles import ratios
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
 
@@ -182,23 +180,6 @@ def test_the_ranking_is_by_the_share_within_then_by_time(
             assert mean == pytest.approx(means[name])
 
 
-@pytest.mark.parametrize("limit", ["1e-7", "1e-9"])
-def test_the_profiles_are_those_of_the_report(chromium: Any, tmp_path: Path, limit: str) -> None:
-    found = read(everything(tmp_path, {4386: [100, 800, 1500], 6112: [300, 2000]}))
-    opened(chromium, write(tmp_path / "index.html", "Made up", run_data(found), tmp_path), f"limit={limit}")
-    asked = replace(found, cells=found.cells.assign(limit_mm=float(limit)))
-    times = ratios(asked.cells)
-    shown = chromium.execute_script(
-        "const {ratios, count} = profiles(filtered(), Number(STATE.limit));"
-        "const met = list => list.filter(Number.isFinite).sort(d3.ascending);"
-        "return [count, [...ratios].map(([name, list]) => [name, met(list)])]"
-    )
-    assert shown[0] == len(times) == 5
-    assert {name for name, _ in shown[1]} == set(times)
-    for name, values in shown[1]:
-        np.testing.assert_allclose(values, np.sort(times[name][np.isfinite(times[name])]))
-
-
 def test_the_csv_has_the_cells_shown_judged_at_the_limit(
     chromium: Any, made: tuple[pd.DataFrame, Path]
 ) -> None:
@@ -213,20 +194,6 @@ def test_the_csv_has_the_cells_shown_judged_at_the_limit(
     assert list(table["label"]) == list(wanted["label"])
     assert list(table["verdict"]) == list(judged(wanted, 1e-9).replace("?", "cannot_be_judged"))
     np.testing.assert_array_equal(table["load_case_s"].astype(float), wanted["load_case_s"])
-
-
-def test_a_share_counts_before_a_number_and_time_after_both(chromium: Any, tmp_path: Path) -> None:
-    scenes = ["4386/0100", "4386/1000", "4386/2000"]
-    rows = [row(scene, "slow", solve_s=9.0) for scene in scenes]
-    rows += [
-        row(scene, "quick", displacement_error_mm=1e-5 if scene == scenes[2] else 1e-9) for scene in scenes
-    ]
-    rows += [row(scenes[0], "seldom", solve_s=5.0)]
-    opened(chromium, write(tmp_path / "index.html", "", run_data(results_of(tmp_path, rows)), tmp_path))
-    ranked = f"{RANKED}.map(line => line.solver)"
-    assert chromium.execute_script(ranked) == ["slow", "seldom", "quick"]
-    opened(chromium, tmp_path / "index.html", "limit=1e-3")
-    assert chromium.execute_script(ranked) == ["quick", "slow", "seldom"]
 
 
 def test_filters_a_baseline_and_the_address(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
@@ -283,16 +250,6 @@ def test_a_map_of_a_series_has_its_worst_case_and_curves(chromium: Any, tmp_path
     chromium.execute_script("document.getElementById('about-map').textContent = ''")
     chromium.execute_script("document.getElementById('worst').click()")
     assert f"case {worst}, mm" in eventually(chromium, "document.getElementById('about-map').textContent")
-
-
-def test_headings_stay_in_sight(chromium: Any, made: tuple[pd.DataFrame, Path]) -> None:
-    opened(chromium, made[1], "rows=all")
-    chromium.execute_script("document.querySelector('.scroll').style.maxHeight = '200px'")
-    top = "document.querySelector('thead th').getBoundingClientRect().top"
-    before = chromium.execute_script(f"return {top}")
-    chromium.execute_script("document.querySelector('.scroll').scrollTop = 150")
-    assert chromium.execute_script("return document.querySelector('.scroll').scrollTop") > 50
-    assert chromium.execute_script(f"return {top}") == pytest.approx(before, abs=1)
 
 
 def test_the_address_names_the_open_row(chromium: Any, tmp_path: Path) -> None:

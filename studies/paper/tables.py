@@ -1,4 +1,4 @@
-"""Table 1: CG iterations without a preconditioner and with V = U + √D."""
+"""Tables 1, 2 and 4: CG iterations, the starting points on the ten loads, and the test problems."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from report.document.blocks import Figure, Section
-from report.document.numbers import tidy_power
+from report.document.numbers import MISSING, significant, tidy_power, whole
 from report.figures import style
 
-from .lines import table
-from .printed import TABLE_1
-from .rows import SYSTEMS, Counts, Row, Study, counts
+from .printed import TABLE_1, TABLE_2, TABLE_4
+from .rows import SCALING, SYSTEMS, Counts, Row, Study, counts, table
 
 N = 4386  # of the printed table
 PRINTED = {name: Counts(both["predictor"], both["corrector"]) for name, both in TABLE_1.items()}
@@ -27,7 +26,7 @@ LOOKS = {
 }
 
 
-def section(study: Study) -> Section | None:
+def cg_iterations(study: Study) -> Section | None:
     base = [row for row in study.ipm(preconditioner="none").values() if row["n"] == N and counts(row)]
     if not base:
         return None
@@ -74,3 +73,61 @@ def _drawn(lines: dict[str, Counts]) -> Drawing:
     panels[0].set_ylabel("CG iterations")
     drawing.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", handlelength=3.2)
     return drawing
+
+
+STARTS = {"stp1": "STP1", "stp2": "STP2", "algorithm_5": "Algorithm 5", "mehrotra": "Mehrotra"}
+RIVALS = ("stp1", "stp2")
+N = 4386
+
+
+def loads(study: Study) -> dict[int, dict[str, Row]]:
+    """By printed number of active contacts: the row of each start that was measured."""
+    of_start = {start: study.ipm(start=start) for start in STARTS}
+    return {
+        active: {start: rows[scene] for start, rows in of_start.items() if scene in rows}
+        for active in TABLE_2
+        for scene in (f"{N}/{active:04d}",)
+    }
+
+
+def iterations(row: Row | None) -> int | None:
+    """None without an answer."""
+    return int(row["iterations"]) if row and row["verdict"] != "no_answer" else None
+
+
+def starting_points(study: Study) -> Section | None:
+    found = loads(study)
+    if not any(rival in rows for rows in found.values() for rival in RIVALS):
+        return None
+    lines = []
+    for active, rows in found.items():
+        line: Row = {"active, printed": active}
+        line["ours"] = max((row["active"] for row in rows.values()), default=None)
+        for start, name in STARTS.items():
+            row, (its, seconds) = rows.get(start), TABLE_2[active].get(start, (None, None))
+            line[f"{name}: iterations"] = _beside(whole(iterations(row)), whole(its))
+            line[f"{name}: s"] = _beside(row["shown"] if row else MISSING, significant(seconds))
+        lines.append(line)
+    about = (
+        "*The starting points on the ten loads, ours | printed*: iterations, and seconds per load case, the "
+        "printed ones on the paper's machine. The paper does not state its ε_μ. STP1 and STP2 are as read "
+        "from a secondary source; Mehrotra's start is not in the paper."
+    )
+    return Section("Table 2: starting points", [table("table2", about, lines, keys=2)])
+
+
+def _beside(ours: str, printed: str) -> str:
+    return ours if printed == MISSING else f"{ours} | {printed}"
+
+
+def test_problems(study: Study) -> Section:
+    ours = {p["n"]: p for p in study.problems if not p["scene"].startswith(SCALING)}
+    lines: list[Row] = []
+    for problem, n, m, cond in TABLE_4:
+        here = ours.get(n, {})
+        found = here.get("cond_K")
+        line = {"problem": problem, "n": here.get("n"), "n, printed": n, "m": here.get("m"), "m, printed": m}
+        line |= {"cond(K)": found, "cond(K), printed": cond}
+        lines.append(line | {"difference": f"{found / cond - 1:+.2%}" if found else None})
+    about = "*The test problems.* Ours are plate models of our own with the paper's nodes and constraints."
+    return Section("Table 4: test problems", [table("table4", about, lines)])

@@ -1,0 +1,180 @@
+"""How fast is it, from the scene on? Against libraries and textbook methods, and stage by stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure as Drawing
+from matplotlib.patches import Patch
+
+from harness.results.schema import OWNERS
+from report.analysis.roads import LOAD_CASES, STAGES, roads
+from report.analysis.standings import best_tolerances, seconds_text
+from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
+from report.document.escape import short
+from report.document.numbers import counted, significant, whole
+from report.figures import style
+from report.results.reader import Results
+from report.results.rows import in_order
+
+FROM_SCENE = "a load case, from the scene on"
+ONE_MORE = "one more load case on a known assembly"
+MADE = ("model_s", "K_s", "factors_s", "Q_s")  # before the solver's own preparation
+#: Of each stage its name, colour and hatch.
+LOOKS = {
+    "model_s": ("finite-element model", "#C9C9C9", None),
+    "K_s": ("condensation", "#5A5A5A", None),
+    "factors_s": ("factors of K", style.PURPLE, None),
+    "Q_s": ("Q", style.VERMILLION, "xxxx"),
+    "once_s": ("preparation", style.GREEN, None),
+    "solving_s": ("set-up and solve", style.BLUE, None),
+    "recovery_s": ("p and x of the dual", style.SKY, "...."),
+}
+MOST = 12  # lines of a panel
+LONGEST = 60  # characters of a name
+ROW, AROUND = 0.19, 0.45  # inches: a bar; the title and the axis of a panel
+
+
+def how_fast(results: Results) -> Section | None:
+    """For every solver in every form: against libraries, against textbook methods, in seconds."""
+    table = ours_and_others(results)
+    if table.empty:
+        return None
+    columns = [
+        word("question", "question"),
+        number("n", "n", whole),
+        number("scenes", "scenes", whole),
+        Column("the fastest library takes", _times("library")),
+        Column("the fastest textbook method takes", _times("textbook")),
+        Column("the fastest of ours, s (worst scene)", _seconds),
+    ]
+    caption = (
+        "*How fast is it?* From the scene on: condensation, factors, Q and preparation included where a form "
+        "needs them. How many times as long as the fastest of ours: the median over the scenes (the least). "
+        "A scene on which none of them is within the limit counts as more than all others."
+    )
+    return Section("How fast is it?", [Table("how-fast", caption, table, columns, keys=2)])
+
+
+def _times(owner: str) -> Callable[[Mapping[str, Any]], str]:
+    def text(line: Mapping[str, Any]) -> str:
+        median, least = line[owner], line[f"{owner}_least"]
+        return f"{'more' if median == float('inf') else significant(median, 2)} × ({significant(least, 2)})"
+
+    return text
+
+
+def _seconds(line: Mapping[str, Any]) -> str:
+    return f"{significant(line['seconds'], 2)} ({significant(line['seconds_most'], 2)})"
+
+
+def ours_and_others(results: Results) -> pd.DataFrame:
+    """Per question and size n, over the scenes on which ours is within the limit:
+
+    seconds, seconds_most : of the fastest of ours, the median and the worst scene
+    library, library_least : how many times as long the fastest library takes, the median and the least
+    library_none : the scenes on which no library is within the limit; they count as more than all others
+    textbook, … : the same for the textbook methods
+
+    Empty unless libraries and textbook methods were measured on these scenes, in sparse and in dense forms.
+    """
+    ways = roads(results)
+    if ways.empty or not set(OWNERS) <= set(ways["owner"]):
+        return pd.DataFrame()
+    ways = ways[ways["verdict"] == "within"]
+    lines = []
+    for question, seconds in ((FROM_SCENE, "total_1_s"), (ONE_MORE, "load_case_s")):
+        fastest = ways.groupby(["n", "scene", "owner"])[seconds].min().unstack("owner")
+        known = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
+        lines += [{"question": question, "n": n} | _line(of_size) for n, of_size in known.groupby("n")]
+    return pd.DataFrame(lines)
+
+
+def _line(fastest: pd.DataFrame) -> dict[str, Any]:
+    """fastest : seconds by scene and owner."""
+    line: dict[str, Any] = {"scenes": len(fastest), "seconds": fastest["ours"].median()}
+    line["seconds_most"] = fastest["ours"].max()
+    for owner in OWNERS[1:]:
+        times = fastest[owner] / fastest["ours"]
+        line |= {owner: times.fillna(float("inf")).median(), f"{owner}_least": times.min()}
+        line[f"{owner}_none"] = int(times.isna().sum())
+    return line
+
+
+def section(results: Results) -> Section | None:
+    """In a run with sparse and dense forms."""
+    lines = roads(results)
+    if lines.empty:
+        return None
+    order = in_order(lines)
+    table = lines.assign(place=lines["label"].map(order.index), made_s=lines[[*MADE]].sum(axis=1))
+    table = table.sort_values(["n", "active", "scene", "total_1_s", "place"])
+    kept = ["scene", "n", "m", "active", "label", "threads", "tolerance", "status", "verdict"]
+    kept += [*STAGES, "made_s", *(f"total_{k}_s" for k in LOAD_CASES)]
+    kept += ["stored_mib", "peak_rss_mib", "load_case_s", "time_limit_s"]
+    columns = [word("scene", "scene"), word("solver (form)", "label"), number("matrices, s", "made_s")]
+    columns += [Column(f"{counted(k, 'load case')}, s", partial(_total, load_cases=k)) for k in LOAD_CASES]
+    columns += [
+        number("dense matrices, MiB", "stored_mib", whole),
+        number("peak, MiB", "peak_rss_mib", whole),
+    ]
+    caption = (
+        "*From the scene to the answer*, medians of the repeats, totals of several load cases extrapolated. "
+        "Cached matrices count with the seconds that they took to make."
+    )
+    blocks: list[Block] = [Table("roads", caption, table[kept], columns, keys=2)]
+    answered = _at_the_ends(best_tolerances(lines[lines["total_1_s"].notna()]))
+    answered = answered[answered.groupby("scene")["method"].transform("nunique") > 1]
+    if len(answered):
+        caption = (
+            "*From the scene to the answer of one load case*, the fastest first, in seconds; of each size, "
+            "the scenes with the fewest and the most active contacts."
+        )
+        blocks.insert(0, Figure("roads", caption, _stacked(answered)))
+    return Section("From scene to answer", blocks)
+
+
+def _total(line: Mapping[str, Any], load_cases: int) -> str:
+    if line["verdict"] == "within":
+        return significant(line[f"total_{load_cases}_s"])
+    return seconds_text(line) if load_cases == LOAD_CASES[0] else ""
+
+
+def _at_the_ends(cells: pd.DataFrame) -> pd.DataFrame:
+    """Of each size the scenes with the fewest and the most active contacts."""
+    scenes = cells.drop_duplicates("scene").sort_values(["n", "active", "scene"]).groupby("n")["scene"]
+    return cells[cells["scene"].isin([*scenes.first(), *scenes.last()])]
+
+
+def _stacked(lines: pd.DataFrame) -> Drawing:
+    """A panel of bars for each scene, the fastest MOST lines of it."""
+    scenes = [
+        of.sort_values("total_1_s").head(MOST)
+        for _, of in lines.groupby(["n", "active", "scene"], dropna=False)
+    ]
+    heights = [AROUND + ROW * len(of) for of in scenes]
+    drawing = style.figure(sum(heights) + 0.5)
+    panels = drawing.subplots(len(scenes), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for axes, of in zip(panels, scenes, strict=True):
+        left = np.zeros(len(of))
+        for name, (_, color, hatch) in LOOKS.items():
+            look: Any = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.4}
+            axes.barh(np.arange(len(of)), of[name], left=left, height=0.74, **look)
+            left += of[name].to_numpy(dtype=float)
+        for place, line in enumerate(records(of)):
+            at: Any = {"textcoords": "offset points", "va": "center", "fontsize": 8}
+            axes.annotate(significant(line["total_1_s"]), (left[place], place), (4, 0), **at)
+        axes.set(xlim=(0, 1.14 * left.max()), ylim=(len(of) - 0.5, -0.5))
+        axes.set_yticks(range(len(of)), [short(name, LONGEST) for name in of["method"]])
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+        axes.set_title(f"n = {whole(of['n'].iloc[0])}, {whole(of['active'].iloc[0])} active")
+    axes.set_xlabel("seconds")
+    used = [look for name, look in LOOKS.items() if (lines[name] > 0).any()]
+    handles = [Patch(facecolor=color, hatch=hatch, label=text) for text, color, hatch in used]
+    drawing.legend(handles=handles, loc="outside lower center", ncols=4)
+    return drawing
