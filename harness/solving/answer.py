@@ -20,7 +20,7 @@ from .session import SolverSession
 NO_ANSWER = "gave no answer; try another solver or form"
 NO_CONTACT = "no contact closes"
 #: The methods that a reference may be proven from.
-DENSE = ("newton", "ipm-fast", "ipm", "gi", "lemke")
+DENSE = ("newton", "ipm-fast", "ipm", "gi")
 SPARSE = ("newton", "mprgp")
 TOLERANCE_MM = 1e-11  # of these
 

@@ -6,8 +6,8 @@ import scipy.linalg as sla
 from long import seeds
 from small import definite
 
-from solvers.interior_point.newton_system import conjugate_gradients
-from solvers.interior_point.preconditioner import (
+from solvers.algorithms.newton_system import conjugate_gradients
+from solvers.algorithms.preconditioner import (
     REORDER_AFTER,
     SYSTEMS,
     CholeskyPlusRoot,

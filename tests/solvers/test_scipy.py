@@ -9,7 +9,6 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.base import Answer
 from solvers.registry import make_solver
-from solvers.textbook import l_bfgs_b
 
 EPS = float(np.finfo(float).eps)
 
@@ -42,10 +41,3 @@ def test_one_that_met_no_tolerance_does_not_say_solved() -> None:
     answer = solved(prepared, load, 1e-300)
     assert answer.status == "inaccurate"
     assert answer.details["products"] > 10
-
-
-def test_a_limit_that_was_reached_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(l_bfgs_b, "LIMIT", 3)
-    prepared = make_strips(40)
-    _, load = make_load(3, prepared)
-    assert solved(prepared, load).status == "iteration_limit"

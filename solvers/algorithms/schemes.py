@@ -1,4 +1,4 @@
-"""The iterations of the interior-point method on min ½λᵀQλ − pᵀλ, λ ≥ 0: Algorithms 2 and 3, and Mehrotra's.
+"""The iterations of the interior-point method on min ½λᵀQλ − pᵀλ, λ ≥ 0: Algorithm 3, and Mehrotra's.
 
 With A = I the unknowns are λ, its slack w and the multiplier y = Qλ − p (the gaps). w = λ holds at
 the start and is preserved by every step, so w is not stored.
@@ -55,14 +55,13 @@ class Point:
 class NewtonSteps:
     """Directions and steps for one load case, and the CG iterations that they took.
 
-    theta : fraction of the step to the boundary, in (0, 1). sigma : centring parameter of Algorithm 2.
+    theta : fraction of the step to the boundary, in (0, 1).
     """
 
     Q: Matrix
     p: Vector
     system: NewtonSystem
     theta: float
-    sigma: float
     cg_tolerance: float
     cg_left: float
     counts: dict[str, list[int]] = field(default_factory=lambda: {"predictor": [], "corrector": []})
@@ -95,12 +94,6 @@ class NewtonSteps:
         return self.at(point.lam + alpha * dlam, point.y + alpha * dy)
 
 
-def algorithm_2(newton: NewtonSteps, point: Point) -> Point:
-    """One Newton step with a given centring parameter σ: plain path following."""
-    s3 = newton.sigma * point.mu - point.lam * point.y
-    return newton.moved(point, *newton.direction(point, s3, "predictor"))
-
-
 def algorithm_3(newton: NewtonSteps, point: Point) -> Point:
     """The predictor step is taken; the corrector is a second Newton step, with its own matrix."""
     s3 = -point.lam * point.y
@@ -127,6 +120,5 @@ def mehrotra(newton: NewtonSteps, point: Point) -> Point:
 #: The option `scheme`.
 SCHEMES: dict[str, Callable[[NewtonSteps, Point], Point]] = {
     "algorithm_3": algorithm_3,
-    "algorithm_2": algorithm_2,
     "mehrotra": mehrotra,
 }
