@@ -10,10 +10,21 @@ from typing import Any
 
 import numpy as np
 
+from solvers.algorithms.interior_point import (
+    SCHEMES,
+    CgExhausted,
+    NewtonSteps,
+    NoStart,
+    Point,
+    Start,
+    algorithm_4,
+    algorithm_5,
+    mehrotra_start,
+    stp1,
+    stp2,
+)
 from solvers.algorithms.newton_system import NewtonSystem
 from solvers.algorithms.preconditioner import SYSTEMS, OpenLast
-from solvers.algorithms.schemes import SCHEMES, CgExhausted, NewtonSteps, Point
-from solvers.algorithms.start import NoStart, Start, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
 from solvers.base import Answer, LoadCase, Problem, Status
 from solvers.kkt import largest_rounding
 from solvers.method import Method, State

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from solvers.algorithms.interior_point import NewtonSteps, mehrotra, stp2
 from solvers.algorithms.newton_system import Banded, Direct, NewtonSystem
-from solvers.algorithms.schemes import NewtonSteps, mehrotra
-from solvers.algorithms.start import stp2
 from solvers.algorithms.sweeps import Sweeps
 from solvers.base import Answer, LoadCase, Problem, failed
 from solvers.method import Method, State

@@ -14,9 +14,8 @@ from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
+from solvers.algorithms.interior_point import NewtonSteps, Point, algorithm_3, algorithm_5, mehrotra
 from solvers.algorithms.preconditioner import SYSTEMS
-from solvers.algorithms.schemes import NewtonSteps, Point, algorithm_3, mehrotra
-from solvers.algorithms.start import algorithm_5
 from solvers.base import Answer
 from solvers.methods.ipm import Ipm
 from solvers.methods.ipm_fast import FastIpm
@@ -214,7 +213,7 @@ def test_where_no_feasible_start_is_found_another_is_taken() -> None:
 
 def test_conjugate_gradients_that_stagnate_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a step it does not call itself solved, and says what held it up."""
-    monkeypatch.setattr("solvers.algorithms.schemes.CG_LIMIT", 0)
+    monkeypatch.setattr("solvers.algorithms.interior_point.CG_LIMIT", 0)
     answer = solved(definite(40, 0), np.ones(40))
     assert answer.status == "inaccurate"
     assert answer.details["restarts"] == 2

@@ -102,15 +102,6 @@ def test_every_system_solves(name: str) -> None:
     assert system.factorisations == 0
 
 
-def test_one_matrix_is_factored_once_for_two_right_hand_sides() -> None:
-    system = SYSTEMS["direct"](definite(8, 0))
-    system.begin()
-    D = np.arange(1.0, 9.0)
-    for b in np.eye(8)[:3]:
-        system.solve(D, b, 1e-3, 100)
-    assert system.factorisations == 1
-
-
 def test_open_gaps_go_last_after_a_slow_system() -> None:
     rng = np.random.default_rng(0)
     size = 120
