@@ -65,18 +65,3 @@ def test_every_step_of_descent_opens_a_contact() -> None:
         found = _towards(aim, lam, aim < 0)
         assert found.min() == 0.0
         assert found[aim >= 0].min() != 0.0
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_weakly_active_contacts_do_no_harm(share: float) -> None:
-    """λ* and y* are made to order, a share of the contacts with both zero."""
-    rng = np.random.default_rng(7)
-    m = 60
-    Q = definite(m, seed=8)
-    weak = rng.random(m) < share
-    lam = np.where(weak | (rng.random(m) < 0.5), 0.0, rng.random(m) + 0.1)
-    y = np.where(weak | (lam > 0), 0.0, rng.random(m) + 0.1)
-    p = Q @ lam - y
-    found = block_pivoting(lambda C: forces_on(C, Q, p), p > 0, np.diag(Q), 1e-11, 200)
-    assert found.converged
-    np.testing.assert_allclose(np.maximum(found.trial.lam, 0), lam, atol=1e-8)

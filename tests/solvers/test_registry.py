@@ -74,6 +74,7 @@ class Diagonal(Solver):
                 lam[i] = max(0.0, lam[i] - (Q[i] @ lam - load.p[i]) / Q[i, i])
         return Answer("solved", lam)
 """
+REFUSING = GOOD.replace("self.sweeps = sweeps", "raise ValueError('sweeps must be positive')")
 
 
 def write(folder: Path, text: str, name: str = "mine.py") -> Path:
@@ -111,17 +112,17 @@ def test_plugin_errors_are_one_clear_message(tmp_path: Path, text: str, words: l
         assert word in str(caught.value)
 
 
-def test_a_missing_plugin_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="existing Python file"):
-        load_plugin(tmp_path / "no.py")
-
-
-def test_a_plugin_may_not_take_a_name_that_is_taken(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="rename the file"):
-        make_solver("piqp", {}, write(tmp_path, GOOD, "piqp.py"))
-
-
-def test_a_plugins_own_complaint_is_an_input_error(tmp_path: Path) -> None:
-    text = GOOD.replace("self.sweeps = sweeps", "raise ValueError('sweeps must be positive')")
-    with pytest.raises(InputError, match="sweeps must be positive"):
-        make_solver("mine", {"sweeps": -1}, write(tmp_path, text))
+@pytest.mark.parametrize(
+    ("name", "options", "file", "text", "message"),
+    [
+        ("no", {}, "no.py", None, "existing Python file"),
+        ("piqp", {}, "piqp.py", GOOD, "rename the file"),
+        ("mine", {"sweeps": -1}, "mine.py", REFUSING, "sweeps must be positive"),
+    ],
+)
+def test_a_plugin_that_cannot_be_made(
+    name: str, options: dict[str, Any], file: str, text: str | None, message: str, tmp_path: Path
+) -> None:
+    path = write(tmp_path, text, file) if text else tmp_path / file
+    with pytest.raises(InputError, match=message):
+        make_solver(name, options, path)
