@@ -28,7 +28,7 @@ from harness.conformance.check import run as check_solver
 from harness.planning.form_choice import chosen_form
 from harness.scene.solution import Solution, Source, load_scene, solve, solver_named
 from harness.series.session import Job, Result, SeriesSession
-from harness.solving.answer import forces_of, form_of
+from harness.solving.session import forces_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import opened
 from problems.build import prepared

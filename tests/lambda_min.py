@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.verification.definite import smallest_eigenvalue
+from harness.verification.balanced import smallest_eigenvalue
 from problems.forms.assembly import Vector
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.operator import Stiffness

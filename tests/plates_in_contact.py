@@ -13,7 +13,7 @@ import numpy as np
 import scikit_fem_plates
 from numpy.typing import NDArray
 
-from harness.solving.answer import answer_of
+from harness.solving.session import answer_of
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase
 from problems.model.effect import GapEffect

@@ -1,6 +1,6 @@
 """Whether the remaining gap is larger than allowed, and where.
 
-The gap y_j of contact j is known up to e_j (harness/verification/gap_error.py). It is larger than allowed
+The gap y_j of contact j is known up to e_j (harness/verification/assess.py). It is larger than allowed
 where y_j − e_j is, and not where y_j + e_j is not; between the two nothing can be said, nor of an allowed gap
 below the largest e_j.
 """

@@ -15,7 +15,7 @@ import numpy as np
 import threadpoolctl
 
 from harness.planning.form_choice import Choice, chosen_form
-from harness.solving.answer import answer_of, form_of
+from harness.solving.session import answer_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, opened
 from problems.errors import InputError

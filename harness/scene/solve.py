@@ -22,7 +22,7 @@ from rich.text import Text
 from harness.results.machine import machine, resident_mib
 from harness.results.provenance import provenance
 from harness.terminal.exit_codes import DONE, FAILED
-from harness.verification.gap_error import GapError
+from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.errors import InputError

@@ -17,8 +17,7 @@ from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.results.series_file import Gaps
 from harness.solving.session import SolverSession
-from harness.verification.assess import Assessment, assess
-from harness.verification.gap_error import GapError
+from harness.verification.assess import Assessment, GapError, assess
 from harness.verification.judge import judge
 from harness.verification.reference import best_of_candidates, proof_of
 from problems.build import prepared

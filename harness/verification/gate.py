@@ -24,8 +24,7 @@ from problems.errors import Fault, InputError
 from problems.forms.names import form_family
 from problems.input.validation import validation_faults
 
-from .baseline import MARGIN, Baseline, read_baseline
-from .findings import Finding, write_json, write_junit
+from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement
 from .reference_problem import ReferenceProblem, reference_problem
 

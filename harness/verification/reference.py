@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.solving.answer import candidates
+from harness.solving.session import candidates
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import ManufacturedScene, Scene
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
-from .definite import smallest_eigenvalue
+from .balanced import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
 from .proof import Proof, Proven
 

@@ -18,12 +18,13 @@ import scipy.linalg as sla
 from scipy.linalg import lapack
 
 from problems.forms.assembly import Matrix, Vector
-from solvers.active_set.goldfarb_idnani import GiResult, Slacks, goldfarb_idnani
-from solvers.active_set.principal_sets import solve_from
+from solvers.algorithms.block_pivoting import solve_from
+from solvers.algorithms.goldfarb_idnani import GiResult, Slacks, goldfarb_idnani
 from solvers.base import DENSE_FORMS, Answer, Form, LoadCase, Problem, failed
 from solvers.kkt import EPS, kkt_residual, kkt_status
 from solvers.method import Method, State
-from solvers.settings import require
+
+MAX_PIVOTS = 10  # changes of the active set, in units of m
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +35,6 @@ class _Prepared(State):
     U: Matrix | None = None
 
 
-@dataclass(kw_only=True, frozen=True, eq=False)
 class GoldfarbIdnani(Method):
     """Goldfarb–Idnani with Powell's safeguards.
 
@@ -43,18 +43,9 @@ class GoldfarbIdnani(Method):
     max(tolerance, 4ε max(|p| + |Q|λ)) mm, else "inaccurate". Iterations are changes of the active set. If
     rounding in Q⁻¹ leaves it inaccurate, or in the primal form an open contact has a slack barely below zero,
     block principal pivoting continues from its set (details: finishing_sets).
-
-    Options
-    -------
-    max_pivots : limit on the changes of the active set, in units of m.
     """
 
     forms: ClassVar[tuple[Form, ...]] = DENSE_FORMS
-
-    max_pivots: float = 10.0
-
-    def __post_init__(self) -> None:
-        require("gi", vars(self), max_pivots=(self.max_pivots > 0, "must be positive"))
 
     def state(self, problem: Problem) -> _Prepared:
         """G: Q itself, or Q⁻¹ from the Cholesky factor of Q."""
@@ -70,7 +61,7 @@ class GoldfarbIdnani(Method):
     def solved(self, ready: _Prepared, load: LoadCase, tolerance: float) -> Answer:
         data = ready.problem
         slacks = _primal_slacks(ready, load) if ready.U is None else _dual_slacks(ready, load)
-        limit = int(self.max_pivots * len(ready.G)) + 10
+        limit = MAX_PIVOTS * len(ready.G) + 10
         result = goldfarb_idnani(ready.G, slacks, tolerance, limit)
         if not np.isfinite(result.u).all():
             return failed("rounding: the multipliers are no longer finite", result.pivots)

@@ -10,16 +10,27 @@ from typing import Any
 
 import numpy as np
 
-from problems.forms.banded_inverse import banded_inverse
+from solvers.algorithms.interior_point import (
+    SCHEMES,
+    CgExhausted,
+    NewtonSteps,
+    NoStart,
+    Point,
+    Start,
+    algorithm_4,
+    algorithm_5,
+    mehrotra_start,
+    stp1,
+    stp2,
+)
+from solvers.algorithms.newton_system import NewtonSystem
+from solvers.algorithms.preconditioner import SYSTEMS, OpenLast
 from solvers.base import Answer, LoadCase, Problem, Status
-from solvers.interior_point.newton_system import Banded, NewtonSystem
-from solvers.interior_point.preconditioner import SYSTEMS, OpenLast
-from solvers.interior_point.schemes import SCHEMES, CgExhausted, NewtonSteps, Point
-from solvers.interior_point.start import NoStart, Start, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
 from solvers.kkt import largest_rounding
 from solvers.method import Method, State
 from solvers.settings import one_of, require
 
+THETA = 0.995  # fraction of the step to the boundary
 STALLED = 10  # iterations without progress before a restart, or the end
 RESTARTS = ((1e-6, 0.9), (1e-9, 0.7))  # cg_tolerance and theta after a stall, at most
 CONTACT_COMPLIANCE = 0.1  # mm/N
@@ -56,12 +67,9 @@ class Ipm(Method):
     -------
     start : algorithm_5, algorithm_4 (the same point), stp1, stp2, mehrotra. If the first two find no
         feasible point, Mehrotra's start, which may be infeasible (details: start_instead).
-    scheme : algorithm_3 as printed; algorithm_2, with a fixed σ; mehrotra, the textbook's.
-    preconditioner : V, U, none, splitting; band, with a banded M ≈ Q⁻¹ and no factorisation of Q; direct is
-        a Cholesky factorisation of every H instead.
+    scheme : algorithm_3 as printed; mehrotra, the textbook's.
+    preconditioner : V, U, none, splitting; direct is a Cholesky factorisation of every H instead.
     ordering : lexicographic, the nodes as they are numbered; open_last, with V only, by increasing D.
-    theta : fraction of the step to the boundary, in (0, 1).
-    sigma : centring parameter of algorithm_2, in [0, 1].
     cg_tolerance : ‖V⁻ᵀ(b − HΔλ)‖₂ ≤ cg_tolerance · ‖V⁻ᵀb‖₂ ends the conjugate gradients.
     max_cg : limit on the iterations of the conjugate gradients, in total.
     """
@@ -70,31 +78,24 @@ class Ipm(Method):
     scheme: str = "algorithm_3"
     preconditioner: str = "V"
     ordering: str = "lexicographic"
-    theta: float = 0.995
-    sigma: float = 0.1
     cg_tolerance: float = 1e-3
     max_cg: float = np.inf
 
     def __post_init__(self) -> None:
-        systems, orderings = (*SYSTEMS, "band"), ORDERINGS if self.preconditioner == "V" else ORDERINGS[:1]
+        orderings = ORDERINGS if self.preconditioner == "V" else ORDERINGS[:1]
         require(
             "ipm",
             vars(self),
             start=one_of(self.start, STARTS),
             scheme=one_of(self.scheme, SCHEMES),
-            preconditioner=one_of(self.preconditioner, systems),
+            preconditioner=one_of(self.preconditioner, SYSTEMS),
             ordering=(self.ordering in orderings, f"must be one of {ORDERINGS}, open_last with V only"),
-            theta=(0 < self.theta < 1, "must lie in (0, 1)"),
-            sigma=(0 <= self.sigma <= 1, "must lie in [0, 1]"),
             cg_tolerance=(0 < self.cg_tolerance < 1, "must lie in (0, 1)"),
             max_cg=(self.max_cg >= 1, "must be at least 1"),
         )
 
     def state(self, problem: Problem) -> _State:
         """The factors of Q."""
-        if self.preconditioner == "band":
-            M = banded_inverse(problem.Q, problem.assembly.contact_nodes)
-            return _State(problem=problem, system=Banded(problem.Q, M))
         kind = OpenLast if self.ordering == "open_last" else SYSTEMS[self.preconditioner]
         return _State(problem=problem, system=kind(problem.Q))
 
@@ -102,7 +103,7 @@ class Ipm(Method):
         Q, system = ready.Q, ready.system
         tolerance /= load.energy**0.5
         system.begin()
-        newton = NewtonSteps(Q, load.p, system, self.theta, self.sigma, self.cg_tolerance, self.max_cg)
+        newton = NewtonSteps(Q, load.p, system, THETA, self.cg_tolerance, self.max_cg)
         details: dict[str, Any] = {"cg": newton.counts}
         start = self._start(ready.problem, load, details)  # Algorithm 3, step 2
         first = newton.at(start.lam, start.y)  # step 3

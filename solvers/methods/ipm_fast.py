@@ -1,4 +1,4 @@
-"""A fast primal–dual interior-point method on the dual form; each ingredient can be switched off.
+"""A fast primal–dual interior-point method on the dual form.
 
 Mehrotra's predictor–corrector (one matrix, two right-hand sides per iteration) from the start STP2; Newton
 systems by conjugate gradients with a banded M ≈ Q⁻¹; and, once most closed contacts are separated from open
@@ -10,13 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from solvers.active_set.sweeps import Sweeps
+from solvers.algorithms.interior_point import NewtonSteps, mehrotra, stp2
+from solvers.algorithms.newton_system import Banded, Direct, NewtonSystem
+from solvers.algorithms.sweeps import Sweeps
 from solvers.base import Answer, LoadCase, Problem, failed
-from solvers.interior_point.newton_system import Banded, Direct, NewtonSystem
-from solvers.interior_point.schemes import NewtonSteps, mehrotra
-from solvers.interior_point.start import algorithm_5, stp2
 from solvers.method import Method, State
-from solvers.settings import one_of, require
 
 THETA = 0.995
 LEAST_GAP = 0.01  # mm, at the start
@@ -34,7 +32,6 @@ class _State(State):
     finish: Sweeps
 
 
-@dataclass(kw_only=True, frozen=True, eq=False)
 class FastIpm(Method):
     """Interior point with an exact finish on the active set it identified.
 
@@ -43,33 +40,20 @@ class FastIpm(Method):
     is the answer's. The interior point ends when the natural residual max|min(q_ii λ_i, (Qλ − p)_i)| is at
     most the tolerance, mm, or has not decreased for 10 iterations. Iterations are Newton matrices, inner
     iterations the finish's products with Q.
-
-    Options
-    -------
-    finish, start_at_gaps, band : false switches off the finish, the start STP2, which Algorithm 5's then
-        replaces, or the banded M in the Newton systems, which a factorisation of each then replaces.
     """
-
-    finish: bool = True
-    start_at_gaps: bool = True
-    band: bool = True
-
-    def __post_init__(self) -> None:
-        options = vars(self)
-        require("ipm-fast", options, **{key: one_of(options[key], (False, True)) for key in options})
 
     def state(self, problem: Problem) -> _State:
         """M, and what the systems need."""
         finish = Sweeps(problem.prepared)
-        system = Banded(problem.Q, finish.M) if self.band and finish.M else Direct(problem.Q)
+        system = Banded(problem.Q, finish.M) if finish.M else Direct(problem.Q)
         return _State(problem=problem, system=system, finish=finish)
 
     def solved(self, ready: _State, load: LoadCase, tolerance: float) -> Answer:
         Q, p, system = ready.Q, load.p, ready.system
         compliance = np.diag(Q)
         system.begin()
-        newton = NewtonSteps(Q, p, system, THETA, 0.0, REFINEMENT, np.inf)
-        start = stp2(Q, p, RHO, LEAST_GAP) if self.start_at_gaps else algorithm_5(Q, p)
+        newton = NewtonSteps(Q, p, system, THETA, REFINEMENT, np.inf)
+        start = stp2(Q, p, RHO, LEAST_GAP)
         point = newton.at(start.lam, start.y)
         details: dict[str, Any] = {"start": {"mu": point.mu}}
         identifying_mu, least, stalled = IDENTIFICATION_RATIO * point.mu, np.inf, 0
@@ -81,16 +65,11 @@ class FastIpm(Method):
             least = min(least, residual)
             details |= {"mu": point.mu, "natural_residual_mm": residual, "undecided": undecided}
             done = residual <= tolerance or stalled == STALLED
-            if self.finish and (done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p))):
+            if done or (point.mu <= identifying_mu and undecided <= UNDECIDED * len(p)):
                 case = ready.finish.solved(load, tolerance, C=ratio > 1)
                 answer = ready.finish.answer(case, tolerance)
                 details |= answer.details
                 return replace(answer, iterations=k, inner_iterations=answer.iterations, details=details)
-            if residual <= tolerance:
-                return Answer("solved", point.lam, iterations=k, details=details)
-            if done:
-                details["cause"] = f"rounding: optimal to {residual:.1e} mm only"
-                return Answer("inaccurate", point.lam, iterations=k, details=details)
             point = mehrotra(newton, point)
             if not np.isfinite(point.mu):
                 return failed("λ or y overflowed", k)

@@ -2,7 +2,7 @@
 
 Z. Dostál and J. Schöberl, Comput. Optim. Appl. 30:23–43, 2005: conjugate gradients on the face λ > 0, as long
 as the other contacts' share of the gradient is small; projected gradient steps and proportioning change the
-face (solvers/gradient_projection/proportioning.py). The only operation with Q is a product.
+face (solvers/algorithms/proportioning.py). The only operation with Q is a product.
 
 With a banded M ≈ Q⁻¹, the face is preconditioned, and gradients are projected in the norm of M⁻¹. To
 precondition the face alone is not enough: Q is a compliance, so a gradient step of length 1/λmax(Q) moves
@@ -14,16 +14,15 @@ from typing import ClassVar
 
 from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
-from solvers.active_set.contact_sets import OpenFactor
+from solvers.algorithms.contact_sets import OpenFactor
+from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
 from solvers.base import Answer, Form, LoadCase, Problem, failed
-from solvers.gradient_projection.metric import Band, Diagonal, Face, step_length
-from solvers.gradient_projection.proportioning import Proportioning
-from solvers.kkt import judged, kkt_residual, largest_rounding
+from solvers.kkt import judged, kkt_residual, largest_rounding, with_p, with_x
 from solvers.method import Method, State, first_point
 from solvers.settings import one_of, require
-from solvers.sparse_dual import with_p, with_x
 
 PRECONDITIONERS = ("band", "face", "none")
+MAX_PRODUCTS = 100_000  # with Q
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,27 +42,20 @@ class Mprgp(Method):
     computed anew, or when such a computation has not halved what is below the tolerance, or five what is
     above. "solved" if it then is at most max(tolerance, `kkt.largest_rounding`) mm, else "inaccurate".
     Iterations are steps, inner iterations contact sets tried with M; details count the products with Q per
-    load case. In the sparse form the status is that of the refined x (solvers/sparse_dual.py).
+    load case. In the sparse form the status is that of the refined x (solvers/kkt.py).
 
     Options
     -------
     preconditioner : "band", M on the face and in the projections; "face", M on the face and diag(Q) in the
         projections; "none", diag(Q) in both.
-    max_products : limit on the products with Q.
     """
 
     forms: ClassVar[tuple[Form, ...]] = ("dual", "sparse")
 
     preconditioner: str = "band"
-    max_products: int = 100_000
 
     def __post_init__(self) -> None:
-        require(
-            "mprgp",
-            vars(self),
-            preconditioner=one_of(self.preconditioner, PRECONDITIONERS),
-            max_products=(self.max_products >= 1, "must be at least 1"),
-        )
+        require("mprgp", vars(self), preconditioner=one_of(self.preconditioner, PRECONDITIONERS))
 
     def state(self, problem: Problem) -> _State | Answer:
         """M and ᾱ, by 30 products, as the option needs them; a failed answer if there is no M."""
@@ -93,7 +85,7 @@ class Mprgp(Method):
         case = Proportioning(
             prepared.compliance, given.p, ready.diagonal, metric, gaps, *first_point(start, given)
         )
-        enough = case.solve(tolerance, self.max_products)
+        enough = case.solve(tolerance, MAX_PRODUCTS)
         residual = kkt_residual(case.lam, case.y)
         solved = residual <= max(tolerance, largest_rounding(ready.diagonal, given.p, case.lam))
         answer = judged(
@@ -101,7 +93,7 @@ class Mprgp(Method):
             case.lam,
             residual,
             {"products": case.products, "steps": case.steps},
-            "" if enough else f"max_products = {self.max_products}",
+            "" if enough else f"{MAX_PRODUCTS} products",
             iterations=sum(case.steps.values()),
             inner_iterations=metric.sets,
         )

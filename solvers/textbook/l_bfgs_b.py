@@ -7,7 +7,6 @@ when the objective no longer changes in its last digit, which it also calls a su
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from scipy.optimize import minimize
@@ -16,22 +15,14 @@ from problems.forms.assembly import Vector
 from solvers.adapter import answer
 from solvers.base import Answer, LoadCase, Status
 from solvers.method import Method, State, first_point
-from solvers.settings import require
 
 LIMIT = 1_000_000  # iterations, and products with Q
 
 
-@dataclass(kw_only=True, frozen=True, eq=False)
 class LBfgsB(Method):
-    """It starts from λ = 0 or a warm start. maxcor : pairs of vectors in the approximate Hessian."""
+    """It starts from λ = 0 or a warm start. Takes no options."""
 
     distribution: ClassVar[str | None] = "scipy"
-
-    maxcor: int = 10
-
-    def __post_init__(self) -> None:
-        valid = type(self.maxcor) is int and self.maxcor >= 1
-        require("l-bfgs-b", vars(self), maxcor=(valid, "must be a whole number from 1"))
 
     def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         Q, (start, _) = ready.Q.T, first_point(ready.start, load)  # symmetric
@@ -47,13 +38,7 @@ class LBfgsB(Method):
             jac=True,
             method="L-BFGS-B",
             bounds=[(0.0, None)] * len(load.p),
-            options={
-                "ftol": 0.0,
-                "gtol": tolerance,
-                "maxcor": self.maxcor,
-                "maxiter": LIMIT,
-                "maxfun": LIMIT,
-            },
+            options={"ftol": 0.0, "gtol": tolerance, "maxiter": LIMIT, "maxfun": LIMIT},
         )
         message = str(found.message)
         details = {"products": int(found.nfev), "message": message}

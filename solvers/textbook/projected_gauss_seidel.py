@@ -22,6 +22,7 @@ from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
 from solvers.method import Method, State, first_point
 from solvers.settings import require
 
+MAX_SWEEPS = 1_000_000
 CHECKED = 10  # sweeps after which y is computed anew
 SLOWEST, PATIENCE = 0.5, 100  # of the KKT residual, after so many checks: slower is as good as never
 
@@ -37,19 +38,13 @@ class ProjectedGaussSeidel(Method):
     Options
     -------
     relaxation : ω.
-    max_sweeps : limit on the sweeps.
     """
 
     relaxation: float = 1.5
-    max_sweeps: int = 1_000_000
 
     def __post_init__(self) -> None:
-        require(
-            "projected-gauss-seidel",
-            vars(self),
-            relaxation=(0 < self.relaxation < 2, "must be between 0 and 2"),
-            max_sweeps=(self.max_sweeps >= 1, "must be at least 1"),
-        )
+        valid = 0 < self.relaxation < 2
+        require("projected-gauss-seidel", vars(self), relaxation=(valid, "must be between 0 and 2"))
 
     def solved(self, ready: State, load: LoadCase, tolerance: float) -> Answer:
         Q, p = ready.Q, load.p
@@ -61,13 +56,13 @@ class ProjectedGaussSeidel(Method):
             reached.append(kkt_residual(lam, y))
             if reached[-1] <= max(tolerance, rounding_of(p, y)):
                 break
-            if sweeps >= self.max_sweeps:
-                limit = f"max_sweeps = {self.max_sweeps}"
+            if sweeps >= MAX_SWEEPS:
+                limit = f"{MAX_SWEEPS} sweeps"
                 break
             if len(reached) > PATIENCE and not reached[-1] <= SLOWEST * reached[-1 - PATIENCE]:
                 cause = f"{PATIENCE * CHECKED} sweeps did not halve the KKT residual"
                 break
-            for _ in range(min(CHECKED, self.max_sweeps - sweeps)):
+            for _ in range(min(CHECKED, MAX_SWEEPS - sweeps)):
                 lam = _sweep(Q, lam, y, self.relaxation)
                 sweeps += 1
             y, products = product(Q, lam) - p, products + 1

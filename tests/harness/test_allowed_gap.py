@@ -18,7 +18,7 @@ from strip import write_strip
 
 from harness.results import series_file
 from harness.scene.allowed_gap import checked
-from harness.verification.gap_error import GapError
+from harness.verification.assess import GapError
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly
 from problems.load_cases.random_gaps import random_gaps

@@ -13,8 +13,7 @@ from typer.testing import Result
 
 from harness.results import records
 from harness.results.sides import measurement
-from harness.verification.baseline import Baseline, read_baseline
-from harness.verification.findings import Finding
+from harness.verification.findings import Baseline, Finding, read_baseline
 from harness.verification.judge import Judgement
 
 pytestmark = pytest.mark.slow

@@ -62,7 +62,7 @@ def test_words_and_layout_do_not_count(package: Path) -> None:
 
 def test_a_constant_two_imports_down_counts_for_those_who_use_it(package: Path) -> None:
     before = hashes(package)
-    # ipm → kkt, newton → active_set → kkt, and so all our methods; the libraries do not
+    # ipm → kkt, newton → sweeps → kkt, and so all our methods; the libraries do not
     change(package / "kkt.py", "EPS = float(np.finfo(float).eps)", "EPS = 2 * float(np.finfo(float).eps)")
     assert changed(package, before) == {name for name in modules() if owner_of(name) == "ours"} | {
         "projected-gauss-seidel",

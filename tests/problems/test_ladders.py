@@ -39,9 +39,7 @@ IN_HOUSE: list[tuple[str, Form, float]] = [
     ("gi", "primal", 1e-10),
     ("newton", "dual", 1e-10),
     ("ipm-fast", "dual", 1e-10),
-    ("lemke", "dual", 1e-10),
     ("mprgp", "dual", 1e-10),
-    ("projected-newton", "dual", 1e-10),
 ]
 #: Where the paper's interior-point method, which starts from forces of 1 N, may say that it finds no answer.
 MAY_GIVE_UP = [("ipm", name) for name in TAKEN if name.endswith("/chain-32")]

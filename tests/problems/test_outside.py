@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from synthetic_results import row, write_rows
 
 from harness.planning.form_choice import chosen_form
-from harness.solving.answer import answer_of
+from harness.solving.session import answer_of
 from harness.verification.judge import Reference, judge
 from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared

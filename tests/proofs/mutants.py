@@ -20,16 +20,9 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "REFERENCE_SHARE * limit_mm": ("limit_mm", "2 * REFERENCE_SHARE * limit_mm"),
         "if not reference.bound_mm <= ": ("if reference.bound_mm > ",),
     },
-    "harness/verification/baseline.py": {
+    "harness/verification/findings.py": {
         "max(errors.get(key, (0.0, 0.0))[0], error)": ("error",),
         "max(bound_mm, then_bound_mm)": ("bound_mm", "then_bound_mm"),
-    },
-    "harness/verification/gap_error.py": {
-        "self.norms * error_mm": ("error_mm",),
-        "self.norms * error_mm + rounding": ("self.norms * error_mm", "rounding"),
-        "abs(g) + self.size @ abs(x)": ("self.size @ abs(x)", "abs(g)"),
-        "abs(assembly.A).T": ("assembly.A.T",),
-        "gamma(k + 2)": ("gamma(k)", "gamma(2)"),
     },
     "harness/verification/enclosure.py": {
         "SAFE * (U * abs(value) + self.error)": (
@@ -85,6 +78,14 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "found += gamma(2 * len(z)) * self.stiffest * length(w) ** 2": ("pass",),
         "gamma(2 * len(z)) * self.stiffest": ("gamma(2 * len(z))",),
         "self.D * self.assembly.K.multiply(self.D * w)": ("self.assembly.K.multiply(w)",),
+        "return float(s - SAFE * away)": ("return float(s)", "return float(s - away / 2)"),
+        ">= SMALLEST:\n            return": (">= 0:\n            return",),
+        "away is not None and": ("away is None or",),
+        "return min((_of_block": ("return max((_of_block",),
+        "sigma2 = found - SAFE * gamma(longest + 1) * float((size.T @ (size @ ones)).max())": (
+            "sigma2 = found",
+        ),
+        "return sigma2 if sigma2 >= SMALLEST else 0.0": ("return sigma2",),
     },
     "harness/verification/proof.py": {
         "np.minimum(reach, np.sqrt(self.compliance))": (
@@ -159,16 +160,11 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "SAFE * near + (1 + 4 * U) * away": ("SAFE * near",),
         "(1 + 4 * U) * away": ("away",),
         "np.where(np.isfinite(bounds), bounds, np.inf)": ("bounds",),
-    },
-    "harness/verification/definite.py": {
-        "return float(s - SAFE * away)": ("return float(s)", "return float(s - away / 2)"),
-        ">= SMALLEST:\n            return": (">= 0:\n            return",),
-        "away is not None and": ("away is None or",),
-        "return min((_of_block": ("return max((_of_block",),
-        "sigma2 = found - SAFE * gamma(longest + 1) * float((size.T @ (size @ ones)).max())": (
-            "sigma2 = found",
-        ),
-        "return sigma2 if sigma2 >= SMALLEST else 0.0": ("return sigma2",),
+        "self.norms * error_mm": ("error_mm",),
+        "self.norms * error_mm + rounding": ("self.norms * error_mm", "rounding"),
+        "abs(g) + self.size @ abs(x)": ("self.size @ abs(x)", "abs(g)"),
+        "abs(assembly.A).T": ("assembly.A.T",),
+        "gamma(k + 2)": ("gamma(k)", "gamma(2)"),
     },
     "harness/verification/reference.py": {
         "[ESTIMATED * about for about in": ("[4 * ESTIMATED * about for about in",),
@@ -204,13 +200,15 @@ MUTANTS = [
 #: Which tests must fail.
 TESTS = {
     "harness/verification/enclosure.py": ("proofs/test_enclosure.py",),
-    "harness/verification/baseline.py": ("harness/test_gate_baseline.py",),
-    "harness/verification/gap_error.py": ("harness/test_allowed_gap.py",),
-    "harness/verification/balanced.py": ("proofs/test_enclosure.py", "proofs/test_proof.py"),
+    "harness/verification/findings.py": ("harness/test_gate_baseline.py",),
+    "harness/verification/balanced.py": (
+        "proofs/test_enclosure.py",
+        "proofs/test_definite.py",
+        "proofs/test_proof.py",
+    ),
     "harness/verification/proof.py": ("proofs/test_proof.py",),
     "harness/verification/near.py": ("proofs/test_proof.py",),
-    "harness/verification/assess.py": ("proofs/test_proof.py",),
-    "harness/verification/definite.py": ("proofs/test_definite.py",),
+    "harness/verification/assess.py": ("proofs/test_proof.py", "harness/test_allowed_gap.py"),
     "harness/verification/reference.py": ("proofs/test_terms_verdict.py",),
     "harness/verification/judge.py": ("proofs/test_terms_verdict.py", "harness/test_judge.py"),
     "problems/stiffness/dense.py": ("proofs/test_definite.py",),

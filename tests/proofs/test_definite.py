@@ -13,8 +13,8 @@ import scipy.sparse as sp
 from lambda_min import proven, proven_in_units
 from sparse_matrices import band_matrix, chain, graph_matrix
 
-from harness.verification import definite
-from harness.verification.definite import independence
+from harness.verification import balanced
+from harness.verification.balanced import independence
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness.dense import DenseBlock
 from problems.stiffness.operator import Stiffness
@@ -135,7 +135,7 @@ def test_independence_of_contacts() -> None:
 
 
 def test_independence_counts_the_rounding_of_long_sums(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(definite, "SHARE", 1 - 2.0**-50)  # so that nothing else is left to spare
+    monkeypatch.setattr(balanced, "SHARE", 1 - 2.0**-50)  # so that nothing else is left to spare
     for entry in (0.1, 0.7, 1.1):
         found = independence(sp.csc_array(np.full((4096, 1), entry)))
         assert 0 < Fraction(found) <= 4096 * Fraction(entry) ** 2

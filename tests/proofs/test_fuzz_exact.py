@@ -39,10 +39,9 @@ USUAL: list[Variant] = [
     (name, form, {}) for name in modules() if owner_of(name) == "ours" for form in make_solver(name, {}).forms
 ]
 OTHERS: list[Variant] = [
-    *(("ipm-fast", "dual", {key: False}) for key in ("finish", "start_at_gaps", "band")),
     *(("ipm", "dual", {"start": name}) for name in ("algorithm_4", "stp1", "stp2", "mehrotra")),
-    *(("ipm", "dual", {"scheme": name}) for name in ("algorithm_2", "mehrotra")),
     *(("ipm", "dual", {"preconditioner": name}) for name in ("U", "none", "splitting", "direct")),
+    ("ipm", "dual", {"scheme": "mehrotra"}),
     ("ipm", "dual", {"ordering": "open_last"}),
 ]
 

@@ -14,7 +14,7 @@ from harness.conformance.known_problems import contact_rows
 from harness.measurement.row import _why_not_judged
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from harness.solving import answer
+from harness.solving import session
 from harness.verification import reference as module
 from harness.verification.judge import Judgement
 from harness.verification.proof import Proof
@@ -90,7 +90,7 @@ def test_the_methods_are_tried_in_turn_until_one_is_proven(
         made = Prepared(replace(made.assembly, K=made.assembly.K.as_sparse()))
     load, x, lam = chosen(made, 1, 0.4, 0.0)
     monkeypatch.setattr(Proof, "_corrections", lambda self, r, s, lam, enough: (0 * r, 0 * lam))
-    methods: tuple[str, ...] = getattr(answer, kind.upper())
+    methods: tuple[str, ...] = getattr(session, kind.upper())
     tried: list[str] = []
     right = methods[:3][-1]
 
@@ -100,7 +100,7 @@ def test_the_methods_are_tried_in_turn_until_one_is_proven(
             raise InputError.one("solver", "status", "failed", "gave no answer")
         return Answer("solved", lam if name == right else 0 * lam)
 
-    monkeypatch.setattr(answer, "forces_of", answers)
+    monkeypatch.setattr(session, "forces_of", answers)
     found = best_of_candidates(made, load)
     assert tried == list(methods[:3])
     assert found.route == f"{right}, refined"

@@ -1,7 +1,6 @@
 from typing import Any
 
 import clarabel
-import cvxpy as cp
 import numpy as np
 import piqp
 import pytest
@@ -36,25 +35,6 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
 @pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
 def test_conformance(name: str, options: dict[str, Any]) -> None:
     assert [str(finding) for finding in run(lambda: make_solver(name, options))] == []
-
-
-def test_both_forms_are_stated_rightly() -> None:
-    """cvxpy, which knows nothing of the dual form's derivation, on the primal and on the dual."""
-    prepared = make_prepared(5, 8, 3)
-    case, load = make_load(6, prepared)
-    _, n, m = prepared.Q, prepared.assembly.n, prepared.assembly.m
-    K = sla.block_diag(*prepared.assembly.K.matrices)
-    x, lam = cp.Variable(n), cp.Variable(m)
-    rows = prepared.assembly.A.T.toarray() @ x <= case.g
-    settings = {"solver": "CLARABEL", "tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
-    cp.Problem(cp.Minimize(cp.quad_form(x, cp.psd_wrap(K)) / 2 - case.f @ x), [rows]).solve(**settings)
-    cp.Problem(cp.Minimize(cp.quad_form(lam, cp.psd_wrap(prepared.Q)) / 2 - load.p @ lam), [lam >= 0]).solve(
-        **settings
-    )
-    expected_x, expected_lam = solve_by_nnls(prepared, case)
-    np.testing.assert_allclose(x.value, expected_x, atol=1e-6)
-    np.testing.assert_allclose(rows.dual_value, expected_lam, atol=1e-3)
-    np.testing.assert_allclose(lam.value, expected_lam, atol=1e-3)
 
 
 # Tolerances and settings that really reach the library.

@@ -11,8 +11,8 @@ from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.stiffness.operator import Stiffness
-from solvers.active_set.goldfarb_idnani import goldfarb_idnani
-from solvers.active_set.growing_factor import GrowingFactor
+from solvers.algorithms.goldfarb_idnani import goldfarb_idnani
+from solvers.algorithms.growing_factor import GrowingFactor
 from solvers.base import Answer, Form
 from solvers.methods.gi import GoldfarbIdnani
 

@@ -6,8 +6,8 @@ import scipy.linalg as sla
 from long import seeds
 from small import definite
 
-from solvers.interior_point.newton_system import conjugate_gradients
-from solvers.interior_point.preconditioner import (
+from solvers.algorithms.newton_system import conjugate_gradients
+from solvers.algorithms.preconditioner import (
     REORDER_AFTER,
     SYSTEMS,
     CholeskyPlusRoot,
@@ -100,15 +100,6 @@ def test_every_system_solves(name: str) -> None:
         assert system.factorisations == {"direct": k + 1, "splitting": k + 1}.get(name, system.factorisations)
     system.begin()
     assert system.factorisations == 0
-
-
-def test_one_matrix_is_factored_once_for_two_right_hand_sides() -> None:
-    system = SYSTEMS["direct"](definite(8, 0))
-    system.begin()
-    D = np.arange(1.0, 9.0)
-    for b in np.eye(8)[:3]:
-        system.solve(D, b, 1e-3, 100)
-    assert system.factorisations == 1
 
 
 def test_open_gaps_go_last_after_a_slow_system() -> None:

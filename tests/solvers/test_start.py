@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small import definite, make_load, make_prepared
 
-from solvers.interior_point.start import NoStart, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
+from solvers.algorithms.interior_point import NoStart, algorithm_4, algorithm_5, mehrotra_start, stp1, stp2
 
 
 def with_negative_rows(size: int = 12) -> np.ndarray:

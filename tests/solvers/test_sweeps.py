@@ -22,8 +22,8 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.manufactured.ladder import make_rung
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
-from solvers.active_set import sweeps
-from solvers.active_set.sweeps import Sweeps
+from solvers.algorithms import sweeps
+from solvers.algorithms.sweeps import Sweeps
 from solvers.base import Answer
 from solvers.registry import make_solver
 

@@ -1,7 +1,7 @@
 """Modified proportioning with reduced gradient projections (MPRGP) for min ½λᵀQλ − pᵀλ, λ ≥ 0.
 
 Z. Dostál and J. Schöberl, Comput. Optim. Appl. 30:23–43, 2005. With the face F = {λ > 0}, y = Qλ − p, the
-diagonal D of Q and the B ≈ Q of metric.py, the gradient is split into
+diagonal D of Q and a B ≈ Q, the gradient is split into
 
     φ = y on F        φ̃ = min(φ, Dλ/ᾱ)        β = min(y, 0) off F
 
@@ -9,12 +9,22 @@ A point with βᵀD⁻¹β ≤ φ̃ᵀD⁻¹φ is proportional: F is then explor
 B_FF⁻¹; where their step leaves λ ≥ 0, it ends at the boundary and an expansion follows, the projection of the
 free gradient. At any other point the step is a proportioning, which frees contacts with y < 0.
 
-A projection d is taken in full if that decreases the objective, −yᵀd/dᵀQd > ½, else up to the minimum along
-it, as is one that only frees contacts.
+A projection d minimises yᵀd + ½dᵀBd over λ + d ≥ 0, with
+
+    B = diag(Q)/ᾱ    d = max(λ − ᾱ y/diag(Q), 0) − λ, of Dostál only on the face, or only off it
+    B = M⁻¹          by block principal pivoting with band factorisations, on all contacts
+
+It is taken in full if that decreases the objective, −yᵀd/dᵀQd > ½, else up to the minimum along it, as is one
+that only frees contacts. For B = M⁻¹ the preconditioner on a face, N the other contacts, is
+
+    (M⁻¹)_FF⁻¹ = M_FF − M_FN M_NN⁻¹ M_NF,
+
+two band products and a band solution.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -22,11 +32,65 @@ from problems.forms.assembly import Mask, Vector
 from problems.forms.compliance import Compliance
 from solvers.kkt import kkt_residual, rounding_of
 
-from .metric import Diagonal
+from .block_pivoting import TrialSolution, block_pivoting
+from .contact_sets import OpenFactor, banded_set
 
 RESIDUAL_TARGET = 0.1  # of the tolerance
 RECOMPUTED = 50  # steps after which y is computed anew
 STALLED = 5  # computations anew that have not halved the KKT residual: what is left is rounding
+STEP_LENGTH = 1.9  # ᾱ λmax: below 2 every projection decreases the objective
+POWER_STEPS = 30  # products for λmax, once per assembly
+MAX_SETS = 200  # contact sets per projection with M
+
+
+@dataclass
+class Diagonal:
+    """B = diag(Q)/ᾱ. diagonal : of Q. alpha : ᾱ = 1.9/λmax(diag(Q)⁻¹Q). sets : contact sets tried
+    in this load case."""
+
+    diagonal: Vector
+    alpha: float
+    sets: int = field(default=0, init=False)
+
+    def precondition(self, F: Mask, r: Vector) -> Vector:
+        """B_FF⁻¹ r_F, zero off F."""
+        return np.where(F, r, 0.0) / self.diagonal
+
+    def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
+        """d with λ + d ≥ 0. expanding : whether the face is to shrink, or else to grow."""
+        part = np.where(lam > 0, y if expanding else 0.0, 0.0 if expanding else np.minimum(y, 0.0))
+        step: Vector = np.maximum(lam - self.alpha * part / self.diagonal, 0.0) - lam
+        return step
+
+
+@dataclass
+class Face(Diagonal):
+    """The same, but with M⁻¹ in the preconditioner. factor : of M off the face."""
+
+    factor: OpenFactor
+
+    def precondition(self, F: Mask, r: Vector) -> Vector:
+        M = self.factor.M
+        v = M.product(np.where(F, r, 0.0)[M.order])
+        z = np.empty_like(r)
+        z[M.order] = v - M.product(self.factor(~F[M.order]).solve(v))
+        z[~F] = 0.0
+        return z
+
+
+class Band(Face):
+    """B = M⁻¹, ᾱ = 1."""
+
+    def projection(self, lam: Vector, y: Vector, expanding: bool) -> Vector:
+        order = self.factor.M.order
+        own, gap, compliance = lam[order], y[order], self.diagonal[order]
+        C = np.where(own > 0, compliance * own > gap, gap < 0)
+        start = TrialSolution(own, gap, float(abs(gap[own > 0]).max(initial=0.0)))
+        found = block_pivoting(partial(banded_set, self.factor, start), C, compliance, 0.0, MAX_SETS)
+        self.sets += found.passes
+        d = np.empty_like(lam)
+        d[order] = np.maximum(found.trial.lam, 0.0) - own
+        return d
 
 
 @dataclass
@@ -121,3 +185,14 @@ class Proportioning:
     def _times_Q(self, v: Vector) -> Vector:
         self.products += 1
         return self.Q @ v
+
+
+def step_length(Q: Compliance, diagonal: Vector) -> float:
+    """ᾱ of `Diagonal`, with λmax by the power method, in `POWER_STEPS` products."""
+    root = np.sqrt(diagonal)
+    v, largest = np.random.default_rng(0).uniform(0.5, 1.5, len(root)), 1.0
+    for _ in range(POWER_STEPS):
+        v /= np.linalg.norm(v)
+        v = (Q @ (v / root)) / root
+        largest = float(np.linalg.norm(v))
+    return STEP_LENGTH / largest

@@ -16,8 +16,7 @@ from problems.forms.product import product
 from solvers.base import Status
 from solvers.kkt import EPS
 
-from .gi_border import Border
-from .growing_factor import GrowingFactor
+from .growing_factor import Border, GrowingFactor
 
 #: u → (s, T): the slacks from the original data, and the magnitude of the terms of each.
 Slacks = Callable[[Vector], tuple[Vector, Vector]]

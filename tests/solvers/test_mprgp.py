@@ -1,0 +1,82 @@
+"""MPRGP: its steps, what they count, and where it starts."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from small import make_load, make_strips, solve_by_nnls
+
+from problems.forms import compliance
+from problems.forms.assembly import LoadCase, Vector
+from problems.forms.prepared import Prepared
+from problems.forms.problem import in_form
+from solvers.algorithms.proportioning import Proportioning
+from solvers.base import WarmStart
+from solvers.methods.mprgp import PRECONDITIONERS, Mprgp
+
+TOLERANCE = 1e-10
+KINDS = pytest.mark.parametrize("preconditioner", PRECONDITIONERS)
+
+
+def strips(contacts: int) -> tuple[Prepared, LoadCase]:
+    """Contacts in a row, five windows of M long and more, with nearly as many open as closed."""
+    prepared = make_strips(contacts)
+    return prepared, make_load(3, prepared)[1]
+
+
+def opened(preconditioner: str, prepared: Prepared) -> tuple[Mprgp, Any]:
+    solver = Mprgp(preconditioner=preconditioner)
+    return solver, solver.prepare(in_form(prepared, "dual"))
+
+
+@KINDS
+def test_each_variant_agrees_with_nnls(preconditioner: str) -> None:
+    prepared, load = strips(400)
+    x, lam = solve_by_nnls(prepared, load)
+    assert 0 < np.count_nonzero(lam) < len(lam)
+    solver, state = opened(preconditioner, prepared)
+    answer = solver.solve(state, load, TOLERANCE)
+    assert answer.status == "solved"
+    np.testing.assert_allclose(prepared.recover(answer.lam, load), x, rtol=0, atol=1e-8)
+
+
+@KINDS
+def test_no_step_increases_the_objective(preconditioner: str) -> None:
+    prepared, load = strips(400)
+    Q, p = prepared.Q, load.p
+    solver, state = opened(preconditioner, prepared)
+    metric = solver._metric(state)
+    case = Proportioning(prepared.compliance, p, metric.diagonal, metric, lambda lam: Q @ lam - p, 0 * p, -p)
+    before = 0.0
+    for _ in range(200):
+        if not case._step():
+            break
+        assert case.lam.min() >= 0
+        np.testing.assert_allclose(case.y, Q @ case.lam - p, rtol=0, atol=1e-9 * abs(p).max())
+        objective = float(case.lam @ (Q @ case.lam / 2 - p))
+        assert objective <= before + 1e-13 * abs(before)
+        before = objective
+    assert case.steps["cg"] * case.steps["proportioning"] > 0
+
+
+@KINDS
+def test_the_products_that_are_told_are_those_made(
+    preconditioner: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And from its own answer few are left."""
+    made, original = [], compliance.product
+
+    def counted(Q: Any, v: Vector) -> Vector:
+        made.append(1)
+        return original(Q, v)
+
+    monkeypatch.setattr(compliance, "product", counted)
+    prepared, load = strips(120)
+    solver, state = opened(preconditioner, prepared)
+    made.clear()
+    answer = solver.solve(state, load, TOLERANCE)
+    assert answer.details["products"] == len(made) > 0
+    start = WarmStart(load, answer.lam, prepared.Q @ answer.lam - load.p)
+    warm = solver.solve(solver.update(state, state, load, TOLERANCE, start), load, TOLERANCE)
+    assert warm.status == "solved"
+    assert warm.details["products"] <= min(5, answer.details["products"])
