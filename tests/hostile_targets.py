@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import scipy.io
 import tiny
+from hostile_draws import OF_SUFFIX
+from long import Fault
 from runs import rows_of, said_by
 from small import make_load, make_prepared, solve_by_nnls
 from synthetic_results import row, write_rows
@@ -28,14 +30,6 @@ POINTS = "x,y\n20.0,10.0\n50.0,25.0\n80.0,40.0\n"
 RANDOM = "mean = 0.1\nrandom = { sd = 0.05, correlation_length = 30.0, seed = 1 }"
 FASTENERS = '[[effect]]\nkind = "fasteners"\npreload = 20.0\nfile = "points.csv"\n'
 JOINT = SCENE.replace("mean = 0.1", RANDOM) + FASTENERS
-
-
-class Fault(Exception):
-    """What the test exists to find. kind : hang, traceback, lost, wrong or words."""
-
-    def __init__(self, kind: str, what: object) -> None:
-        super().__init__(kind, what)
-        self.kind, self.what = kind, what
 
 
 @dataclass(frozen=True)
@@ -62,8 +56,9 @@ def invoke(folder: Path, words: tuple[str, ...]) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
-def files_in(folder: Path, where: str, *suffixes: str) -> tuple[str, ...]:
-    found = [path for path in (folder / where).rglob("*") if path.suffix in suffixes]
+def files_in(folder: Path, where: str) -> tuple[str, ...]:
+    """But for locks and pages."""
+    found = [path for path in (folder / where).rglob("*") if path.suffix in OF_SUFFIX]
     return tuple(str(path.relative_to(folder)) for path in found)
 
 
@@ -124,7 +119,7 @@ def cached(root: Path) -> Target:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
         assert invoke(folder, ("solve", "@own.npz", "--out", "@answer"))[0] == 0
-    files = files_in(folder, "cache", ".npy", ".json")
+    files = files_in(folder, "cache")
 
     def same_answer(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
         if code == 0 and words[0] == "solve":
@@ -171,7 +166,7 @@ def results(root: Path) -> Target:
         if wrong:
             raise Fault("wrong", f"passed {wrong}")
 
-    names = files_in(folder, "done", ".jsonl", ".toml", ".json", ".npz")
+    names = files_in(folder, "done")
     baseline = ("gate", "@done", "--baseline", "@done", "--json", "@out.json", "--junit", "@out.xml")
     commands = (*[("gate", "@done")] * 6, *[baseline] * 2, ("report", "@done"))
 

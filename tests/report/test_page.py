@@ -2,18 +2,14 @@
 
 import base64
 import json
-import shutil
 import zlib
 from html.parser import HTMLParser
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from browser import browser
-from conftest import pytest_terminal_summary
 from synthetic_results import everything, no_answer, results, row, write_rows
 from test_hostile_text import HOSTILE, MADE
 from test_series_report import made as made_series
@@ -212,22 +208,6 @@ def test_the_banners_name_the_code(tmp_path: Path) -> None:
     both = comparison._banner(rows.assign(machine=["CPU", "other"]))
     assert "old: " + "a" * 40 in both["commits"]
     assert [warning.split()[-2] for warning in both["warnings"]] == ["uncommitted", "machine"], both
-
-
-def test_that_no_browser_tried_the_page_is_said_in_the_summary(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shutil, "which", lambda name: None)
-    said: list[str] = []
-    with pytest.raises(pytest.skip.Exception) as skipped, browser(Path()):
-        pass
-    report = SimpleNamespace(longrepr=("file", 1, f"Skipped: {skipped.value}"))
-    summary = SimpleNamespace(
-        getreports=lambda kind: [report] * 31,
-        write_sep=lambda sep, text, **colours: said.append(text),
-        write_line=lambda text, **colours: said.append(text),
-    )
-    pytest_terminal_summary(summary)
-    assert said[0] == "31 browser tests SKIPPED"
-    assert said[1].startswith("The page was not tried: no Chromium")
 
 
 @pytest.mark.parametrize(

@@ -14,14 +14,10 @@ from small import make_load, make_prepared
 
 from harness.scene.export import matrices
 from harness.scene.matrix_import import import_
-from harness.verification.reference import reference
 from problems import formats
-from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti
-from problems.scene import read_scene
 
-PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 QUIET = Console(file=StringIO())
 
 
@@ -154,32 +150,6 @@ def test_a_row_at_a_point_that_is_not_there_is_named(changed: Any, said: str, tm
     with pytest.raises(InputError) as error:
         import_([str(path)], tmp_path / "out.npz", QUIET)
     assert said in str(error.value)
-
-
-# --- the cache ----------------------------------------------------------------------------------------
-
-
-def test_no_stage_of_a_scene_is_opened_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every matrix, factor and reference that a scene has in the cache, one after another."""
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
-    scene = read_scene("gallery/installed-fasteners")
-
-    def open_all() -> None:
-        data = prepared(scene)
-        assert data.Q.size
-        assert data.assembly.K.factors
-        reference(data, load_case(scene))
-
-    open_all()
-    assert {path.stat().st_mode & 0o777 for path in tmp_path.rglob("*.npy")} == {0o444}
-    for path in sorted(tmp_path.rglob("*.npy")):
-        whole = path.read_bytes()
-        path.chmod(0o644)
-        path.write_bytes(whole[:-8])
-        with pytest.raises(InputError, match=path.name):
-            open_all()
-        path.write_bytes(whole)
-    open_all()
 
 
 # --- own matrices -------------------------------------------------------------------------------------
