@@ -101,12 +101,9 @@ def everything(directory: Path, scenes_of: dict[int, list[int]]) -> Path:
     suite = 'name = "made-up"\ntitle = "Made-up results"\ndescription = "For the tests of the report."\n'
     (directory / "suite.toml").write_text(suite + "time_limit_s = 60\nmemory_limit_mib = 8192\n", "utf-8")
     machine = {
-        "machine": "Made-up CPU, 2 cores",
-        "cpu": "Made-up CPU",
-        "cores": 2,
-        "blas": ["openblas SkylakeX"],
-        "versions": {"numpy": "2.0", "piqp": "0.6"},
-    }
+        "machine": "Made-up CPU, 2 cores", "cpu": "Made-up CPU", "cores": 2,
+        "blas": ["openblas SkylakeX"], "versions": {"numpy": "2.0", "piqp": "0.6"},
+    }  # fmt: skip
     (directory / "machine.json").write_text(json.dumps(machine), "utf-8")
     return directory
 
