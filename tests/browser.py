@@ -1,6 +1,4 @@
-"""A Chromium without a window or a network, for the tests of the page; where none is installed, they skip,
-and the summary says so.
-"""
+"""A Chromium without a window or a network, for the tests of the page; where none is installed, they skip."""
 
 import shutil
 from collections.abc import Iterator
@@ -10,7 +8,6 @@ from typing import Any
 
 import pytest
 
-NO_BROWSER = "no browser: "  # how the reason of these skips begins
 FLAGS = (
     *("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync"),
     *("disable-background-networking", "disable-component-update", "window-size=1400,1000"),
@@ -23,10 +20,8 @@ def browser(profile: Path) -> Iterator[Any]:
     driver = shutil.which("chromedriver")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if not (driver and chromium):
-        pytest.skip(f"{NO_BROWSER}no Chromium with its driver is installed (apt install chromium-driver)")
-    webdriver = pytest.importorskip(
-        "selenium.webdriver", reason=f"{NO_BROWSER}selenium is missing (pip install selenium)"
-    )
+        pytest.skip("no Chromium with its driver is installed (apt install chromium-driver)")
+    webdriver = pytest.importorskip("selenium.webdriver")
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

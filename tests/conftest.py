@@ -1,6 +1,4 @@
-"""What all tests share: a cache of their own, so that none reads or fills the user's; quick tests first; a
-warning where the page was tried in no browser.
-"""
+"""What all tests share: a cache of their own, so that none reads or fills the user's; quick tests first."""
 
 import os
 import shutil
@@ -8,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from browser import NO_BROWSER
 
 DISTRIBUTED = "PYTEST_XDIST_WORKER" in os.environ
 
@@ -55,12 +52,3 @@ def copy(finished: Path, tmp_path: Path) -> Path:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Quick tests first."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What no test saw is said aloud: judge.js runs in a browser only."""
-    reasons = [report.longrepr[2] for report in terminalreporter.getreports("skipped")]
-    missing = [reason.partition(NO_BROWSER)[2] for reason in reasons if NO_BROWSER in reason]
-    if missing:
-        terminalreporter.write_sep("=", f"{len(missing)} browser tests SKIPPED", yellow=True, bold=True)
-        terminalreporter.write_line(f"The page was not tried: {missing[0]}.", yellow=True)

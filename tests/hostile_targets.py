@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import scipy.io
 import tiny
+from hostile_draws import OF_SUFFIX
+from long import Fault
 from runs import rows_of, said_by
 from small import make_load, make_prepared, solve_by_nnls
 from synthetic_results import row, write_rows
@@ -30,20 +32,9 @@ FASTENERS = '[[effect]]\nkind = "fasteners"\npreload = 20.0\nfile = "points.csv"
 JOINT = SCENE.replace("mean = 0.1", RANDOM) + FASTENERS
 
 
-class Fault(Exception):
-    """What the test exists to find. kind : hang, traceback, lost, wrong or words."""
-
-    def __init__(self, kind: str, what: object) -> None:
-        super().__init__(kind, what)
-        self.kind, self.what = kind, what
-
-
 @dataclass(frozen=True)
 class Target:
-    """A folder of valid files, those to damage, the commands on it, and what must hold if one succeeds.
-
-    keeps : which files no command may change. checked : (folder, words, exit code, output) → Fault, or none.
-    """
+    """keeps : the files that stay. checked : takes (folder, words, exit code, output), raises Fault."""
 
     name: str
     share: float
@@ -62,8 +53,9 @@ def invoke(folder: Path, words: tuple[str, ...]) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
-def files_in(folder: Path, where: str, *suffixes: str) -> tuple[str, ...]:
-    found = [path for path in (folder / where).rglob("*") if path.suffix in suffixes]
+def files_in(folder: Path, where: str) -> tuple[str, ...]:
+    """But for locks and pages."""
+    found = [path for path in (folder / where).rglob("*") if path.suffix in OF_SUFFIX]
     return tuple(str(path.relative_to(folder)) for path in found)
 
 
@@ -73,9 +65,13 @@ def own_matrices() -> formats.Data:
     return matrices(data, make_load(3, data)[0])
 
 
-def scene(root: Path) -> Target:
-    folder = root / "scene"
+def made(folder: Path) -> Path:
     folder.mkdir()
+    return folder
+
+
+def scene(root: Path) -> Target:
+    folder = made(root / "scene")
     (folder / "scene.toml").write_text(JOINT)
     (folder / "points.csv").write_text(POINTS)
     (folder / "gaps.csv").write_text("\n".join(",".join(["0.1"] * 12) for _ in range(3)) + "\n")
@@ -91,18 +87,14 @@ def scene(root: Path) -> Target:
 
 
 def own(root: Path, form: str, suffix: str) -> Target:
-    folder = root / form
-    folder.mkdir()
-    made = folder / ("own" if suffix == ".mtx" else f"own{suffix}")
-    formats.FORMATS[form].write(made, own_matrices())
-    files = [f"own/{name}.mtx" for name in "KAfg"] if suffix == ".mtx" else [made.name]
+    folder = made(root / form)
+    name = "own" if suffix == ".mtx" else f"own{suffix}"
+    formats.FORMATS[form].write(folder / name, own_matrices())
+    files = [f"own/{name}.mtx" for name in "KAfg"] if suffix == ".mtx" else [name]
     commands = [("import", *(f"@{name}" for name in files), "--out", "@out.npz")] * 2
     if suffix == ".npz":
-        commands += [("import", "@own.npz", "--out", "@own.npz"), ("validate", "@own.npz")]
-        commands += [
-            ("solve", "@own.npz", "--out", "@out"),
-            ("solve", "@own.npz", "--solver", "gi", "--out", "@out"),
-        ]
+        more = ("import @own.npz --out @own.npz", "validate @own.npz", "solve @own.npz --out @out")
+        commands += [tuple(words.split()) for words in (*more, "solve @own.npz --solver gi --out @out")]
     if form == "mtx":
         text = "".join(f'{name} = "own/{name}.mtx"\n' for name in "KAfg")
         (folder / "scene.toml").write_text(f"[matrices]\n{text}")
@@ -118,13 +110,12 @@ def says_numbers(folder: Path, words: tuple[str, ...], code: int, output: str) -
 
 def cached(root: Path) -> Target:
     """Own matrices whose cache is damaged: the answer is what it was, or there is none."""
-    folder = root / "cached"
-    folder.mkdir()
+    folder = made(root / "cached")
     formats.FORMATS["npz"].write(folder / "own.npz", own_matrices())
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(folder / "cache"))
         assert invoke(folder, ("solve", "@own.npz", "--out", "@answer"))[0] == 0
-    files = files_in(folder, "cache", ".npy", ".json")
+    files = files_in(folder, "cache")
 
     def same_answer(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
         if code == 0 and words[0] == "solve":
@@ -132,11 +123,11 @@ def cached(root: Path) -> Target:
                 if abs(new["x"] - old["x"]).max() > 1e-14:
                     raise Fault("wrong", f"off by {abs(new['x'] - old['x']).max()}")
 
+    def kept(name: str) -> bool:
+        return not name.startswith(("out", "cache"))
+
     commands = (("solve", "@own.npz", "--out", "@out"), ("validate", "@own.npz"))
-    changing = ("out", "cache")
-    return Target(
-        "cache", 0.08, folder, files, commands, lambda name: not name.startswith(changing), same_answer
-    )
+    return Target("cache", 0.08, folder, files, commands, kept, same_answer)
 
 
 def results(root: Path) -> Target:
@@ -171,7 +162,7 @@ def results(root: Path) -> Target:
         if wrong:
             raise Fault("wrong", f"passed {wrong}")
 
-    names = files_in(folder, "done", ".jsonl", ".toml", ".json", ".npz")
+    names = files_in(folder, "done")
     baseline = ("gate", "@done", "--baseline", "@done", "--json", "@out.json", "--junit", "@out.xml")
     commands = (*[("gate", "@done")] * 6, *[baseline] * 2, ("report", "@done"))
 
@@ -183,8 +174,7 @@ def results(root: Path) -> Target:
 
 def series(root: Path) -> Target:
     """A finished series of six cases."""
-    folder = root / "series"
-    folder.mkdir()
+    folder = made(root / "series")
     (folder / "scene.toml").write_text(JOINT)
     (folder / "points.csv").write_text(POINTS)
     words = ("series", "@scene.toml", "--cases", "6", "--threads", "1", "--check", "0", "--out", "@done")
@@ -225,8 +215,7 @@ def compared(root: Path) -> Target:
 
 def judged(root: Path) -> Target:
     """An exact answer in each kind of file."""
-    folder = root / "judged"
-    folder.mkdir()
+    folder = made(root / "judged")
     formats.FORMATS["npz"].write(folder / "own.npz", own_matrices())
     data = make_prepared(3, 3, tools=1)
     x, lam = solve_by_nnls(data, make_load(3, data)[0])
@@ -243,5 +232,4 @@ def judged(root: Path) -> Target:
 def all_targets(root: Path) -> list[Target]:
     forms = {"npz": ".npz", "mtx": ".mtx", "abaqus": ".mtx", "op4": ".op4", "dmig": ".pch"}
     of_formats = [own(root, form, suffix) for form, suffix in forms.items()]
-    made = (scene, cached, results, series, suite, compared, judged)
-    return [*(make(root) for make in made), *of_formats]
+    return [*(make(root) for make in (scene, cached, results, series, suite, compared, judged)), *of_formats]

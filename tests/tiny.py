@@ -22,7 +22,7 @@ class Exact(Solver):
         return Answer("solved", lam, iterations=1)
 """
 
-FAULTY = """
+FAULTY = '''
 import os
 import signal
 import subprocess
@@ -31,108 +31,67 @@ import time
 import numpy as np
 from solvers.base import Answer, Solver
 
-MEMORY = "import time; held = bytearray(400 * 2**20); held[::4096] = bytes(len(held[::4096])); time.sleep(60)"
+EATS = "import time; held = bytearray(400 * 2**20); held[::4096] = bytes(len(held[::4096])); time.sleep(60)"
+SLEEPS = f"{sys.executable} -c 'import time; time.sleep(61)' > /dev/null & echo $!"
+NONSENSE = bytes([10]).join([b"nonsense", b"[1]", bytes(range(256)), b""])
+FORKS = """
+if os.fork() == 0:
+    for _ in range(4000):  # some ten seconds
+        if os.fork():
+            os._exit(0)
+        os.setsid()
+        time.sleep(0.002)
+    os._exit(0)
+time.sleep(60)
+"""
+WRITES = """
+for fd in range(1, 64):
+    try:
+        os.write(fd, NONSENSE)
+    except OSError:
+        pass
+answer = Answer("iteration_limit", None)
+"""
+FAULTS = {
+    "hang": "while True: pass",
+    "sleep": "time.sleep(60)",
+    "signal": "os.kill(os.getpid(), signal.SIGSEGV)",
+    "kill_itself": "os.kill(os.getpid(), signal.SIGKILL)",
+    "stop_itself": "os.kill(os.getpid(), signal.SIGSTOP)",
+    "abort": "os.abort()",
+    "leave": "os._exit(7)",
+    "system_exit": "sys.exit('enough')",
+    "raises": "raise ValueError('no step')",
+    "recurse": "exec(FAULTS['recurse'])",
+    "eat": "held = []\\nwhile True: held.append(np.ones(2**20)); time.sleep(0.002)",
+    "out_of_memory": "raise MemoryError('as numpy does')",
+    "children_eat": "subprocess.Popen([sys.executable, '-c', EATS], start_new_session=True); time.sleep(60)",
+    "orphan": "subprocess.run(SLEEPS, shell=True, stdout=subprocess.PIPE, start_new_session=True)",
+    "fork_and_go_on": "os.fork()",
+    "fork_on_and_on": FORKS,
+    "chatter": "for _ in range(300): os.write(1, b'o' * 2**20); os.write(2, b'e' * 2**16)",
+    "close_everything": "os.closerange(0, 1024)",
+    "write_everywhere": WRITES,
+    "big_details": "answer = Answer('solved', answer.lam, details={'trace': 'x' * 2**22})",
+    "nan": "answer.lam.fill(np.nan)",
+    "gives_up": "answer = Answer('iteration_limit', None, iterations=5)",
+}
 
 
 class Faulty(Solver):
     forms = ("dual",)
 
-    def __init__(self, fault="none"):
-        self.fault = fault
+    def __init__(self, fault="gives_up", only=0):
+        """only : which of its solves has the fault; 0: all."""
+        self.fault, self.only, self.count = fault, only, 0
 
     def solve(self, problem, load, tolerance):
-        return getattr(self, self.fault)(np.zeros(problem.assembly.m))
-
-    def hang(self, lam):
-        while True:
-            pass
-
-    def sleep(self, lam):
-        time.sleep(60)
-
-    def signal(self, lam):
-        os.kill(os.getpid(), signal.SIGSEGV)
-
-    def leave(self, lam):
-        os._exit(7)
-
-    def system_exit(self, lam):
-        sys.exit("enough")
-
-    def eat(self, lam):
-        held = []
-        while True:
-            held.append(np.ones(2**20))
-            time.sleep(0.002)
-
-    def out_of_memory(self, lam):
-        raise MemoryError("as numpy does")
-
-    def children_eat(self, lam):
-        subprocess.Popen([sys.executable, "-c", MEMORY], start_new_session=True)
-        time.sleep(60)
-
-    def orphan(self, lam):
-        command = f"{sys.executable} -c 'import time; time.sleep(61)' > /dev/null & echo $!"
-        pid = subprocess.run(command, shell=True, stdout=subprocess.PIPE, start_new_session=True).stdout
-        return Answer("solved", lam, details={"pid": int(pid)})
-
-    def fork_and_go_on(self, lam):
-        os.fork()
-        return Answer("solved", lam)
-
-    def chatter(self, lam):
-        for _ in range(300):
-            os.write(1, b"o" * 2**20)
-            os.write(2, b"e" * 2**16)
-        return Answer("solved", lam)
-
-    def big_details(self, lam):
-        return Answer("solved", lam, details={"trace": "x" * 2**22})
-
-    def nan(self, lam):
-        return Answer("solved", lam * np.nan)
-
-    def gives_up(self, lam):
-        return Answer("iteration_limit", None, iterations=5)
-
-    def raises(self, lam):
-        raise ValueError("no step")
-
-    def kill_itself(self, lam):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-    def stop_itself(self, lam):
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-    def abort(self, lam):
-        os.abort()
-
-    def recurse(self, lam):
-        return self.recurse(lam)
-
-    def close_everything(self, lam):
-        os.closerange(0, 1024)
-        return Answer("solved", lam)
-
-    def write_everywhere(self, lam):
-        for fd in range(1, 64):
-            try:
-                os.write(fd, bytes([10]).join([b"nonsense", b"[1]", bytes(range(256)), b""]))
-            except OSError:
-                pass
-        return Answer("iteration_limit", None)
-
-    def fork_on_and_on(self, lam):
-        if os.fork() == 0:
-            for _ in range(4000):  # some ten seconds
-                if os.fork():
-                    os._exit(0)
-                os.setsid()
-                time.sleep(0.002)
-            os._exit(0)
-        time.sleep(60)
-"""
+        self.count += 1
+        here = {"answer": Answer("solved", np.zeros(problem.assembly.m))}
+        if self.only in (0, self.count):
+            exec(FAULTS[self.fault], globals(), here)
+        return here["answer"]
+'''
 
 
 def write_problem(path: Path, shift: float = 0.0) -> Path:

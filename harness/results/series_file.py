@@ -40,7 +40,8 @@ CREATE TABLE IF NOT EXISTS cases (number INTEGER PRIMARY KEY, row TEXT NOT NULL,
 """
 WITHOUT_GAP = """
 SELECT number FROM cases
-WHERE coalesce(length(gap), 0) != ? AND json_extract(row, '$.verdict') != 'no_answer' LIMIT 1
+WHERE (coalesce(length(gap), 0) != ? OR typeof(gap) != 'blob')
+    AND json_extract(row, '$.verdict') != 'no_answer' LIMIT 1
 """
 DISK = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
 AGAIN = "delete it, and run the same `series` command again"
@@ -85,7 +86,7 @@ def connected(directory: Path) -> Iterator[sqlite3.Connection]:
                 raise InputError.one(path, "content", "cut off", AGAIN)
             yield connection
     except sqlite3.DatabaseError as error:
-        if error.sqlite_errorcode & 0xFF in DISK:
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF in DISK:  # text that is not UTF-8 has none
             raise OSError(f"{path}: {error}") from error
         raise InputError.one(path, "content", str(error), AGAIN) from error
 
@@ -130,7 +131,7 @@ def read_facts(directory: Path) -> dict[str, Any] | None:
         Facts.model_validate(content)
     except ValidationError as error:
         raise InputError(list(validation_faults(path, Facts, error))) from error
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise InputError.one(path, "series", str(error), AGAIN) from error
     return content
 
@@ -148,7 +149,7 @@ def rows(directory: Path) -> Iterator[Row]:
             except (ValueError, TypeError, KeyError):
                 whole = False
             if not whole:
-                raise InputError.one(path, f"case {number}", text[:80], f"not what was written; {AGAIN}")
+                raise InputError.one(path, f"case {number}", str(text)[:80], f"not what was written; {AGAIN}")
             yield row
 
 
@@ -168,13 +169,18 @@ def drop_gaps(directory: Path) -> None:
 
 
 def read_contacts(directory: Path) -> dict[str, NDArray[Any]]:
-    """The same."""
+    """The same. Raises InputError if they are not what was written."""
+    path = directory / SERIES
     with connected(directory) as connection:
         found = connection.execute("SELECT value FROM facts WHERE name = 'contacts'").fetchone()
     if found is None:
-        raise InputError.one(directory / SERIES, "contacts", None, AGAIN)
-    with np.load(io.BytesIO(found[0])) as arrays:
-        return dict(arrays)
+        raise InputError.one(path, "contacts", None, AGAIN)
+    try:
+        arrays = records.read_arrays(io.BytesIO(found[0]))
+        int(arrays["m"])
+    except (ValueError, TypeError, KeyError) as error:
+        raise InputError.one(path, "contacts", str(error), AGAIN) from error
+    return arrays
 
 
 class StoredGaps:
@@ -192,8 +198,12 @@ class StoredGaps:
         where = 1 + GAP.itemsize * start, GAP.itemsize * (stop - start)
         with connected(self.directory) as connection:
             for k, number in enumerate(asked):
-                (blob,) = connection.execute(part, (*where, number)).fetchone()
-                found[k] = np.frombuffer(blob, GAP)[::step]
+                try:
+                    (blob,) = connection.execute(part, (*where, number)).fetchone()
+                    found[k] = np.frombuffer(blob, GAP)[::step]
+                except (TypeError, ValueError) as error:
+                    path = self.directory / SERIES
+                    raise InputError.one(path, f"gaps of case {number}", str(error), AGAIN) from error
         return found if np.ndim(numbers) else found[0]
 
 

@@ -1,6 +1,8 @@
 """Arrays on disk under a hash of their data and code; opened memory-mapped, written atomically.
 
-An entry is a folder with one read-only .npy per array and a manifest: the size of each file, and the facts.
+An entry is a folder with one read-only .npy per array and a manifest: the size and the hash of each file,
+the facts, and a hash of it all. So what a disk has changed gets no proven bound; files too long to be read at
+each opening (`CHECKED`) have no hash.
 """
 
 import hashlib
@@ -17,30 +19,12 @@ import numpy as np
 import platformdirs
 from filelock import FileLock
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
 from problems.errors import InputError
 
 MANIFEST = "manifest.json"
+CHECKED = 64 * 2**20  # bytes, 0.05 s; of a longer file the size alone is checked
 READ_ONLY = 0o444  # so that nobody who is given a memory map can write to its file by accident
-
-
-class Manifest(BaseModel):
-    """The bytes of each file of an entry, and what else is known."""
-
-    files: dict[str, int]
-    facts: dict[str, Any]
-
-
-class Facts(dict[str, Any]):
-    """The facts of a stored entry; asking for one that it lacks raises InputError."""
-
-    def __init__(self, path: Path, facts: dict[str, Any]) -> None:
-        super().__init__(facts)
-        self.path = path
-
-    def __missing__(self, name: str) -> Any:
-        raise InputError.one(self.path, f"facts.{name}", None, _repair(self.path.parent))
 
 
 #: Arrays by name, and facts that JSON can hold.
@@ -80,8 +64,8 @@ def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -
     try:
         for name, array in arrays.items():
             np.save(work / f"{name}.npy", array)
-        sizes = {path.name: path.stat().st_size for path in sorted(work.iterdir())}
-        (work / MANIFEST).write_text(json.dumps({"files": sizes, "facts": facts}, indent=1))
+        content = {"files": {path.name: _stamp(path) for path in sorted(work.iterdir())}, "facts": facts}
+        (work / MANIFEST).write_text(json.dumps(content | {"hash": digest(content)}, indent=1))
         for path in work.iterdir():
             path.chmod(READ_ONLY)
         target = root() / key
@@ -94,9 +78,10 @@ def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -
 
 
 def load(key: str) -> Entry | None:
-    """The entry's arrays, memory-mapped and read-only, and its facts; None if there is none.
+    """The entry's arrays, memory-mapped and read-only, and its facts; None if there is none, or an older
+    version's without hashes.
 
-    Raises InputError if a file is missing, cut off or another one.
+    Raises InputError if a file is missing or not what was written.
     """
     folder = root() / key
     if not folder.exists():
@@ -105,19 +90,26 @@ def load(key: str) -> Entry | None:
     try:
         if not path.is_file():
             raise OSError("no regular file")
-        manifest = Manifest.model_validate(json.loads(path.read_bytes()))
+        content = json.loads(path.read_bytes())
+        written = content.pop("hash", None)
+        if written is None:
+            return None
+        if written != digest(content):
+            raise ValueError("not what was written")
         arrays = {}
-        for name, size in manifest.files.items():
+        for name, (size, hashed) in content["files"].items():
             path = folder / name
-            found = path.stat().st_size if path.is_file() else None
-            if found != size:
-                raise InputError.one(path, "bytes", found, f"must be {size}; {_repair(folder)}")
+            found = _stamp(path)
+            if found[0] != size:
+                raise InputError.one(path, "bytes", found[0], f"must be {size}; {_repair(folder)}")
+            if found[1] != hashed:
+                raise ValueError("not what was written")
             arrays[path.stem] = np.load(path, mmap_mode="r")
     except InputError:
         raise
-    except Exception as error:  # json, pydantic and numpy's reader of headers raise kinds of their own
+    except Exception as error:  # json and numpy's reader of headers raise kinds of their own
         raise InputError.one(path, "content", str(error), _repair(folder)) from error
-    return arrays, Facts(folder / MANIFEST, manifest.facts)
+    return arrays, content["facts"]
 
 
 def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:
@@ -131,6 +123,15 @@ def load_or_make(key: str, make: Callable[[], Entry]) -> Entry:
                 found = load(key)
     assert found is not None
     return found
+
+
+def _stamp(path: Path) -> tuple[int | None, str | None]:
+    """The size of a file, None if there is none, and its hash, None if it is long."""
+    size = path.stat().st_size if path.is_file() else None
+    if size is None or size > CHECKED:
+        return size, None
+    with path.open("rb") as file:
+        return size, hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _repair(folder: Path) -> str:

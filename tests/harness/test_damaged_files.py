@@ -19,6 +19,7 @@ from harness.planning.suite import read_written
 from harness.results import records, series_file
 from harness.results.kinds import refuse_unreadable
 from harness.results.schema import SERIES
+from problems.errors import InputError
 
 pytestmark = pytest.mark.slow
 
@@ -110,12 +111,23 @@ def test_a_file_that_holds_no_series_is_named(damage: Any, series: Path) -> None
 @pytest.mark.parametrize(
     "statement",
     [
-        *(f"UPDATE facts SET value = '{value}' WHERE name = 'series'" for value in ("[]", '{"identity": 1}')),
+        *(
+            f"UPDATE facts SET value = {value} WHERE name = 'series'"
+            for value in ("'[]'", """'{"identity": 1}'""", "1", "CAST(x'ff' AS TEXT)")
+        ),
+        *(
+            f"UPDATE facts SET value = {value} WHERE name = 'contacts'"
+            for value in ("1", "'a'", "x''", "x'00'", "substr(value, 1, 200)")
+        ),
         "DELETE FROM facts WHERE name = 'series'",
         "DELETE FROM facts WHERE name = 'contacts'",
         "UPDATE cases SET gap = NULL WHERE number = 3",
         "UPDATE cases SET gap = substr(gap, 5) WHERE number = 3",
-        *(f"UPDATE cases SET row = '{row}' WHERE number = 3" for row in ("[]", "1", '{"case": 3}')),
+        "UPDATE cases SET gap = printf('%180s', 'a') WHERE number = 3",
+        *(
+            f"UPDATE cases SET row = {row} WHERE number = 3"
+            for row in ("'[]'", "'1'", """'{"case": 3}'""", "x'ff'", "CAST(x'ff' AS TEXT)")
+        ),
         "DROP TABLE cases",
     ],
 )
@@ -126,6 +138,15 @@ def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series
     refused = harness("report", series)
     assert refused.exit_code == 2, refused.output
     assert SERIES in refused.output
+    assert solve_series(series).exit_code in (0, 2)
+
+
+@pytest.mark.parametrize("gap", ["NULL", "substr(gap, 5)", "printf('%180s', 'a')"])
+def test_gaps_that_are_not_what_was_written_are_named(gap: str, series: Path) -> None:
+    with series_file.connected(series) as connection:
+        connection.execute(f"UPDATE cases SET gap = {gap} WHERE number = 3")
+    with pytest.raises(InputError, match="gaps of case 3"):
+        series_file.StoredGaps(series, 45)[[2, 3]]
 
 
 def test_fewer_cases_than_before_are_reported_as_that_many(

@@ -71,24 +71,16 @@ FAULTY = (
 [[solver]]
 name = "faulty"
 time_limit_s = 2
-options = { fault = "third", how = "FAULT" }
+options = { fault = "FAULT", only = 3 }
 """
 )
-THIRD = """
-    seen = 0
-
-    def third(self, lam):
-        self.seen += 1
-        return getattr(self, self.how)(lam) if self.seen == 3 else Answer("solved", lam)
-"""
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _here(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("series")
     write_strip(folder)
-    with_how = ('fault="none"):', 'fault="none", how="none"):\n        self.how = how')
-    (folder / "faulty.py").write_text(tiny.FAULTY.replace(*with_how) + THIRD)
+    (folder / "faulty.py").write_text(tiny.FAULTY)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         yield

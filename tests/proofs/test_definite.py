@@ -10,18 +10,32 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from lambda_min import proven, proven_in_units
 from sparse_matrices import band_matrix, chain, graph_matrix
 
 from harness.verification import balanced
-from harness.verification.balanced import independence
+from harness.verification.balanced import independence, smallest_eigenvalue
 from problems.forms.assembly import Matrix, Vector
+from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.dense import DenseBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.rounding import U, gamma
 
 KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array])
 Kind = Callable[[Any], Any]
+
+
+def proven(K: Any, guess: float) -> float:
+    """The bound of one matrix in its own units, from a guess."""
+    return smallest_eigenvalue(Stiffness.of(K), np.ones(K.shape[0]), [guess])
+
+
+def proven_in_units(K: Stiffness, D: Vector) -> float:
+    """Of DKD, from half of an estimate that is no smaller; 0 for a K that is not positive definite."""
+    try:
+        guesses = [about / 2 for about in K.least_eigenvalues(D)]
+    except NotPositiveDefinite:
+        return 0.0
+    return smallest_eigenvalue(K, D, guesses)
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 40])

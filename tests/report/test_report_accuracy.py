@@ -4,9 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from accuracy_results import HIGH, LOW, answer, sweep
 from matplotlib.image import imread
-from synthetic_results import no_answer, results, row, shown, table, write_rows
+from synthetic_results import HIGH, LOW, answer, no_answer, results, row, shown, sweep, table, write_rows
 
 from report.analysis.standings import best_tolerances, fastest_first, swept, with_errors
 from report.document.blocks import Figure

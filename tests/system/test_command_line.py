@@ -17,38 +17,37 @@ finally:
 """
 
 
-def test_help_imports_nothing_that_is_slow() -> None:
+ROOT = Path(__file__).parents[2]
+
+
+def run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    paths = {"PYTHONPATH": str(ROOT), "RIVETBENCH_CACHE": str(folder / "cache")}
     done = subprocess.run(
-        [sys.executable, "-c", SHOW, "--help"],
-        cwd=Path(__file__).parents[2],
+        [sys.executable, *words],
+        cwd=folder,
         capture_output=True,
         text=True,
-        check=True,
+        env=os.environ | paths | environment,
     )
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def test_help_imports_nothing_that_is_slow(tmp_path: Path) -> None:
+    done = run(tmp_path, "-c", SHOW, "--help")
     assert "Exit codes" in done.stdout
     slow = {"numpy", "scipy", "pandas", "matplotlib", "pydantic", "rich", "problems", "solvers", "report"}
     assert not slow & set(done.stderr.split())
 
 
-def harness(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    paths = {"PYTHONPATH": str(Path(__file__).parents[2]), "RIVETBENCH_CACHE": str(folder / "cache")}
-    command = [sys.executable, "-m", "harness", *words]
-    done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, env=os.environ | paths | environment
-    )
-    assert "Traceback" not in done.stderr
-    return done
-
-
 @pytest.mark.parametrize("words", [("list", "scenes"), ("validate", "gallery/three-part-stack"), ("--help",)])
 def test_a_terminal_of_few_letters_ends_no_command(words: tuple[str, ...], tmp_path: Path) -> None:
-    done = harness(tmp_path, *words, LC_ALL="C", PYTHONUTF8="0", PYTHONIOENCODING="ascii")
-    assert done.returncode == 0, done.stderr
+    done = run(tmp_path, "-m", "harness", *words, LC_ALL="C", PYTHONUTF8="0", PYTHONIOENCODING="ascii")
     assert "?" in done.stdout or words == ("--help",)
 
 
 def test_a_closed_terminal_ends_no_command(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "harness", "validate", "gallery/three-part-stack"]
-    root = Path(__file__).parents[2]
-    done = subprocess.run(["sh", "-c", f"{' '.join(words)} >&-"], cwd=root, capture_output=True, text=True)
+    done = subprocess.run(["sh", "-c", f"{' '.join(words)} >&-"], cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from pydantic_core import PydanticUndefined
 from rich.console import Console
 from typer.main import get_command
 
@@ -21,7 +20,7 @@ from problems import effects
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.formats import FORMATS
-from problems.model.effect import Effect, effect_class, effect_kinds
+from problems.model.effect import effect_class, effect_kinds
 from problems.scene import SCENES, read_scene
 from solvers.plugin import load_plugin
 
@@ -30,6 +29,7 @@ DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
 PAGE = (DOCS / "effects.md").read_text("utf-8")
 PUBLISHED = "results/published"
+FASTENERS = ("clamps", "fasteners", "installed_fasteners")  # their units are in a table of their own
 COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
 JOINT = re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
@@ -70,29 +70,17 @@ def test_the_new_effect_of_the_page_is_one_short_file(
     sys.modules.pop(f"problems.effects.{code[1]}")
 
 
-def parameters(effect: type[Effect]) -> set[str]:
-    """The names that a scene may give, those of tables inside included."""
-    names = set(effect.model_fields) - {"kind"}
-    if {"points", "pattern"} <= names:
-        names |= {"file"}
-    return names
-
-
 @pytest.mark.parametrize("kind", effect_kinds())
 def test_the_table_names_every_parameter_with_its_default_and_unit(kind: str) -> None:
     row = next(line for line in PAGE.splitlines() if line.startswith(f"| `{kind}` |"))
-    effect = effect_class(kind)
-    named = set(re.findall(r"`(\w+)", row.split("|", 3)[3]))
-    assert named - {"file"} == parameters(effect) - {"file"}
-    for name, field in effect.model_fields.items():
-        default = field.default
-        if name != "kind" and default is not PydanticUndefined and isinstance(default, float) and default:
+    fields = {name: field for name, field in effect_class(kind).model_fields.items() if name != "kind"}
+    assert set(re.findall(r"`(\w+)", row.split("|", 3)[3])) - {"file"} == fields.keys() - {"file"}
+    for name, field in fields.items():
+        if isinstance(field.default, float) and field.default:
             stated = re.search(rf"`{name}` = (\S+)", row)
-            assert float(stated[1].rstrip(";,")) == default
-    for unit in (
-        each for field in effect.model_fields.values() for each in field.metadata if str is type(each)
-    ):
-        assert unit.replace("1/mm", "mm") in row or kind in ("clamps", "fasteners", "installed_fasteners")
+            assert float(stated[1].rstrip(";,")) == field.default
+        for unit in field.metadata:
+            assert not isinstance(unit, str) or unit.replace("1/mm", "mm") in row or kind in FASTENERS
 
 
 def test_every_scene_of_the_gallery_is_shown_with_its_command_and_pictures() -> None:
@@ -118,23 +106,24 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+
+
+@each_page
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text("utf-8")):
-        if "://" in target:
-            continue
         path, _, anchor = target.partition("#")
-        linked = page.parent / path if path else page
-        assert linked.exists(), target
-        assert not anchor or anchor in anchors(linked), target
+        if "://" not in target:
+            linked = page.parent / path if path else page
+            assert linked.exists(), target
+            assert not anchor or anchor in anchors(linked), target
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@each_page
 def test_paths_of_code_exist(page: Path) -> None:
     """`harness/….py`, `problems/effects/`; not those with a <name> to fill in."""
     folders = "harness|problems|solvers|report|tests|examples"
-    pattern = rf"`((?:{folders})/[\w./-]*(?:\.py|\.toml|/))`"
-    for path in re.findall(pattern, page.read_text("utf-8")):
+    for path in re.findall(rf"`((?:{folders})/[\w./-]*(?:\.py|\.toml|/))`", page.read_text("utf-8")):
         assert (ROOT / path).exists(), path
 
 
@@ -150,39 +139,23 @@ def test_the_folders_and_files_of_the_architecture_are_those_of_the_code() -> No
                 assert f"{folder.name}/" in part, f"{package}/{folder.name}"
 
 
-def test_the_exit_codes_of_the_page_are_those_of_the_commands() -> None:
+def test_the_exit_codes_and_commands_of_the_page_are_those_of_the_code() -> None:
     text = (DOCS / "commands.md").read_text("utf-8")
     table = text[text.index("| exit code |") :].split("\n\n")[0]
     codes = {value for name, value in vars(exit_codes).items() if name.isupper()}
     assert {int(code) for code in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)} == codes
-
-
-def test_every_command_is_in_its_table() -> None:
-    text = (DOCS / "commands.md").read_text("utf-8")
     for name in COMMANDS:
         assert f"| `python -m harness {name} " in text, name
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@each_page
 def test_commands_of_a_page_exist_with_their_options(page: Path) -> None:
     """Up to the end of the line, or of the code in a sentence. CHANGELOG tells of what is gone, too."""
-    if page.name == "CHANGELOG.md":
-        return
     for call in re.findall(r"python -m harness ([a-z]+[^`\n&|#]*)", page.read_text("utf-8")):
         name, *words = call.split()
-        assert name in COMMANDS, call
-        known = {option for param in COMMANDS[name].params for option in param.opts}
-        assert {word for word in words if word.startswith("--")} <= known, call
-
-
-def test_the_readme_is_read_in_a_minute() -> None:
-    """Outside code and tables no sentence has more than 30 words."""
-    text = (ROOT / "README.md").read_text("utf-8")
-    assert text.count("\n") <= 130
-    prose = re.sub(r"```.*?```|^(?:\||    ).*?$", "", text, flags=re.DOTALL | re.MULTILINE)
-    for paragraph in prose.split("\n\n"):
-        for sentence in re.split(r"(?<=[.?!:])[*\s]", " ".join(paragraph.split())):
-            assert len(sentence.split()) <= 30, sentence
+        if page.name != "CHANGELOG.md":
+            known = {option for param in COMMANDS[name].params for option in param.opts}
+            assert {word for word in words if word.startswith("--")} <= known, call
 
 
 def test_the_main_suite_takes_as_long_on_every_page() -> None:

@@ -26,7 +26,10 @@ def test_every_example_is_tested() -> None:
 
 
 @pytest.mark.parametrize("name", PRINTED)
-def test_an_example_prints_its_number(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_example_prints_its_number(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", [name])  # else a word of pytest's names its file
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     (line,) = capsys.readouterr().out.splitlines()
     assert float(line) == pytest.approx(PRINTED[name], rel=2e-6)

@@ -14,14 +14,10 @@ from small import make_load, make_prepared
 
 from harness.scene.export import matrices
 from harness.scene.matrix_import import import_
-from harness.verification.reference import reference
 from problems import formats
-from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti
-from problems.scene import read_scene
 
-PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 QUIET = Console(file=StringIO())
 
 
@@ -54,48 +50,39 @@ def test_a_refused_import_leaves_what_is_there(
     assert {path.name for path in tmp_path.iterdir()} == {"bad.npz", out.name}
 
 
-def test_an_import_never_replaces_an_input_and_writes_a_scene_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [("mine.npz", "one of the files"), ("link.npz", "one of the files"), ("noext", "must end in .npz")],
+)
+def test_an_import_never_replaces_an_input_and_writes_a_scene_alone(
+    out: str, said: str, tmp_path: Path
+) -> None:
     np.savez(tmp_path / "mine.npz", **own_matrices())
     before = (tmp_path / "mine.npz").read_bytes()
     (tmp_path / "link.npz").symlink_to("mine.npz")
-    for name, said in (
-        ("mine.npz", "one of the files"),
-        ("link.npz", "one of the files"),
-        ("noext", "must end in .npz"),
-    ):
-        done = harness("import", tmp_path / "mine.npz", "--out", tmp_path / name)
-        assert done.exit_code == 2
-        assert said in done.output
+    done = harness("import", tmp_path / "mine.npz", "--out", tmp_path / out)
+    assert done.exit_code == 2
+    assert said in done.output
     assert (tmp_path / "mine.npz").read_bytes() == before
     assert not (tmp_path / "noext").exists()
 
 
 @pytest.mark.parametrize("form", formats.FORMATS)
 def test_an_export_replaces_no_device_no_folder_and_no_input(form: str, tmp_path: Path) -> None:
-    own = tmp_path / "mine.npz"
+    own, folder = tmp_path / "mine.npz", tmp_path / "folder"
     np.savez(own, **own_matrices())
-    before = own.read_bytes()
-    folder = tmp_path / "folder"
     folder.mkdir()
     formats.FORMATS["mtx"].write(folder, own_matrices())
-    assert Path("/dev/null").is_char_device()
-    for out in ("/dev/null", own):
-        done = harness("export", own, "--format", form, "--out", out)
-        assert done.exit_code == 2, done.output
-        assert "--out" in done.output
-    if form not in ("mtx", "abaqus"):
-        assert harness("export", own, "--format", form, "--out", folder).exit_code == 2
-    assert Path("/dev/null").is_char_device()
-    assert own.read_bytes() == before
-
-
-def test_an_export_into_the_folder_of_its_own_matrices_is_refused(tmp_path: Path) -> None:
-    formats.FORMATS["mtx"].write(tmp_path, own_matrices())
-    scene = tmp_path / "scene.toml"
+    scene = folder / "scene.toml"
     scene.write_text("[matrices]\n" + "".join(f'{name} = "{name}.mtx"\n' for name in "KAfg"))
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert harness("export", scene, "--format", "mtx", "--out", tmp_path).exit_code == 2
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    before = {path: path.read_bytes() for path in (own, *folder.iterdir())}
+    of_folders = form in ("mtx", "abaqus")
+    for given, out in ((own, "/dev/null"), (own, own), (scene if of_folders else own, folder)):
+        done = harness("export", given, "--format", form, "--out", out)
+        assert done.exit_code == 2, done.output
+        assert "--out" in done.output or out == folder
+    assert Path("/dev/null").is_char_device()
+    assert {path: path.read_bytes() for path in (own, *folder.iterdir())} == before
 
 
 # --- DMIG ---------------------------------------------------------------------------------------------
@@ -154,32 +141,6 @@ def test_a_row_at_a_point_that_is_not_there_is_named(changed: Any, said: str, tm
     with pytest.raises(InputError) as error:
         import_([str(path)], tmp_path / "out.npz", QUIET)
     assert said in str(error.value)
-
-
-# --- the cache ----------------------------------------------------------------------------------------
-
-
-def test_no_stage_of_a_scene_is_opened_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every matrix, factor and reference that a scene has in the cache, one after another."""
-    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path))
-    scene = read_scene("gallery/installed-fasteners")
-
-    def open_all() -> None:
-        data = prepared(scene)
-        assert data.Q.size
-        assert data.assembly.K.factors
-        reference(data, load_case(scene))
-
-    open_all()
-    assert {path.stat().st_mode & 0o777 for path in tmp_path.rglob("*.npy")} == {0o444}
-    for path in sorted(tmp_path.rglob("*.npy")):
-        whole = path.read_bytes()
-        path.chmod(0o644)
-        path.write_bytes(whole[:-8])
-        with pytest.raises(InputError, match=path.name):
-            open_all()
-        path.write_bytes(whole)
-    open_all()
 
 
 # --- own matrices -------------------------------------------------------------------------------------

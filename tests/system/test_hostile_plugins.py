@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import tiny
 from rich.console import Console
-from runs import all_end, processes, rows_of
+from runs import all_end, processes, rows_of, wait_for
 
 import harness.conformance.isolated as isolated
 import harness.measurement.describe as describing
@@ -26,17 +26,13 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 
-START = """
+#: A plug-in: {0} runs when it is imported, {1} in solve, which has `lam`, the right answer.
+PLUGIN = """
 import atexit, os, sys, threading, time
 import numpy as np
-from solvers.base import Answer, Solver
-"""
-#: A plug-in: {0} runs when it is imported, {1} in solve, which has `lam`, the right answer.
-PLUGIN = (
-    START
-    + """
 import scipy.linalg as sla
 from scipy.optimize import nnls
+from solvers.base import Answer, Solver
 {0}
 
 class Mine(Solver):
@@ -48,9 +44,6 @@ class Mine(Solver):
         {1}
         return Answer("solved", lam, iterations=1)
 """
-)
-
-
 THREAD = "threading.Thread(target=time.sleep, args=(60,)).start()"
 
 
@@ -162,10 +155,7 @@ def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> Non
         # What started the tests may ignore it, as a shell does for a command in the background.
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
-    deadline = time.monotonic() + 60
-    while not begun.exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_for(begun.exists)
     start = time.monotonic()
     going.send_signal(sent)
     _, said = going.communicate(timeout=30)

@@ -28,6 +28,7 @@ def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[ob
     [
         ("os.kill(os.getpid(), 11)", "crashed", "killed by SIGSEGV"),
         (MORE_MEMORY, "memory_limit", "more than 700 MiB"),
+        ("os.remove(problem.Q.filename)", "failed", "the solver wrote into the cache"),
     ],
 )
 def test_the_case_that_ends_the_process_is_a_row_and_the_others_are_solved(
@@ -39,7 +40,7 @@ def test_the_case_that_ends_the_process_is_a_row_and_the_others_are_solved(
     assert done.returncode == 1
     assert f"case 2: {status}, no_answer" in done.stdout
     assert said in done.stdout
-    assert "Not solved: 2. Run the same command again." in done.stdout
+    assert status == "failed" or "Not solved: 2. Run the same command again." in done.stdout
     kept = list(series_file.rows(tmp_path / "out"))
     assert [row["verdict"] for row in kept] == ["within", "within", "no_answer"]
     if status != "crashed":
@@ -50,13 +51,6 @@ def test_the_case_that_ends_the_process_is_a_row_and_the_others_are_solved(
     assert rows[:3] == kept
     assert [(row["case"], row["verdict"]) for row in rows[3:]] == [(3, "within"), (4, "within")]
     assert "4 within, 1 no answer" in done.stdout
-
-
-def test_a_plugin_that_writes_into_the_cache_is_named(tmp_path: Path) -> None:
-    done = harness(tmp_path, *series(tmp_path, in_solve=COUNTED + "os.remove(problem.Q.filename)"))
-    assert done.returncode == 1
-    assert "case 2: failed, no_answer: the solver wrote into the cache" in done.stdout
-    assert [row["verdict"] for row in series_file.rows(tmp_path / "out")] == ["within", "within", "no_answer"]
 
 
 def test_a_preparation_that_hangs_ends(tmp_path: Path) -> None:
