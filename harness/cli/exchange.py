@@ -89,7 +89,7 @@ def import_(
 
 @app.command()
 def judge(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npy, .npz, .csv, .txt or .mtx.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npz or .csv.")],
     scene: SceneName,
     form: Annotated[
         FormName, option("FORM", "The form it was computed in: a file without names has x, of dual λ.")
@@ -99,13 +99,14 @@ def judge(
 ) -> None:
     """Judge an answer that was computed elsewhere: its error, against the certified reference of the scene.
 
-    An .npz has arrays x or lam, a .csv such columns or nodes.csv's displacement_mm; x is in mm, λ in N. Where
-    there is only λ, x is recovered from it. In the sparse form x has all the unknowns of the model.
+    An .npz has arrays x or lam, a .csv such columns, nodes.csv's displacement_mm, or one column of numbers; x
+    is in mm, λ in N. Where there is only λ, x is recovered from it. In the sparse form x has all the
+    unknowns of the model.
 
     \b
     Examples:
-      python -m harness judge x.npy 4386/0107
-      python -m harness judge lambda.txt scaling/1170 --form dual
+      python -m harness judge x.npz 4386/0107
+      python -m harness judge lambda.csv scaling/1170 --form dual
       python -m harness judge results/sheet/nodes.csv gallery/heavy-sheet-on-tool
 
     \b

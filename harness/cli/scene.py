@@ -11,6 +11,7 @@ from harness.terminal.console import AllowGap, FormName, ReferenceLimit, SceneNa
 
 app = typer.Typer(rich_markup_mode=None)
 
+STARTER = Path(__file__).with_name("starter.toml")
 SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
 
 
@@ -39,8 +40,7 @@ def solve(
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
 
     Without --solver the answer comes with a proven bound on its error; with --solver it is judged against
-    that answer. If the parts do not meet, this is a linear solve. A ledger lists what was computed, for which
-    effect, and what was skipped.
+    that answer. If the parts do not meet, this is a linear solve.
 
     Two scenes with the same contacts, such as two plans of fasteners, are solved into DIR/first and
     DIR/second and compared: gaps side by side, a map of the difference, the force in each fastener.
@@ -103,6 +103,12 @@ def init(
     Exit codes: 0 written, 2 the file exists, or is no .toml.
     """
     with error_reporting(SAFE, INTERRUPTED) as console:
-        from harness.scene.starter import write
+        from problems.errors import InputError
 
-        write(file, console)
+        if file.suffix != ".toml":
+            raise InputError.one("FILE", "path", str(file), "must end in .toml, which makes it a scene")
+        if file.exists() or file.is_symlink():
+            raise InputError.one("FILE", "path", str(file), "exists: name another")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(STARTER.read_text("utf-8").replace("FILE", str(file)), "utf-8")
+        console.print(f"{file}: edit it, then `python -m harness solve {file} --out results/{file.stem}`.")

@@ -101,8 +101,7 @@ def series(
         from harness.measurement.scheduler import threads_per_worker
         from harness.planning.form_choice import chosen_form
         from harness.results.series_file import read_facts
-        from harness.scene.allowed_gap import refuse_unusable
-        from harness.series.allowed_gap import check as check_allowed_gap
+        from harness.scene.allowed_gap import refuse_unusable, show_series
         from harness.series.run import run
         from harness.series.session import Job
         from harness.terminal.exit_codes import DONE
@@ -160,5 +159,5 @@ def series(
 
             console.print(f"Report: {write(out)}")
         if code == DONE and allow_gap is not None:
-            code = check_allowed_gap(out, allow_gap, console)
+            code = show_series(out, allow_gap, console)
         raise typer.Exit(code)

@@ -1,7 +1,9 @@
-"""The verdict on an answer that another program has computed."""
+"""The verdict on an answer that another program has computed: x or λ from a .npz or .csv file."""
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
@@ -17,11 +19,14 @@ from harness.verification.reference_problem import ReferenceProblem, reference_p
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 from problems.forms.names import Form
+from problems.input.bounded import regular_file
 
-from .answer_file import read_answer
-
+MIB = 1024
+#: The headings of a column of displacements and of contact forces, in a table with several.
+HEADINGS = {"x": ("x", "displacement_mm"), "lam": ("lam", "force_N")}
+ALLOWED = "a .npz or .csv file with numbers"
 CODES = {"within": DONE, "outside": FAILED, "cannot_be_judged": NOTHING_JUDGED}
-#: The vector that a file without names holds, by the form that it was computed in.
+#: The vector that has none of these names, by the form that it was computed in.
 VECTOR_OF = {"primal": "x", "dual": "lam", "sparse": "x"}
 
 
@@ -94,3 +99,75 @@ def _place(problem: ReferenceProblem, x: Vector) -> str:
     nodes = assembly.asked_nodes
     worst = int(np.argmax(assembly.at_junction(abs(x - problem.reference.x))))
     return f"at entry {worst}" if nodes is None else f"at ({nodes[worst, 0]:.4g}, {nodes[worst, 1]:.4g}) mm"
+
+
+def read_answer(path: Path) -> dict[str, Vector]:
+    """What the file holds: "x" (displacements), "lam" (contact forces), or "" for a vector of another name.
+
+    An .npz has arrays x or displacement_mm, lam or force_N, never both of a pair, or one alone; a .csv has a
+    header with such columns (as in nodes.csv and contacts.csv of `solve`), or one column of numbers.
+    Raises InputError.
+    """
+    regular_file(path, "file", MIB)
+    try:
+        match path.suffix.lower():
+            case ".npz":
+                with np.load(path, allow_pickle=False) as archive:
+                    found = _named(path, archive.files, archive.__getitem__)
+            case ".csv":
+                found = _columns(path)
+            case suffix:
+                raise InputError.one(path, "suffix", suffix, ALLOWED)
+    except InputError:
+        raise
+    except Exception as error:  # numpy, zipfile and csv raise kinds of their own
+        raise InputError.one(path, "file", f"{type(error).__name__}: {error}", ALLOWED) from error
+    for name, vector in found.items():
+        wrong = np.flatnonzero(~np.isfinite(vector))
+        if len(wrong):
+            key = f"{name or 'entry'}[{wrong[0]}]"
+            allowed = f"must be finite; {len(wrong)} of {len(vector)} are not"
+            raise InputError.one(path, key, float(vector[wrong[0]]), allowed)
+    return found
+
+
+def _columns(path: Path) -> dict[str, Vector]:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        first, *rest = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+    heading = [cell.strip() for cell in first]
+    if len(heading) == 1 and _is_number(heading[0]):
+        return {"": np.array([float(row[0]) for row in (first, *rest)])}
+    return _named(path, heading, lambda name: [float(row[heading.index(name)]) for row in rest])
+
+
+def _named(path: Path, names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:
+    """Those of HEADINGS, else the only one."""
+    found = {}
+    for name, headings in HEADINGS.items():
+        known = [each for each in headings if each in names]
+        if len(known) > 1:
+            allowed = "one of them alone: the other is not what is judged"
+            raise InputError.one(path, "columns", ", ".join(known), allowed)
+        if known:
+            found[name] = _vector(read(known[0]))
+    if not found and len(names) != 1:
+        wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
+        raise InputError.one(path, "names", names, f"{wanted}, or one alone")
+    return found or {"": _vector(read(names[0]))}
+
+
+def _vector(array: object) -> Vector:
+    values = np.asarray(array)
+    if values.dtype.kind not in "fiu":
+        raise ValueError(f"an array of {values.dtype}")
+    if values.size != max(values.shape, default=1):
+        raise ValueError(f"an array of shape {values.shape}, not a vector")
+    return values.astype(float).ravel()
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -64,9 +64,7 @@ def refuse_other_contacts(first: str, second: str) -> None:
             raise Incomparable.one(second, "contacts", contacts, allowed)
         return
     wanted, found = (prepared(scene).assembly.A for scene in (one, other))
-    if wanted.shape[1] != found.shape[1] or not wanted.shape[1]:
-        allowed = f"as many as {first} has, {wanted.shape[1]}, at least one"
-        raise Incomparable.one(second, "contacts", found.shape[1], allowed)
-    if wanted.shape != found.shape or (wanted != found).nnz:
-        rows, others = (f"A with {A.shape[0]} rows and {A.nnz} entries" for A in (wanted, found))
-        raise Incomparable.one(second, "contacts", others, f"those of {first}, {rows}, entry by entry")
+    if wanted.shape != found.shape or (wanted != found).nnz or not wanted.shape[1]:
+        rows, others = (f"A of shape {A.shape} with {A.nnz} entries" for A in (wanted, found))
+        allowed = f"those of {first}, at least one: {rows}, entry by entry"
+        raise Incomparable.one(second, "contacts", others, allowed)

@@ -60,7 +60,6 @@ def solution(folder: Path, name: str) -> Path:
         "title": name, "method": name, "status": name, "verdict": "within", "n": 12, "m": 6, "qp": True,
         "closest_mm": 0.1, "judged_error_mm": 1e-9, "error_bound_mm": 1e-9, "parts": parts,
         "pairs": [{"pair": [name, name], "start": 0, "stop": 6}], "marks": {name: [[1.0, 2.0]]},
-        "ledger": [{"effect": name, "adds": name, "amount": name, "seconds": 1.0, "mib": 1.0}],
         "digits": None, "skipped": [name], "steps": {name: 1.0}, "peak_rss_mib": 100.0,
     }  # fmt: skip
     (folder / "solution.json").write_text(json.dumps(record))
