@@ -14,13 +14,12 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
-
 from . import check as check_command
 from . import compare as compare_command
 from . import exchange as exchange_commands
 from . import scene as scene_commands
 from . import series as series_command
+from .options import FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False

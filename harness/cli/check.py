@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from harness.terminal.console import MemoryLimit, Plugin, error_reporting, option
+from .options import MemoryLimit, Plugin, error_reporting, option
 
 app = typer.Typer(rich_markup_mode=None)
 

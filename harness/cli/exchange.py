@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from harness.terminal.console import FormName, ReferenceLimit, SceneName, error_reporting, option
+from .options import FormName, ReferenceLimit, SceneName, error_reporting, option
 
 app = typer.Typer(rich_markup_mode=None)
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from harness.terminal.console import AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
+from .options import AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
 
 app = typer.Typer(rich_markup_mode=None)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.terminal.console import (
+from .options import (
     AllowGap,
     FormName,
     MemoryLimit,
@@ -104,8 +104,8 @@ def series(
         from harness.scene.allowed_gap import refuse_unusable, show_series
         from harness.series.run import run
         from harness.series.session import Job
+        from harness.terminal.console import waiting
         from harness.terminal.exit_codes import DONE
-        from harness.terminal.waiting import waiting
         from problems.errors import Fault, InputError
         from problems.load_cases.sweep import sweep as swept
         from problems.scene import read_scene

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.results.records import replace_text, to_line
-from harness.terminal.plain_console import legible
+from harness.terminal.console import legible
 
 from .judge import Judgement
 

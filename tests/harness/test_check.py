@@ -61,13 +61,11 @@ def test_a_sound_solver_has_no_findings() -> None:
     ("change", "expected"),
     [
         (lambda a: replace(a, lam=lam_of(a)[:-1]), "lam has shape"),
-        (lambda a: replace(a, lam=list(lam_of(a))), "lam is list"),
-        (lambda a: replace(a, lam=lam_of(a).astype(np.float32)), "lam is float32"),
         (lambda a: replace(a, lam=np.full_like(lam_of(a), np.nan)), "lam has NaN or infinity"),
         (lambda a: replace(a, lam=-lam_of(a)), "lam has the wrong sign"),
         (lambda a: replace(a, lam=2 * lam_of(a)), "mm off (limit 1e-07 mm at tolerance 1e-09), and yet"),
         (lambda a: replace(a, lam=lam_of(a) * (1 + 1e-5), status="inaccurate"), 'status "inaccurate"'),
-        (lambda a: replace(a, lam=None), 'lam is None, status "solved"'),
+        (lambda a: replace(a, lam=None, x=None), "says solved, and gives no"),
         (lambda a: replace(a, lam=None, status="failed"), 'lam is None, status "failed"'),
         (lambda a: replace(a, status="failed"), 'status is "failed" beside a right answer'),
         (lambda a: replace(a, status="optimal"), "status 'optimal'; allowed: solved, inaccurate"),
@@ -84,7 +82,7 @@ def test_a_fault_is_named(change: Callable[[Answer], Any], expected: str, form: 
 
 
 def test_a_primal_answer_needs_right_displacements() -> None:
-    assert "x is None" in words_of(spoiling(lambda a: replace(a, x=None)), ("primal",))
+    assert "gives no x" in words_of(spoiling(lambda a: replace(a, x=None)), ("primal",))
 
     def moved(answer: Answer) -> Answer:
         return answer if answer.x is None else replace(answer, x=answer.x + 2e-7)

@@ -16,10 +16,10 @@ from synthetic_results import no_answer, row, write_rows
 from typer import Typer
 from typer.testing import CliRunner
 
+from harness.cli.options import error_reporting
 from harness.results import series_file
 from harness.results.records import to_line
-from harness.terminal.console import error_reporting
-from harness.terminal.plain_console import PlainConsole
+from harness.terminal.console import PlainConsole
 from report.document import escape
 from report.figures import style
 from report.figures.answer import answer_figures
