@@ -15,14 +15,11 @@ if TYPE_CHECKING:
     from harness.results.sides import Side
     from report.writers.comparison import Comparison
 
-app = typer.Typer(rich_markup_mode=None)
-
 MAX_SLOWDOWN = 1.3
 LINES = 20  # of a table
 LEFT_OUT = ("seconds", "status")  # for whole lines on a terminal
 
 
-@app.command()
 def compare(
     old: Annotated[str, typer.Argument(metavar="OLD", help="Directory that `run` wrote, or DIR@COMMIT.")],
     new: Annotated[list[str], typer.Argument(metavar="NEW...", help="Those to compare with it.")],

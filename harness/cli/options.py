@@ -16,6 +16,7 @@ from harness.terminal.exit_codes import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
 if TYPE_CHECKING:
     from rich.console import Console
 
+NOTHING_WRITTEN = ("", "Interrupted: nothing was written.")
 WIDTH_OF_A_LOG = 160
 MOST_FAULTS = 100  # shown at once
 LONGEST_LINE = 200  # characters of a file quoted in a message

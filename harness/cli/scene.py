@@ -7,15 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from .options import AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
-
-app = typer.Typer(rich_markup_mode=None)
+from .options import NOTHING_WRITTEN, AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
 
 STARTER = Path(__file__).with_name("starter.toml")
-SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
 
 
-@app.command()
 def solve(
     scene: SceneName,
     other: Annotated[
@@ -58,7 +54,7 @@ def solve(
                 3 --allow-gap cannot be told from what is proven, 4 a gap is larger than --allow-gap,
                 5 the two scenes have other contacts.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.solve import solve as solve_scene
         from harness.scene.two_scenes import solve_both
 
@@ -72,7 +68,6 @@ def solve(
         raise typer.Exit(solve_both((scene, other), out, solved, console))
 
 
-@app.command()
 def validate(scene: SceneName) -> None:
     """Check a scene without solving it; show what would be built, its size and memory.
 
@@ -83,13 +78,12 @@ def validate(scene: SceneName) -> None:
     \b
     Exit codes: 0 valid, 2 bad input.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.validate import validate as validate_scene
 
         validate_scene(scene, console)
 
 
-@app.command()
 def init(
     file: Annotated[Path, typer.Argument(metavar="[FILE]", help="The scene to write.")] = Path("joint.toml"),
 ) -> None:
@@ -102,7 +96,7 @@ def init(
     \b
     Exit codes: 0 written, 2 the file exists, or is no .toml.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from problems.errors import InputError
 
         if file.suffix != ".toml":

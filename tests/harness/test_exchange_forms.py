@@ -90,21 +90,12 @@ def test_one_npz_holds_the_same(form: Form, scenes: Path, tmp_path: Path) -> Non
         assert np.array_equal(arrays[name], dense(M)), name
 
 
-def test_several_scenes_are_folders_or_files_in_one(scenes: Path, tmp_path: Path) -> None:
-    both = (scenes / "strip.toml", scenes / "tiny.npz")
-    assert harness("export", *both, "--form", "dual", "--out", tmp_path / "forms").exit_code == 0
-    assert sorted(path.name for path in (tmp_path / "forms").iterdir()) == ["strip", "tiny"]
-    assert harness("export", *both, "--format", "npz", "--out", tmp_path / "files").exit_code == 0
-    assert sorted(path.name for path in (tmp_path / "files").iterdir()) == ["strip.npz", "tiny.npz"]
-    assert harness("export", both[0], both[0], "--form", "dual", "--out", tmp_path / "twice").exit_code == 2
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--format", "op4", "--form", "dual"], "mtx or npz"),
+        (["--format", "op4", "--form", "dual"], "none with --form"),
         (["--format", "npz", "--with-reference"], "needs --form"),
-        ([], "is needed without --form"),
+        ([], "--format: format = None: one of"),
     ],
 )
 def test_options_that_do_not_go_together(
