@@ -76,21 +76,20 @@ def judge(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npz or .csv.")],
     scene: SceneName,
     form: Annotated[
-        FormName, option("FORM", "The form it was computed in: a file without names has x, of dual λ.")
+        FormName, option("FORM", "The form it was computed in: of sparse, x has all unknowns.")
     ] = FormName.primal,
     limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
     reference_limit: ReferenceLimit = None,
 ) -> None:
     """Judge an answer that was computed elsewhere: its error, against the certified reference of the scene.
 
-    An .npz has arrays x or lam, a .csv such columns, nodes.csv's displacement_mm, or one column of numbers; x
-    is in mm, λ in N. Where there is only λ, x is recovered from it. In the sparse form x has all the
-    unknowns of the model.
+    An .npz has arrays x or lam, a .csv such columns, or displacement_mm or force_N, as the tables of `solve`;
+    x is in mm, λ in N. Where there is only λ, x is recovered from it.
 
     \b
     Examples:
       python -m harness judge x.npz 4386/0107
-      python -m harness judge lambda.csv scaling/1170 --form dual
+      python -m harness judge lambda.csv scaling/1170
       python -m harness judge results/sheet/nodes.csv gallery/heavy-sheet-on-tool
 
     \b

@@ -22,12 +22,10 @@ from problems.forms.names import Form
 from problems.input.bounded import regular_file
 
 MIB = 1024
-#: The headings of a column of displacements and of contact forces, in a table with several.
+#: The names of displacements and of contact forces.
 HEADINGS = {"x": ("x", "displacement_mm"), "lam": ("lam", "force_N")}
 ALLOWED = "a .npz or .csv file with numbers"
 CODES = {"within": DONE, "outside": FAILED, "cannot_be_judged": NOTHING_JUDGED}
-#: The vector that has none of these names, by the form that it was computed in.
-VECTOR_OF = {"primal": "x", "dual": "lam", "sparse": "x"}
 
 
 def judge_file(
@@ -45,7 +43,7 @@ def judge_file(
     """
     if not 0 < limit_mm < inf:
         raise InputError.one("--limit", "limit, mm", limit_mm, "must be positive and finite")
-    given = {name or VECTOR_OF[form]: vector for name, vector in read_answer(path).items()}
+    given = read_answer(path)
     problem = reference_problem(source, limit_s=reference_limit_s, form=form)
     assembly = problem.prepared.assembly
     for name, size in (("x", assembly.n), ("lam", assembly.m)):
@@ -102,72 +100,49 @@ def _place(problem: ReferenceProblem, x: Vector) -> str:
 
 
 def read_answer(path: Path) -> dict[str, Vector]:
-    """What the file holds: "x" (displacements), "lam" (contact forces), or "" for a vector of another name.
+    """What the file holds: "x" (displacements) and "lam" (contact forces), or one of them.
 
-    An .npz has arrays x or displacement_mm, lam or force_N, never both of a pair, or one alone; a .csv has a
-    header with such columns (as in nodes.csv and contacts.csv of `solve`), or one column of numbers.
-    Raises InputError.
+    An .npz has arrays of the names in HEADINGS, a .csv columns, as nodes.csv and contacts.csv of `solve`;
+    never both names of one vector. Raises InputError.
     """
+    if path.suffix.lower() not in (".npz", ".csv"):
+        raise InputError.one(path, "suffix", path.suffix, ALLOWED)
     regular_file(path, "file", MIB)
     try:
-        match path.suffix.lower():
-            case ".npz":
-                with np.load(path, allow_pickle=False) as archive:
-                    found = _named(path, archive.files, archive.__getitem__)
-            case ".csv":
-                found = _columns(path)
-            case suffix:
-                raise InputError.one(path, "suffix", suffix, ALLOWED)
-    except InputError:
-        raise
+        if path.suffix.lower() == ".npz":
+            with np.load(path, allow_pickle=False) as archive:
+                names = archive.files
+                found = _named(names, archive.__getitem__)
+        else:
+            with path.open(encoding="utf-8-sig", newline="") as file:
+                reader = csv.DictReader(file)
+                rows, names = list(reader), list(reader.fieldnames or [])
+            found = _named(names, lambda name: [float(row[name]) for row in rows])
     except Exception as error:  # numpy, zipfile and csv raise kinds of their own
         raise InputError.one(path, "file", f"{type(error).__name__}: {error}", ALLOWED) from error
+    if not found:
+        wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
+        raise InputError.one(path, "names", names, wanted)
     for name, vector in found.items():
         wrong = np.flatnonzero(~np.isfinite(vector))
         if len(wrong):
-            key = f"{name or 'entry'}[{wrong[0]}]"
-            allowed = f"must be finite; {len(wrong)} of {len(vector)} are not"
-            raise InputError.one(path, key, float(vector[wrong[0]]), allowed)
+            allowed = f"must be a finite number; {len(wrong)} of {len(vector)} are not"
+            raise InputError.one(path, f"{name}[{wrong[0]}]", float(vector[wrong[0]]), allowed)
     return found
 
 
-def _columns(path: Path) -> dict[str, Vector]:
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        first, *rest = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
-    heading = [cell.strip() for cell in first]
-    if len(heading) == 1 and _is_number(heading[0]):
-        return {"": np.array([float(row[0]) for row in (first, *rest)])}
-    return _named(path, heading, lambda name: [float(row[heading.index(name)]) for row in rest])
-
-
-def _named(path: Path, names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:
-    """Those of HEADINGS, else the only one."""
+def _named(names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:
+    """The vectors of HEADINGS among them. Raises ValueError."""
     found = {}
     for name, headings in HEADINGS.items():
         known = [each for each in headings if each in names]
         if len(known) > 1:
-            allowed = "one of them alone: the other is not what is judged"
-            raise InputError.one(path, "columns", ", ".join(known), allowed)
+            raise ValueError(f"has {' and '.join(known)}: give one of them alone")
         if known:
-            found[name] = _vector(read(known[0]))
-    if not found and len(names) != 1:
-        wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
-        raise InputError.one(path, "names", names, f"{wanted}, or one alone")
-    return found or {"": _vector(read(names[0]))}
-
-
-def _vector(array: object) -> Vector:
-    values = np.asarray(array)
-    if values.dtype.kind not in "fiu":
-        raise ValueError(f"an array of {values.dtype}")
-    if values.size != max(values.shape, default=1):
-        raise ValueError(f"an array of shape {values.shape}, not a vector")
-    return values.astype(float).ravel()
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+            array = np.asarray(read(known[0]))
+            if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):
+                raise ValueError(
+                    f"{known[0]} is an array of {array.dtype} of shape {array.shape}, not a vector"
+                )
+            found[name] = array.astype(float).ravel()
+    return found
