@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.terminal.console import error_reporting, option
+from .options import error_reporting, option
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from harness.results.sides import Side
     from report.writers.comparison import Comparison
 
-app = typer.Typer(rich_markup_mode=None)
-
 MAX_SLOWDOWN = 1.3
+LINES = 20  # of a table
+LEFT_OUT = ("seconds", "status")  # for whole lines on a terminal
 
 
-@app.command()
 def compare(
     old: Annotated[str, typer.Argument(metavar="OLD", help="Directory that `run` wrote, or DIR@COMMIT.")],
     new: Annotated[list[str], typer.Argument(metavar="NEW...", help="Those to compare with it.")],
@@ -48,14 +49,13 @@ def compare(
     """
     with error_reporting() as console:
         from harness.results.sides import read_side
-        from harness.terminal.changes import show
         from harness.terminal.exit_codes import DONE, FAILED
         from report.writers.comparison import write
 
         before = read_side(old, key)
         compared = [_compared(before, read_side(name, key), max_digits_lost, max_slowdown) for name in new]
         for comparison in compared:
-            show(comparison, console)
+            _show(comparison, console)
         if out:
             console.print(f"Comparison: {write(out, compared)}")
         raise typer.Exit(FAILED if any(each.worse for each in compared) else DONE)
@@ -84,3 +84,26 @@ def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float 
     names = quoted(old.name), quoted(new.name)
     both = pd.concat([rows.assign(side=side) for rows, side in zip((before, after), names, strict=True)])
     return Comparison(*names, table, untimed, both)
+
+
+def _show(comparison: Comparison, console: Console) -> None:
+    """Print the measurements that changed, at most LINES, and a summary."""
+    from rich.table import Table
+
+    from report.analysis.comparison import ADDED, BETTER, SAME, WORSE
+    from report.document.blocks import records
+    from report.document.escape import plain
+    from report.writers.comparison import COLUMNS
+
+    columns = [column for column in COLUMNS if column.heading not in LEFT_OUT]
+    changed = comparison.table[~comparison.table["group"].isin([ADDED, SAME])]
+    title = plain(f"{comparison.old} → {comparison.new}")
+    table = Table(*(column.heading for column in columns), title=title)
+    for line in records(changed.head(LINES)):
+        style = "red" if line["group"] == WORSE else "green" if line["group"] == BETTER else "yellow"
+        table.add_row(*(plain(column.show(line)) for column in columns), style=style)
+    if len(changed):
+        console.print(table)
+    if len(changed) > LINES:
+        console.print(f"… and {len(changed) - LINES} more: --out writes them all", style="dim")
+    console.print(plain(comparison.summary), style="red" if comparison.worse else "green")

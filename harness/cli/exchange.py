@@ -7,25 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from harness.terminal.console import FormName, ReferenceLimit, SceneName, error_reporting, option
-
-app = typer.Typer(rich_markup_mode=None)
-
-SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
+from .options import NOTHING_WRITTEN, FormName, ReferenceLimit, SceneName, error_reporting, option
 
 
-@app.command()
 def export(
-    scene: Annotated[
-        list[str], typer.Argument(metavar="SCENE...", help="Scenes: names, paths of .toml or .npz.")
-    ],
-    out: Annotated[
-        Path, option("PATH", "A file, or a folder for a format of several; for several scenes a folder.")
-    ],
-    format: Annotated[
-        str | None,
-        option("FORMAT", "A name from `list formats`; with --form mtx or npz.  [default with --form: mtx]"),
-    ] = None,
+    scene: SceneName,
+    out: Annotated[Path, option("PATH", "A file, or a folder for a format of several files.")],
+    format: Annotated[str | None, option("FORMAT", "Of K, A, f, g: a name from `list formats`.")] = None,
     form: Annotated[
         FormName | None, option("FORM", "The quadratic program in this form: primal, dual or sparse.")
     ] = None,
@@ -34,31 +22,28 @@ def export(
     ] = False,
     reference_limit: ReferenceLimit = None,
 ) -> None:
-    """Write scenes for another program: K, A, f, g in a file format, or the program of a form.
+    """Write a scene for another program: K, A, f, g in a file format, or the program of a form.
 
-    With --form: P, q, G, h (or the lower bounds lb) of min ½zᵀPz + qᵀz, Gz ≤ h. Readers in Python, C++, Julia
-    and Matlab: docs/exchange.md.
+    With --form: P, q, G, h (or the lower bounds lb) of min ½zᵀPz + qᵀz, Gz ≤ h, as one .npz or, for any other
+    PATH, a folder of Matrix Market files. Readers in Python, C++, Julia and Matlab: docs/exchange.md.
 
     \b
     Examples:
       python -m harness export 4386/0107 --format npz --out joint.npz
       python -m harness export gallery/three-part-stack --format op4 --out stack.op4
       python -m harness export scaling/1170 --form dual --with-reference --out problem
-      python -m harness export 4386/0107 4386/1471 --form primal --with-reference --format npz --out problems
+      python -m harness export 4386/0107 --form primal --with-reference --out problem.npz
 
     \b
     Exit codes: 0 written, 2 wrong usage or bad input.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.export import export as export_scene
-        from harness.scene.export import places
 
         taken: Any = form.value if form else None
-        for source, path in places(scene, out, format or ("mtx" if form else None)):
-            export_scene(source, format, path, console, taken, with_reference, reference_limit)
+        export_scene(scene, format, out, console, taken, with_reference, reference_limit)
 
 
-@app.command("import")
 def import_(
     files: Annotated[
         list[str],
@@ -81,38 +66,37 @@ def import_(
     \b
     Exit codes: 0 read and written, 2 wrong usage or bad input.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.matrix_import import import_ as import_files
 
         import_files(files, out, console)
 
 
-@app.command()
 def judge(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npy, .npz, .csv, .txt or .mtx.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="x or λ: .npz or .csv.")],
     scene: SceneName,
     form: Annotated[
-        FormName, option("FORM", "The form it was computed in: a file without names has x, of dual λ.")
+        FormName, option("FORM", "The form it was computed in: of sparse, x has all unknowns.")
     ] = FormName.primal,
     limit: Annotated[float, option("MM", "Limit on the error.")] = 1e-7,
     reference_limit: ReferenceLimit = None,
 ) -> None:
     """Judge an answer that was computed elsewhere: its error, against the certified reference of the scene.
 
-    An .npz has arrays x or lam, a .csv such columns or nodes.csv's displacement_mm; x is in mm, λ in N. Where
-    there is only λ, x is recovered from it. In the sparse form x has all the unknowns of the model.
+    An .npz has arrays x or lam, a .csv such columns, or displacement_mm or force_N, as the tables of `solve`;
+    x is in mm, λ in N. Where there is only λ, x is recovered from it.
 
     \b
     Examples:
-      python -m harness judge x.npy 4386/0107
-      python -m harness judge lambda.txt scaling/1170 --form dual
+      python -m harness judge x.npz 4386/0107
+      python -m harness judge lambda.csv scaling/1170
       python -m harness judge results/sheet/nodes.csv gallery/heavy-sheet-on-tool
 
     \b
     Exit codes: 0 within the limit, 1 outside, 2 wrong usage or bad input (NaN, not numbers),
                 3 the reference is not proven well enough, 5 an x of another problem's length.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.judge_file import judge_file
 
         taken: Any = form.value

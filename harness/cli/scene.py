@@ -7,14 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from harness.terminal.console import AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
+from .options import NOTHING_WRITTEN, AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
 
-app = typer.Typer(rich_markup_mode=None)
-
-SAFE, INTERRUPTED = "", "Interrupted: nothing was written."
+STARTER = Path(__file__).with_name("starter.toml")
 
 
-@app.command()
 def solve(
     scene: SceneName,
     other: Annotated[
@@ -39,8 +36,7 @@ def solve(
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
 
     Without --solver the answer comes with a proven bound on its error; with --solver it is judged against
-    that answer. If the parts do not meet, this is a linear solve. A ledger lists what was computed, for which
-    effect, and what was skipped.
+    that answer. If the parts do not meet, this is a linear solve.
 
     Two scenes with the same contacts, such as two plans of fasteners, are solved into DIR/first and
     DIR/second and compared: gaps side by side, a map of the difference, the force in each fastener.
@@ -58,7 +54,7 @@ def solve(
                 3 --allow-gap cannot be told from what is proven, 4 a gap is larger than --allow-gap,
                 5 the two scenes have other contacts.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.solve import solve as solve_scene
         from harness.scene.two_scenes import solve_both
 
@@ -72,7 +68,6 @@ def solve(
         raise typer.Exit(solve_both((scene, other), out, solved, console))
 
 
-@app.command()
 def validate(scene: SceneName) -> None:
     """Check a scene without solving it; show what would be built, its size and memory.
 
@@ -83,13 +78,12 @@ def validate(scene: SceneName) -> None:
     \b
     Exit codes: 0 valid, 2 bad input.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.scene.validate import validate as validate_scene
 
         validate_scene(scene, console)
 
 
-@app.command()
 def init(
     file: Annotated[Path, typer.Argument(metavar="[FILE]", help="The scene to write.")] = Path("joint.toml"),
 ) -> None:
@@ -102,7 +96,13 @@ def init(
     \b
     Exit codes: 0 written, 2 the file exists, or is no .toml.
     """
-    with error_reporting(SAFE, INTERRUPTED) as console:
-        from harness.scene.starter import write
+    with error_reporting(*NOTHING_WRITTEN) as console:
+        from problems.errors import InputError
 
-        write(file, console)
+        if file.suffix != ".toml":
+            raise InputError.one("FILE", "path", str(file), "must end in .toml, which makes it a scene")
+        if file.exists() or file.is_symlink():
+            raise InputError.one("FILE", "path", str(file), "exists: name another")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(STARTER.read_text("utf-8").replace("FILE", str(file)), "utf-8")
+        console.print(f"{file}: edit it, then `python -m harness solve {file} --out results/{file.stem}`.")

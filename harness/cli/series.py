@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.terminal.console import (
+from .options import (
     AllowGap,
     FormName,
     MemoryLimit,
@@ -23,12 +23,9 @@ from harness.terminal.console import (
 if TYPE_CHECKING:
     from problems.load_cases.base import LoadCases
 
-app = typer.Typer(rich_markup_mode=None)
-
 SEED = 0
 
 
-@app.command()
 def series(
     scene: SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
@@ -101,25 +98,24 @@ def series(
         from harness.measurement.scheduler import threads_per_worker
         from harness.planning.form_choice import chosen_form
         from harness.results.series_file import read_facts
-        from harness.scene.allowed_gap import refuse_unusable
-        from harness.series.allowed_gap import check as check_allowed_gap
+        from harness.scene.allowed_gap import refuse_unusable, show_series
         from harness.series.run import run
         from harness.series.session import Job
+        from harness.terminal.console import waiting
         from harness.terminal.exit_codes import DONE
-        from harness.terminal.waiting import waiting
         from problems.errors import Fault, InputError
+        from problems.load_cases.measured_gaps import measured_gaps
+        from problems.load_cases.random_gaps import random_gaps
         from problems.load_cases.sweep import sweep as swept
         from problems.scene import read_scene
 
         refuse_unusable(allow_gap)
         random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
         drawn = [name for name, value in random.items() if value is not None]
-        sources = [
-            name for name, given in (("--gaps", gaps), ("--sweep", sweep), *((d, d) for d in drawn)) if given
-        ]
         faults = []
         if (gaps and sweep) or (drawn and (gaps or sweep)):
-            faults.append(Fault("series", "cases", " ".join(sources), "random gaps, --gaps or --sweep"))
+            given = [*(["--gaps"] if gaps else []), *(["--sweep"] if sweep else []), *drawn]
+            faults.append(Fault("series", "cases", " ".join(given), "random gaps, --gaps or --sweep"))
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -140,18 +136,15 @@ def series(
         if choice.why:
             console.print(f"In the sparse form, without condensation: {choice.why}.", style="dim")
         taken: Any = choice.form
+        chosen: LoadCases
         if gaps:
-            from problems.load_cases.measured_gaps import measured_gaps
-
-            chosen: LoadCases = measured_gaps(read, gaps, cases, taken)
+            chosen = measured_gaps(read, gaps, cases, taken)
         elif sweep:
             chosen = swept(read, sweep, taken)
         else:
-            from problems.load_cases.random_gaps import random_gaps
-
-            chosen = random_gaps(read, cases or 100, seed or SEED, mean, sd, correlation_length, taken)
-        limits, threads = (time_limit, memory_limit), threads or threads_per_worker(scheduler)
-        threads = threads or (1 if taken == "sparse" else 2)
+            chosen = random_gaps(read, count, seed or SEED, mean, sd, correlation_length, taken)
+        limits = time_limit, memory_limit
+        threads = threads or threads_per_worker(scheduler) or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
         facts = {"solver_version": made.version, "solver_code": made.code}
         code = run(job, facts, out, console, scheduler)
@@ -160,5 +153,5 @@ def series(
 
             console.print(f"Report: {write(out)}")
         if code == DONE and allow_gap is not None:
-            code = check_allowed_gap(out, allow_gap, console)
+            code = show_series(out, allow_gap, console)
         raise typer.Exit(code)

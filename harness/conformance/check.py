@@ -5,19 +5,37 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import pairwise
 
-from harness.solving.answers import InvalidAnswer, error_text, shown, vector
+import numpy as np
+
+from harness.solving.answers import InvalidAnswer, checked, error_text, shown, vector
 from harness.solving.session import SolverSession
 from harness.verification.judge import LIMIT_MM
 from problems.forms.assembly import Vector
 from problems.forms.problem import in_form
 from solvers.base import FORMS, Answer, Form, Problem, Solver, WarmStart
 
-from .inspection import TOLERANCE, Finding, distance, inspect
 from .known_problems import KnownCase, KnownProblem, arrays_of, known_problems
 
+TOLERANCE = 1e-9
 LOOSE = 1e-1  # a tolerance at which an iterative solver stops earlier than at TOLERANCE
+MEANING = "x solves min ½xᵀKx − fᵀx, Aᵀx ≤ g, in mm; λ solves min ½λᵀQλ − pᵀλ, λ ≥ 0, in N"
+NO_ANSWER = "The problem is small and easy: return λ, and x in all forms but the dual"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong with a solver, where it showed, and how to fix it."""
+
+    form: str
+    where: str
+    wrong: str
+    fix: str
+
+    def __str__(self) -> str:
+        return f"[{self.form}] {self.where}: {self.wrong}. {self.fix}."
 
 
 def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] | None = None) -> list[Finding]:
@@ -26,6 +44,14 @@ def run(solver_factory: Callable[[], Solver], forms: Sequence[Form] | None = Non
     A solver that ends the process or hangs is for isolated.py.
     """
     return first_of_each(findings(solver_factory, forms))
+
+
+def first_of_each(found: Iterable[Finding]) -> list[Finding]:
+    """The first finding of each kind in each form: one fault shows in many cases."""
+    kinds: dict[tuple[str, str], Finding] = {}
+    for finding in found:
+        kinds.setdefault((finding.form, finding.fix), finding)
+    return list(kinds.values())
 
 
 def findings(
@@ -53,76 +79,67 @@ def findings(
 
 
 def _check_problem(factory: Callable[[], Solver], known: KnownProblem, form: Form) -> Iterator[Finding]:
-    """The cases one after another on one state, then the first one again, then by a fresh solver."""
-    problem = in_form(known.prepared, form)
-    before = _fingerprint(known)
-    first_case, *other_cases = known.cases
-    steps = _Steps(factory(), problem)
+    """Each case by a solver of its own; then all by one solver, in each of the ways to solve several."""
+    problem, before = in_form(known.prepared, form), _fingerprint(known)
 
-    first = steps.answer(first_case)
-    wrong = list(inspect(first, known, first_case, form))
-    yield from wrong
-    if wrong and _same(first, steps.answer(first_case, LOOSE), known):
+    def alone(case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
+        return _Steps(factory(), problem).answer(case, tolerance)
+
+    answers = [alone(case) for case in known.cases]
+    wrong = [inspect(answer, known, case, form) for case, answer in zip(known.cases, answers, strict=True)]
+    yield from filter(None, wrong)
+    first, answer = known.cases[0], answers[0]
+    if wrong[0] and _apart(answer, alone(first, LOOSE), known, first) == 0.0:
         what = f"wrong, and the same at tolerance {LOOSE:g}: if it iterates, it ignores the tolerance"
         yield Finding(form, known.name, what, "Use the argument `tolerance` in the stopping test")
-
-    state_fix = "Let setup and solve not change the prepared state, and start each load case cold"
-    for case in other_cases:
-        wrong = list(inspect(steps.answer(case), known, case, form))
-        if wrong and not list(inspect(_Steps(factory(), problem).answer(case), known, case, form)):
-            what = f"right on a state of its own, wrong as a second load case ({wrong[0].wrong})"
-            yield Finding(form, f"{known.name}, {case.name}", what, state_fix)
-        else:
-            yield from wrong
-    if wrong_in_series := _wrong_in_series(factory, problem, known):
-        what = f"right when each is set up, wrong as a series by `update` ({wrong_in_series})"
-        fix = "Let update renew all that depends on the load case; the warm start is not the answer"
-        yield Finding(form, known.name, what, fix)
-    if wrong_batched := _wrong_batched(factory, problem, known):
-        what = f"right when each is set up, wrong when solved at once by `batched` ({wrong_batched})"
-        fix = "Return an answer to each load, in the order of the loads"
-        yield Finding(form, known.name, what, fix)
-    if _differ(first, steps.answer(first_case), known, first_case):
-        what = "the first load case, solved again after others, has a different answer"
-        yield Finding(form, known.name, what, state_fix)
-    if _differ(first, _Steps(factory(), problem).answer(first_case), known, first_case):
+    if not wrong[0] and _apart(answer, alone(first), known, first) > LIMIT_MM / 100:
         what = "not repeatable: two fresh solvers answer the same problem differently"
         yield Finding(form, known.name, what, "Fix random seeds; share nothing between solvers")
+    for way, (what, fix) in WAYS.items():
+        some = way(_Steps(factory(), problem), known.cases)
+        for k, (case, answer) in enumerate(zip(known.cases, some, strict=bool(some))):
+            if not wrong[k] and (found := inspect(answer, known, case, form)):
+                words = f"right when solved alone, wrong {what} ({case.name}: {found.wrong})"
+                yield Finding(form, known.name, words, fix)
+                break
     if _fingerprint(known) != before:
         fix = "Copy K, A, Q, f, g and p before writing into them"
         yield Finding(form, known.name, "the solver changed the arrays that it was given", fix)
 
 
-def _wrong_in_series(factory: Callable[[], Solver], problem: Problem, known: KnownProblem) -> str:
-    """What is wrong in cases solved by `update` but right when set up each; "" if nothing."""
-    steps = _Steps(factory(), problem)
-    steps.answer(known.cases[0])
-    pairs = ((case, steps.next_answer(case, before)) for before, case in pairwise(known.cases))
-    return _first_wrong(pairs, factory, problem, known)
+def inspect(answer: Answer, known: KnownProblem, case: KnownCase, form: Form) -> Finding | None:
+    """What is wrong with the answer to a case at TOLERANCE, first of all; None if nothing is."""
 
+    def finding(wrong: str, fix: str) -> Finding:
+        return Finding(form, f"{known.name}, {case.name}", wrong, fix)
 
-def _wrong_batched(factory: Callable[[], Solver], problem: Problem, known: KnownProblem) -> str:
-    """What is wrong in cases solved by `batched` but right when set up each; "" if nothing."""
-    answers = _Steps(factory(), problem).answers(known.cases)
-    if answers is None:
-        return ""
-    if len(answers) != len(known.cases):
-        return f"{len(answers)} answers to {len(known.cases)} load cases"
-    return _first_wrong(zip(known.cases, answers, strict=True), factory, problem, known)
-
-
-def _first_wrong(
-    answers: Iterable[tuple[KnownCase, Answer]],
-    factory: Callable[[], Solver],
-    problem: Problem,
-    known: KnownProblem,
-) -> str:
-    """The first answer that is wrong although a fresh solver's is right; "" if there is none."""
-    for case, answer in answers:
-        wrong = list(inspect(answer, known, case, problem.form))
-        if wrong and not list(inspect(_Steps(factory(), problem).answer(case), known, case, problem.form)):
-            return f"{case.name}: {wrong[0].wrong}"
-    return ""
+    prepared, load, problem = known.prepared, case.load, in_form(known.prepared, form)
+    try:
+        plain = checked(answer, problem)
+    except InvalidAnswer as fault:
+        return finding(str(fault), fault.fix or NO_ANSWER)
+    if missing := [name for name in problem.needs if getattr(plain, name) is None]:
+        return finding(f'{missing[0]} is None, status "{plain.status}"', NO_ANSWER)
+    assert plain.lam is not None
+    errors = {} if plain.x is None else {"x": _largest(plain.x - case.x)}
+    errors["x = K⁻¹(f − A lam)"] = _largest(prepared.recover(plain.lam, load) - case.x)
+    for what, error in errors.items():
+        if error <= LIMIT_MM:
+            continue
+        if _largest(prepared.recover(-plain.lam, load) - case.x) <= LIMIT_MM:
+            fix = "λ ≥ 0 are the multipliers of Aᵀx ≤ g, so Kx − f + Aλ = 0: return −lam"
+            return finding("lam has the wrong sign", fix)
+        wrong = f"{what} is {error:.2g} mm off (limit {LIMIT_MM:g} mm at tolerance {TOLERANCE:g})"
+        if plain.status == "solved":
+            fix = f"{MEANING}; claim solved only at the tolerance"
+            return finding(f'{wrong}, and yet status is "solved"', fix)
+        return finding(f'{wrong}, status "{plain.status}"', f"{MEANING}; raise the iteration limit, say")
+    if plain.status in ("failed", "iteration_limit"):
+        words = f'status is "{plain.status}" beside a right answer'
+        return finding(words, "Say solved when the tolerance is met")
+    if (smallest := float(plain.lam.min())) < -10 * TOLERANCE:
+        return finding(f"λ is as low as {smallest:.3g} N", "Contacts only push: λ ≥ 0 in both forms")
+    return None
 
 
 class _Raised(Exception):
@@ -150,18 +167,41 @@ class _Steps:
     def answer(self, case: KnownCase, tolerance: float = TOLERANCE) -> Answer:
         return self.session.cold(case.load, tolerance)
 
-    def next_answer(self, case: KnownCase, before: KnownCase) -> Answer:
-        """From the answer of the case before, as in a series."""
-        x = before.x if "x" in self.problem.needs else None
-        gap = before.load.g - self.problem.assembly.A.T @ before.x
-        return self.session.warm(case.load, WarmStart(before.load, before.lam, gap, x))
+    def one_by_one(self, cases: Sequence[KnownCase]) -> list[Answer]:
+        return [self.answer(case) for case in cases]
 
-    def answers(self, cases: Sequence[KnownCase]) -> list[Answer] | None:
-        """The answers to all cases at once; None if the solver cannot."""
+    def as_series(self, cases: Sequence[KnownCase]) -> list[Answer]:
+        """Each but the first from the known answer of the case before."""
+        found = [self.answer(cases[0])]
+        for before, case in pairwise(cases):
+            x = before.x if "x" in self.problem.needs else None
+            gap = before.load.g - self.problem.assembly.A.T @ before.x
+            found.append(self.session.warm(case.load, WarmStart(before.load, before.lam, gap, x)))
+        return found
+
+    def at_once(self, cases: Sequence[KnownCase]) -> list[Answer]:
+        """None at all if the solver cannot."""
         if self.session.batch is None:
-            return None
-        with self._lap("batched"), self.session.in_one_process():
-            return list(self.session.batch([case.load for case in cases], TOLERANCE))
+            return []
+        with self._lap("batched"):
+            return self.session.solve_batch([case.load for case in cases])
+
+
+#: Ways to solve several cases: what is wrong if only this goes wrong, and how to fix it.
+WAYS = {
+    _Steps.one_by_one: (
+        "as a second load case",
+        "Let setup and solve not change the prepared state, and start each load case cold",
+    ),
+    _Steps.as_series: (
+        "as a series by `update`",
+        "Let update renew all that depends on the load case; the warm start is not the answer",
+    ),
+    _Steps.at_once: (
+        "when solved at once by `batched`",
+        "Return an answer to each load, in the order of the loads",
+    ),
+}
 
 
 def _raised(form: str, step: str, error: BaseException) -> Finding:
@@ -172,36 +212,22 @@ def _raised(form: str, step: str, error: BaseException) -> Finding:
     return Finding(form, step, what, "A solver that cannot go on returns Answer('failed', None)")
 
 
-def _lam(answer: object, known: KnownProblem) -> Vector | None:
-    """λ if it can be compared; anything else has been reported already."""
-    try:
-        return vector("lam", getattr(answer, "lam", None), known.prepared.assembly.m)
-    except InvalidAnswer:
-        return None
+def _apart(one: Answer, other: Answer, known: KnownProblem, case: KnownCase) -> float:
+    """max|x − x'| of the displacements that follow from the forces of two answers, mm; NaN without forces."""
+    x = []
+    for answer in (one, other):
+        try:
+            lam = vector("lam", getattr(answer, "lam", None), known.prepared.assembly.m)
+        except InvalidAnswer:
+            lam = None
+        x.append(known.prepared.recover(np.full_like(case.lam, np.nan) if lam is None else lam, case.load))
+    return _largest(x[0] - x[1])
 
 
-def _same(one: Answer, two: Answer, known: KnownProblem) -> bool:
-    a, b = _lam(one, known), _lam(two, known)
-    return a is not None and b is not None and bool((a == b).all())
-
-
-def _differ(one: Answer, two: Answer, known: KnownProblem, case: KnownCase) -> bool:
-    """Whether the displacements of two answers differ by more than a hundredth of the limit."""
-    a, b = _lam(one, known), _lam(two, known)
-    if a is None or b is None:
-        return False
-    recover = known.prepared.recover
-    return distance(recover(a, case.load), recover(b, case.load)) > LIMIT_MM / 100
+def _largest(difference: Vector) -> float:
+    return float(np.abs(difference).max())
 
 
 def _fingerprint(known: KnownProblem) -> list[bytes]:
     loads = [array for case in known.cases for array in (case.load.f, case.load.g, case.load.p)]
     return [array.tobytes() for array in (*arrays_of(known.prepared), *loads)]
-
-
-def first_of_each(found: Iterable[Finding]) -> list[Finding]:
-    """The first finding of each kind in each form: one fault shows in many cases."""
-    kinds: dict[tuple[str, str], Finding] = {}
-    for finding in found:
-        kinds.setdefault((finding.form, finding.fix), finding)
-    return list(kinds.values())

@@ -11,14 +11,13 @@ from rich.console import Console
 from harness.measurement.child import Events
 from harness.measurement.describe import IMPORT_S, refuse_unimportable
 from harness.measurement.monitored import Monitored
+from harness.terminal.console import waiting
 from harness.terminal.exit_codes import DONE, FAILED
-from harness.terminal.waiting import waiting
 from problems.errors import InputError
 from solvers.base import Solver
 from solvers.registry import make_solver
 
-from .check import findings, first_of_each
-from .inspection import Finding
+from .check import Finding, findings, first_of_each
 
 LONGEST_TEXT = 1000  # characters of a finding
 FIX = "Return from solve, within the limits of a measurement; end no process"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -24,9 +23,9 @@ from harness.results import records
 from harness.results.machine import machine
 from harness.results.provenance import provenance
 from harness.results.records import Row
+from harness.terminal.console import waiting
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import Display
-from harness.terminal.waiting import waiting
 from harness.verification.reference_problem import (
     ReferenceProblem,
     record,
@@ -128,9 +127,8 @@ def measure_remaining(
     console: Console,
 ) -> list[Row]:
     """Make the measurements and append their rows. `rows` are those of DIRECTORY so far."""
-    sizes = {m.scene: size[0] for m in remaining if (size := read_scene(m.source).expected_size)}
     rows = list(rows)
-    with Display(console, remaining, done, sizes) as display:
+    with Display(console, len(remaining), done) as display:
         for pending, outcome in outcomes(pending_tasks(remaining, rows, directory, solvers, display)):
             batch = pending.task.batch
             if isinstance(outcome, BaseException):
@@ -143,8 +141,8 @@ def measure_remaining(
             new = rows_of(pending.task, outcome, pending.problem, directory, of_worker)
             records.append(directory / records.MEASUREMENTS, *new)
             rows += new
-            for m, row in zip(batch, new, strict=True):
-                display.finished(m, row, outcome.elapsed_s / len(batch))
+            for row in new:
+                display.finished(row)
     return rows
 
 
@@ -156,16 +154,15 @@ def pending_tasks(
     for batch in batches(remaining):
         m = due(batch[0], rows)
         if m is None:
-            display.passed_over(batch)
+            display.passed_over(len(batch))
             continue
         if any(problem.scene.name != m.scene for problem in opened.values()):
             opened = {}
         family = form_family(m.form)
         if family not in opened:
-            start, building = time.monotonic(), partial(display.building, m.scene)
+            building = partial(display.building, m.scene)
             opened[family] = reference_problem(m.source, building, m.reference_limit_s, m.form)
             record(opened[family], directory)
-            display.ready(m.scene, time.monotonic() - start)
         problem = opened[family]
         display.doing(f"{m.scene}: {m.solver} {m.form}")
         limit_s, stop = stopped_at(m, rows)

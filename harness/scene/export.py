@@ -33,24 +33,7 @@ from problems.scene import read_scene
 
 from .atomic_output import atomic_output
 
-OF_A_PROGRAM = ("mtx", "npz")
 Arrays = dict[str, Any]
-
-
-def places(sources: list[str], out: Path, format: str | None) -> list[tuple[str, Path]]:
-    """Each scene with the path to write it to: `out` itself, or one per scene inside it. Raises InputError if
-    two would have the same.
-    """
-    if len(sources) == 1:
-        return [(sources[0], out)]
-    suffix = formats.FORMATS[format].suffix if format in formats.FORMATS else ""
-    found: dict[Path, str] = {}
-    for source in sources:
-        path = out / (read_scene(source).name.replace("/", "_") + suffix)
-        if path in found:
-            raise InputError.one("SCENE", "name", source, f"{found[path]} would be written to {path} as well")
-        found[path] = source
-    return [(source, path) for path, source in found.items()]
 
 
 def export(
@@ -62,30 +45,30 @@ def export(
     with_reference: bool = False,
     reference_limit_s: float | None = None,
 ) -> None:
-    """Write K, A, f, g of a scene in a format of problems.formats; with a form, its quadratic program, by
-    default as .npz if `out` ends in that, else as Matrix Market files. Raises InputError.
+    """Write K, A, f, g of a scene in a format of problems.formats; with a form, its quadratic program, as
+    .npz if `out` ends in that, else as a folder of Matrix Market files. Raises InputError.
     """
-    if form is not None:
-        format = format or ("npz" if out.suffix == ".npz" else "mtx")
-    elif with_reference:
+    if form is None and with_reference:
         raise InputError.one("--with-reference", "form", None, "needs --form: primal, dual or sparse")
-    elif format is None:
-        raise InputError.one("export", "--format", None, "is needed without --form; see `list formats`")
-    if format not in (formats.FORMATS if form is None else OF_A_PROGRAM):
-        with_form = f"{' or '.join(OF_A_PROGRAM)} with --form; other formats hold K, A, f, g"
-        allowed = f"one of {', '.join(formats.FORMATS)}" if form is None else with_form
+    if form is None and format not in formats.FORMATS:
+        allowed = f"one of {', '.join(formats.FORMATS)}; none with --form"
+        raise InputError.one("--format", "format", format, allowed)
+    if form is not None and format is not None:
+        allowed = (
+            "none with --form: it holds K, A, f, g; PATH.npz is one file, any other PATH a folder of .mtx"
+        )
         raise InputError.one("--format", "format", format, allowed)
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
     with atomic_output(out, [Path(source), *own]) as new:
-        if form is None:
+        if format is not None:
             problem = opened(scene)
             data = matrices(problem.prepared, problem.load)
             formats.FORMATS[format].write(new, data)
             said = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
-        else:
+        elif form is not None:
             arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
-            (_write_npz if format == "npz" else _write_mtx)(new, arrays, about)
+            (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
             said = f"{form} form, {len(arrays['q'])} unknowns, {about['m']} contacts"
     console.print(f"{out}: {scene.name}, {said}.")
 

@@ -1,7 +1,9 @@
-"""The verdict on an answer that another program has computed."""
+"""The verdict on an answer that another program has computed: x or λ from a .npz or .csv file."""
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
@@ -17,12 +19,13 @@ from harness.verification.reference_problem import ReferenceProblem, reference_p
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 from problems.forms.names import Form
+from problems.input.bounded import regular_file
 
-from .answer_file import read_answer
-
+MIB = 1024
+#: The names of displacements and of contact forces.
+HEADINGS = {"x": ("x", "displacement_mm"), "lam": ("lam", "force_N")}
+ALLOWED = "a .npz or .csv file with numbers"
 CODES = {"within": DONE, "outside": FAILED, "cannot_be_judged": NOTHING_JUDGED}
-#: The vector that a file without names holds, by the form that it was computed in.
-VECTOR_OF = {"primal": "x", "dual": "lam", "sparse": "x"}
 
 
 def judge_file(
@@ -40,7 +43,7 @@ def judge_file(
     """
     if not 0 < limit_mm < inf:
         raise InputError.one("--limit", "limit, mm", limit_mm, "must be positive and finite")
-    given = {name or VECTOR_OF[form]: vector for name, vector in read_answer(path).items()}
+    given = read_answer(path)
     problem = reference_problem(source, limit_s=reference_limit_s, form=form)
     assembly = problem.prepared.assembly
     for name, size in (("x", assembly.n), ("lam", assembly.m)):
@@ -94,3 +97,52 @@ def _place(problem: ReferenceProblem, x: Vector) -> str:
     nodes = assembly.asked_nodes
     worst = int(np.argmax(assembly.at_junction(abs(x - problem.reference.x))))
     return f"at entry {worst}" if nodes is None else f"at ({nodes[worst, 0]:.4g}, {nodes[worst, 1]:.4g}) mm"
+
+
+def read_answer(path: Path) -> dict[str, Vector]:
+    """What the file holds: "x" (displacements) and "lam" (contact forces), or one of them.
+
+    An .npz has arrays of the names in HEADINGS, a .csv columns, as nodes.csv and contacts.csv of `solve`;
+    never both names of one vector. Raises InputError.
+    """
+    if path.suffix.lower() not in (".npz", ".csv"):
+        raise InputError.one(path, "suffix", path.suffix, ALLOWED)
+    regular_file(path, "file", MIB)
+    try:
+        if path.suffix.lower() == ".npz":
+            with np.load(path, allow_pickle=False) as archive:
+                names = archive.files
+                found = _named(names, archive.__getitem__)
+        else:
+            with path.open(encoding="utf-8-sig", newline="") as file:
+                reader = csv.DictReader(file)
+                rows, names = list(reader), list(reader.fieldnames or [])
+            found = _named(names, lambda name: [float(row[name]) for row in rows])
+    except Exception as error:  # numpy, zipfile and csv raise kinds of their own
+        raise InputError.one(path, "file", f"{type(error).__name__}: {error}", ALLOWED) from error
+    if not found:
+        wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
+        raise InputError.one(path, "names", names, wanted)
+    for name, vector in found.items():
+        wrong = np.flatnonzero(~np.isfinite(vector))
+        if len(wrong):
+            allowed = f"must be a finite number; {len(wrong)} of {len(vector)} are not"
+            raise InputError.one(path, f"{name}[{wrong[0]}]", float(vector[wrong[0]]), allowed)
+    return found
+
+
+def _named(names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:
+    """The vectors of HEADINGS among them. Raises ValueError."""
+    found = {}
+    for name, headings in HEADINGS.items():
+        known = [each for each in headings if each in names]
+        if len(known) > 1:
+            raise ValueError(f"has {' and '.join(known)}: give one of them alone")
+        if known:
+            array = np.asarray(read(known[0]))
+            if array.dtype.kind not in "fiu" or array.size != max(array.shape, default=1):
+                raise ValueError(
+                    f"{known[0]} is an array of {array.dtype} of shape {array.shape}, not a vector"
+                )
+            found[name] = array.astype(float).ravel()
+    return found

@@ -18,7 +18,7 @@ from problems.input.user_matrices import NAMES, checked
 from problems.scene import read_scene
 
 from .atomic_output import atomic_output
-from .own_matrices import digits_sentence, print_facts
+from .validate import digits_sentence, print_facts
 
 
 def import_(files: list[str], out: Path, console: Console) -> None:

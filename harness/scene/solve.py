@@ -1,8 +1,8 @@
 """One scene from its file to an answer on disk; the report draws it from there.
 
 DIR is written beside its place and moved there when it is whole; what an older answer left is removed.
-DIR/solution.npz holds the arrays, DIR/solution.json what was done: the steps and their time, the ledger of
-the effects, what was skipped, and the error bound of the answer.
+DIR/solution.npz holds the arrays, DIR/solution.json what was done: the steps and their time, what was
+skipped, and the error bound of the answer.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from harness.results.machine import machine, resident_mib
@@ -27,18 +26,14 @@ from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
 from problems.errors import InputError
 from problems.forms.names import Form
-from problems.model.effect import SpringEffect
-from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, MatricesScene
 from problems.scene import read_scene
 
 from . import allowed_gap, solution
 from .atomic_output import atomic_output, write_record
-from .fastener_forces import fastener_forces
-from .layout import layout
-from .ledger import ledger, not_called_for
-from .own_matrices import digits_sentence
+from .layout import fastener_forces, layout
 from .solution import Solution
+from .validate import digits_sentence
 
 
 def solve(
@@ -110,8 +105,6 @@ def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, 
     problem, known, judged = found.problem, found.problem.reference, found.judgement
     scene, data = problem.scene, problem.prepared
     by_solver = found.unknowns is not known.x
-    condensed = any(text.startswith("condensing") for text in built)
-    entries = ledger(scene, condensed or problem.form == "sparse", data.assembly.junction)
     return {
         "method": found.method,
         "status": found.status,
@@ -132,9 +125,8 @@ def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, 
         "route": known.route,
         **layout(scene, data.assembly),
         "fasteners": fastener_forces(scene, found.x),
-        "ledger": [vars(entry) for entry in entries],
         "digits": digits_sentence(problem)[0] if isinstance(scene, MatricesScene) else None,
-        "skipped": list(_skipped(found, built, condensed, solver)),
+        "skipped": list(_skipped(found, built, solver)),
         "steps": found.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
         "machine": machine()["machine"],
@@ -143,8 +135,7 @@ def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, 
     }
 
 
-def _skipped(found: Solution, built: list[str], condensed: bool, solver: str | None) -> Iterator[str]:
-    scene, sparse = found.problem.scene, found.problem.form == "sparse"
+def _skipped(found: Solution, built: list[str], solver: str | None) -> Iterator[str]:
     if not found.has_contact:
         instead = f"; {solver} was not run" if solver else ""
         why = "The scene has no contact"
@@ -152,29 +143,18 @@ def _skipped(found: Solution, built: list[str], condensed: bool, solver: str | N
             closest = f"the closest contact stays {found.closest_mm:.3g} mm open"
             why = f"The answer without contact violates no gap, {closest}"
         yield f"the quadratic program: it was not called for. {why}{instead}"
-    if sparse:
+    if found.problem.form == "sparse":
         yield "condensation, dense factors and Q: the sparse model was solved as it is"
     elif not built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
-    elif isinstance(scene, JointScene) and not condensed:
+    elif isinstance(found.problem.scene, JointScene) and not any(
+        step.startswith("condensing") for step in built
+    ):
         yield "condensation: the parts came from the cache"
-    if isinstance(scene, JointScene):
-        if not any(scene.effects_of(SpringEffect)):
-            yield "springs between parts: K stays block diagonal"
-        if not any(scene.effects_of(PartLoadEffect)) and not sparse:
-            yield "condensing loads: none acts beyond the junction"
-        if others := not_called_for(scene):
-            yield f"effects that the scene does not name, not imported: {', '.join(others)}"
 
 
 def _show(record: dict[str, Any], console: Console) -> None:
-    """Print the ledger, what was skipped, and the answer with its bound."""
-    table = Table("effect", "adds", "what", "s", title="What each effect added")
-    for entry in record["ledger"]:
-        seconds = "–" if entry["seconds"] is None else f"{entry['seconds']:.3f}"
-        table.add_row(entry["effect"], entry["adds"], entry["amount"], seconds)
-    if record["ledger"]:
-        console.print(table)
+    """Print what was skipped, and the answer with its bound."""
     if record["digits"]:
         console.print(f"{record['digits']}.")
     for line in record["skipped"]:

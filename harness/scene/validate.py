@@ -1,23 +1,26 @@
-"""Checks a scene without solving it: what will be built, its size and memory."""
+"""Checks a scene without solving it: what will be built, its size and memory; the digits of a given K."""
 
 from __future__ import annotations
 
 import inspect
 
+import scipy.sparse as sp
 from rich.console import Console
 from rich.table import Table
 
 from harness.planning.form_choice import chosen_form
 from harness.planning.memory import size_of
 from harness.results.machine import physical_memory_mib
+from harness.verification.judge import LIMIT_MM
+from harness.verification.reference_problem import ReferenceProblem
 from problems.build import model_of, prepared
+from problems.forms.assembly import Assembly
 from problems.forms.names import FORMS
+from problems.input.digits import DOUBLE, apparent_digits, expected_error
 from problems.model.effect import SpringEffect
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
-
-from .own_matrices import digits_of, print_facts
 
 
 def validate(source: str, console: Console) -> None:
@@ -74,3 +77,29 @@ def _contents(scene: JointScene) -> Table:
     for effect in scene.effects:
         table.add_row(f"effect {effect.kind}", (inspect.getdoc(effect) or "").partition("\n")[0])
     return table
+
+
+def print_facts(name: str, assembly: Assembly, console: Console) -> None:
+    """Print the sizes, and what reading has changed. Raises InputError if K is not positive definite."""
+    _ = assembly.K.factors
+    blocks = ", ".join(str(K.shape[0]) for K in assembly.K.matrices)
+    console.print(f"{name}: matrices, n = {assembly.n}, m = {assembly.m}, blocks of {blocks}.")
+    for note in assembly.notes:
+        console.print(f"{note}.", style="yellow")
+
+
+def digits_of(assembly: Assembly) -> int:
+    """The fewest digits that the entries of a block of K seem to have, at most 16."""
+    return min(apparent_digits(K.data if sp.issparse(K) else K) for K in assembly.K.matrices)
+
+
+def digits_sentence(problem: ReferenceProblem) -> tuple[str, bool]:
+    """A sentence on the digits of K, and whether they are too few for 1e-7 mm at the answer."""
+    digits = digits_of(problem.prepared.assembly)
+    if digits == DOUBLE:
+        return "The entries of K have all digits of double precision", False
+    error = expected_error(problem.prepared, problem.reference.x, problem.reference.lam, digits)
+    text = f"The entries of K seem to have {digits} digits: if they were rounded, displacements are off by"
+    few = error > LIMIT_MM
+    more = f", more than {LIMIT_MM:g} mm: export it with more digits" if few else ""
+    return f"{text} about {error:.0e} mm{more}", few

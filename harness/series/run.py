@@ -1,51 +1,37 @@
-"""Runs a series: solves the cases that DIRECTORY lacks, writes rows and gaps as they come in."""
+"""Runs a series: solves the cases that DIRECTORY lacks, writes rows and gaps as they come in.
+
+The same command resumes the series that a directory holds; another series is refused.
+"""
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Iterator
-from concurrent.futures import Executor
-from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from harness.measurement.scheduler import done_as_completed, workers
 from harness.results import records, series_file
 from harness.results.machine import installed_version, machine
-from harness.results.schema import VERDICTS
+from harness.results.records import Row, to_line
+from harness.results.schema import SERIES, VERDICTS
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
+from problems.errors import Fault, InputError
+from problems.load_cases.base import LoadCases
 from problems.model.scene import JointScene
 
-from . import store
-from .isolated import solve_isolated
-from .on_worker import solve_on_worker
-from .session import BLOCK, Job, Result, SeriesSession
+from .places import results_of
+from .session import Job, Result
 
-
-@dataclass
-class Tally:
-    """Counts of verdicts, the largest error bound and the largest error of the cases compared."""
-
-    counts: dict[str, int]
-    worst_bound_mm: float = 0.0
-    worst_error_mm: float | None = None
-    compared: int = 0
-
-    def add(self, row: dict[str, Any]) -> None:
-        self.counts[row["verdict"]] += 1
-        bound = row.get("bound_mm", 0.0)  # missing without an answer; null in the file where it is infinite
-        self.worst_bound_mm = max(self.worst_bound_mm, np.inf if bound is None else bound)
-        error = row.get("displacement_error_mm")
-        if error is not None:
-            self.compared += 1
-            self.worst_error_mm = max(self.worst_error_mm or 0.0, error)
+OTHER = "name another directory with --out"
+MAX_FAULTS = 10  # named at once
 
 
 def run(
@@ -57,8 +43,8 @@ def run(
     if DIRECTORY holds another series; after KeyboardInterrupt the same command resumes.
     """
     with records.locked(directory, (), other=records.MEASUREMENTS):
-        store.open_series(directory, identity(job) | facts, metadata(job))
-        done = store.solved(directory, job.cases)
+        open_series(directory, identity(job) | facts, metadata(job))
+        done = solved(directory, job.cases)
         remaining = np.flatnonzero(~done).tolist()
         console.print(
             f"{job.scene.name}: {len(done)} cases, {len(done) - len(remaining)} already in {directory}"
@@ -66,45 +52,8 @@ def run(
         if remaining:
             with results_of(job, remaining, scheduler, console) as results:
                 solve_remaining(job, len(remaining), results, directory, console)
-        tally = Tally(dict.fromkeys(VERDICTS, 0))
-        for row in series_file.rows(directory):
-            if row["case"] < job.cases.count:
-                tally.add(row)
-    return summary(tally, job.cases.count, console)
-
-
-@contextmanager
-def results_of(
-    job: Job, remaining: list[int], scheduler: str | None, console: Console
-) -> Iterator[Iterator[list[Result]]]:
-    """The results as they come, from this process, a plug-in's own, or the workers of a scheduler."""
-    if scheduler is None and job.plugin:
-        with closing(solve_isolated(job, remaining)) as results:
-            yield results
-        return
-    if scheduler is None:
-        with console.status("opening the assembly, preparing the solver"):
-            session = SeriesSession(job)
-        yield session.solve(remaining)
-        return
-    with workers(scheduler) as (executor, count):
-        console.print(f"{count} workers at {scheduler}")
-        yield on_workers(job, remaining, executor, count, console)
-
-
-def on_workers(
-    job: Job, remaining: list[int], executor: Executor, count: int, console: Console
-) -> Iterator[list[Result]]:
-    """Blocks of cases, small enough that the workers end together. What fails is left for another run."""
-    size = min(max(len(remaining) // (4 * count), 1), BLOCK)
-    blocks = [remaining[start : start + size] for start in range(0, len(remaining), size)]
-    tasks = ((block, (replace(job, cases=job.cases.only(block)), block)) for block in blocks)
-    for block, outcome in done_as_completed(executor, count, solve_on_worker, tasks):
-        if isinstance(outcome, BaseException):
-            why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
-            console.print(f"cases {block[0]} … {block[-1]} not solved, run again: {why}", style="red")
-        else:
-            yield outcome
+        rows = (row for row in series_file.rows(directory) if row["case"] < job.cases.count)
+        return summary(rows, job.cases.count, console)
 
 
 def solve_remaining(
@@ -113,28 +62,15 @@ def solve_remaining(
     """Write the results; only this process does."""
     record_contacts(job, directory)
     begun, made = time.monotonic(), 0
-    with display(console) as progress:
-        task = progress.add_task(job.scene.name, total=count, rate="")
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(job.scene.name, total=count)
         for some in results:
             series_file.append(directory, some)
             made += len(some)
-            rate = f"{made / (time.monotonic() - begun):.3g} cases/s"
-            progress.update(task, completed=made, rate=rate)
+            bar.update(task, completed=made)
             print_failures(some, console)
     console.print(f"{made} cases in {time.monotonic() - begun:.1f} s")
-
-
-def display(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-        console=console,
-        disable=not console.is_terminal,
-    )
 
 
 def print_failures(results: list[Result], console: Console) -> None:
@@ -185,16 +121,61 @@ def record_contacts(job: Job, directory: Path) -> None:
     series_file.write_contacts(directory, arrays)
 
 
-def summary(tally: Tally, asked: int, console: Console) -> int:
-    seen = [f"{count} {verdict.replace('_', ' ')}" for verdict, count in tally.counts.items() if count]
-    error = f", largest of {tally.compared} checked {tally.worst_error_mm:.1e} mm" if tally.compared else ""
-    worst = tally.worst_bound_mm
-    bound = f"largest proven error bound {worst:.1e} mm" if np.isfinite(worst) else f"some bounds {UNPROVEN}"
-    console.print(f"{', '.join(seen)}; {bound}{error}")
-    missing = asked - sum(tally.counts.values())
-    if missing:
+def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]) -> None:
+    """Write identity and facts. Raises InputError, naming each difference, if another series is there."""
+    series_file.create(directory)
+    before = series_file.read_facts(directory)
+    if before is not None:
+        faults = [
+            Fault(str(directory / SERIES), key, before["identity"].get(key), f"now {value!r}: {OTHER}")
+            for key, value in json.loads(to_line(identity)).items()
+            if before["identity"].get(key) != value
+        ]
+        if faults:
+            raise InputError(faults)
+    series_file.write_fact(directory, "series", to_line({"identity": identity, **facts}))
+
+
+def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
+    """(count,) which cases have a row.
+
+    Raises InputError if one has other parameters than its case now, as after a change of a table.
+    """
+    done, faults = np.zeros(cases.count, dtype=bool), []
+    for row in series_file.rows(directory):
+        case = row["case"]
+        if case >= cases.count:
+            continue
+        done[case] = True
+        for name, value in cases.parameters(case).items():
+            if row.get(name) != value:
+                where, allowed = f"case {case}, {name}", f"is now {value!r}: {OTHER}"
+                faults.append(Fault(str(directory / SERIES), where, row.get(name), allowed))
+    if faults:
+        raise InputError(faults[:MAX_FAULTS])
+    return done
+
+
+def summary(rows: Iterable[Row], asked: int, console: Console) -> int:
+    """Say how many rows there are of each verdict, the largest bound, and the largest error of those compared
+    with the reference; returns the exit code.
+    """
+    counts = dict.fromkeys(VERDICTS, 0)
+    worst_bound, compared, worst_error = 0.0, 0, 0.0
+    for row in rows:
+        counts[row["verdict"]] += 1
+        bound = row.get("bound_mm", 0.0)  # missing without an answer; null in the file where it is infinite
+        worst_bound = max(worst_bound, np.inf if bound is None else bound)
+        if (error := row.get("displacement_error_mm")) is not None:
+            compared, worst_error = compared + 1, max(worst_error, error)
+    seen = [f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items() if count]
+    proven = np.isfinite(worst_bound)
+    said = f"largest proven error bound {worst_bound:.1e} mm" if proven else f"some bounds {UNPROVEN}"
+    said += f", largest of {compared} checked {worst_error:.1e} mm" if compared else ""
+    console.print(f"{', '.join(seen)}; {said}")
+    if missing := asked - sum(counts.values()):
         console.print(f"Not solved: {missing}. Run the same command again.", style="red")
         return FAILED
-    if not tally.counts["within"] + tally.counts["outside"]:
+    if not counts["within"] + counts["outside"]:
         return NOTHING_JUDGED
-    return FAILED if tally.counts["outside"] + tally.counts["no_answer"] else DONE
+    return FAILED if counts["outside"] + counts["no_answer"] else DONE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,12 +36,15 @@ BLOCK_TIME_S = 5.0  # after this time a block is written, so that few slow cases
 KEPT_ANSWERS = 32  # for warm starts: memory does not grow with the number of cases
 
 
+Report = Callable[..., None]
+
+
 @dataclass(frozen=True)
 class Job:
     """What a series solves, and how.
 
     check : every check-th case is compared with the reference; 0: none. threads : None: as they are.
-    time_limit_s : per case, and memory_limit_mib, over all its processes: of a plug-in (isolated.py).
+    time_limit_s : per case, and memory_limit_mib, over all its processes: of a plug-in (places.py).
     """
 
     scene: Scene
@@ -75,13 +78,18 @@ class Attempt:
 
 
 class SeriesSession:
-    """A job in this process. solver : made by the caller, or else by its name."""
+    """A job in this process.
 
-    block_time_s = BLOCK_TIME_S
+    solver : made by the caller, or else by its name. report : called with phase="solve" and `cases` where
+    the solver begins, so that each case can have its time limit, and with phase="judging" where it ends; a
+    case is then judged as soon as it is solved, unless several are solved at once.
+    """
 
-    def __init__(self, job: Job, solver: Solver | None = None) -> None:
+    def __init__(self, job: Job, solver: Solver | None = None, report: Report | None = None) -> None:
         threadpoolctl.threadpool_limits(job.threads)
         self.job = job
+        self.report: Report = report or (lambda **event: None)
+        self.block_time_s = 0.0 if report else BLOCK_TIME_S
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)
         self.proof = proof_of(self.data)
@@ -94,6 +102,8 @@ class SeriesSession:
 
     @contextmanager
     def _lap(self, name: str) -> Iterator[None]:
+        if name == "convert_s":
+            self.report(phase="solve")
         start = time.perf_counter()
         yield
         self.row[name] = time.perf_counter() - start
@@ -118,6 +128,7 @@ class SeriesSession:
 
     def _try_batch(self, loads: list[tuple[int, LoadCase]]) -> list[Attempt]:
         """Solve them all at once; if that raises, one after another, to find out which one does."""
+        self.report(phase="solve", times=len(loads), cases=[case for case, _ in loads])
         start = time.perf_counter()
         try:
             answers = self.session.solve_batch([load for _, load in loads])
@@ -134,6 +145,7 @@ class SeriesSession:
 
     def _try(self, case: int, load: LoadCase) -> Attempt:
         """Solve one; if the solver raises, its status is `failed`."""
+        self.report(phase="solve", cases=[case])
         self.row = self._new_row(case)
         near = self.session.nearest(load)
         if near is not None:
@@ -153,6 +165,7 @@ class SeriesSession:
         return [self._result(each, known.get(each.case), share) for each in attempts]
 
     def _assessed(self, attempts: list[Attempt]) -> dict[int, Assessment]:
+        self.report(phase="judging")
         needs = self.problem.needs
         answered = [each for each in attempts if all(getattr(each.answer, v) is not None for v in needs)]
         if not answered:

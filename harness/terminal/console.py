@@ -1,83 +1,59 @@
-"""What commands share: arguments, and user errors shown as red lines with an exit code."""
+"""A console on which text from outside is only text, and a line that says what is being done."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from enum import StrEnum
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Any
 
-import typer
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.text import Text
 
-from .exit_codes import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-WIDTH_OF_A_LOG = 160
-MOST_FAULTS = 100  # shown at once
-LONGEST_LINE = 200  # characters of a file quoted in a message
+#: Control characters except the line break, those that reverse the direction of text, and lone surrogates,
+#: as in file names that are not UTF-8.
+ILLEGIBLE = re.compile("[\0-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+UNKNOWN = "\N{REPLACEMENT CHARACTER}"
+QUIET_S = 2.0  # before a line says what is being done
 
 
-def option(metavar: str, help: str, **limits: Any) -> Any:
-    return typer.Option(metavar=metavar, help=help, **limits)
+def legible(text: str) -> str:
+    return ILLEGIBLE.sub(UNKNOWN, text)
 
 
-class FormName(StrEnum):
-    primal = "primal"
-    dual = "dual"
-    sparse = "sparse"
+class PlainConsole(Console):
+    """Without markup, emoji codes and highlighting; no control character of a text reaches the terminal."""
 
+    def __init__(self, **options: Any) -> None:
+        super().__init__(highlight=False, markup=False, emoji=False, **options)
 
-SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or .npz with matrices.")
-]
-Plugin = Annotated[Path | None, option("FILE", "Python file with your own solver.")]
-MemoryLimit = Annotated[int, option("MIB", "Memory limit, over all processes of the solver.", min=1)]
-ReferenceLimit = Annotated[
-    float | None,
-    option(
-        "SECONDS", "For each reference's search.  [default: 60 per thousand contacts, at least 60]", min=0.001
-    ),
-]
-AllowGap = Annotated[
-    float | None, option("MM", "Fail if a remaining gap is larger than this, and say where.", min=0.0)
-]
-Scheduler = Annotated[
-    str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
-]
+    def render_str(self, text: str, **options: Any) -> Text:
+        """As in rich; here already, because the widths of a table's columns are measured before `render`.
+
+        A string is one line, so that no title or file name can pass for a line of ours.
+        """
+        return super().render_str(legible(text).replace("\n", UNKNOWN), **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """As in rich, whose own control sequences are marked as such or made from styles afterwards."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=legible(segment.text))
 
 
 @contextmanager
-def error_reporting(
-    safe: str = "; rows already written are safe, run again to continue",
-    interrupted: str = "Interrupted. The rows so far are kept: run the same command again to continue.",
-) -> Iterator[Console]:
-    """A console; each user error becomes a red line and an exit code, not a traceback."""
-    from harness.results.incomparable import Incomparable
-    from problems.errors import InputError
+def waiting(console: Console) -> Iterator[Callable[[str], None]]:
+    """Yields a function to call again and again with what is being done; the line goes when it is over."""
+    started, status = time.monotonic(), console.status("")
 
-    from .plain_console import PlainConsole
+    def show(text: str) -> None:
+        seconds = time.monotonic() - started
+        if seconds > QUIET_S and console.is_terminal:
+            status.update(Text(f"{text}: {seconds:.0f} s"))
+            status.start()
 
-    errors = PlainConsole(stderr=True, soft_wrap=True)
     try:
-        yield PlainConsole(width=None if sys.stdout and sys.stdout.isatty() else WIDTH_OF_A_LOG)
-    except InputError as error:
-        for fault in error.faults[:MOST_FAULTS]:
-            errors.print(str(fault), style="red")
-        if (more := len(error.faults) - MOST_FAULTS) > 0:
-            errors.print(f"… and {more} more", style="red")
-        raise typer.Exit(NOT_COMPARABLE if isinstance(error, Incomparable) else WRONG_USAGE) from None
-    except UnicodeEncodeError as error:
-        where = error.object.count("\n", 0, error.start)
-        line = error.object.split("\n")[where][:LONGEST_LINE]
-        errors.print(f"{line}: a name that is not UTF-8 cannot be written: rename the file", style="red")
-        raise typer.Exit(WRONG_USAGE) from None
-    except OSError as error:
-        errors.print(f"{error}{safe}", style="red")
-        raise typer.Exit(WRONG_USAGE) from None
-    except KeyboardInterrupt:
-        errors.print(interrupted, style="yellow")
-        raise typer.Exit(INTERRUPTED) from None
+        yield show
+    finally:
+        status.stop()

@@ -1,18 +1,21 @@
-"""Terminal output of a run: each row as it is finished, a progress bar, and the time remaining."""
+"""Terminal output of a run: each row as it is finished, and a progress bar."""
 
 from __future__ import annotations
 
-import time
-
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.text import Text
 
-from harness.planning.plan import Measurement
 from harness.results.records import Row
 
-GROWTH = 2.5  # seconds ~ n^GROWTH, between the n² of a product and the n³ of a factorisation
-SCENE = ("scene", "")  # the step of opening or building a scene
 STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no_answer": "red"}
 
 #: Heading, width (negative: left-aligned), content.
@@ -63,22 +66,18 @@ def row_text(row: Row) -> Text:
 class Display:
     """Rows scroll above a progress bar; without a terminal only the rows are printed."""
 
-    def __init__(self, console: Console, left: list[Measurement], done: int, sizes: dict[str, int]) -> None:
+    def __init__(self, console: Console, left: int, done: int) -> None:
         self.console = console
-        self.left = list(left)
-        self.unopened = {m.scene for m in left}
-        self.sizes = sizes
-        self.timed: dict[tuple[str, str], tuple[int, float]] = {}
         self.progress = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
-            TextColumn("{task.fields[left]}"),
+            TimeRemainingColumn(),
             console=console,
             disable=not console.is_terminal,
         )
-        self.task: TaskID = self.progress.add_task("", total=len(left) + done, completed=done, left="")
+        self.task: TaskID = self.progress.add_task("", total=left + done, completed=done)
 
     def __enter__(self) -> Display:
         self.console.print(_line([heading for heading, *_ in COLUMNS]), style="bold", soft_wrap=True)
@@ -90,42 +89,17 @@ class Display:
 
     def doing(self, text: str) -> None:
         """Show the current activity beside the bar."""
-        self.progress.update(self.task, description=text, left=self._time_left())
+        self.progress.update(self.task, description=text)
 
     def building(self, scene: str, step: str, fraction: float) -> None:
         """Show the progress of a step of building a scene."""
         self.doing(f"{scene}: {step} {fraction:.0%}" if fraction else f"{scene}: {step}")
 
-    def ready(self, scene: str, seconds: float) -> None:
-        """Note that a scene is open, with its reference."""
-        self.unopened.discard(scene)
-        self._record(SCENE, scene, seconds)
-
-    def _record(self, step: tuple[str, str], scene: str, seconds: float) -> None:
-        self.timed[step] = self.sizes.get(scene, 0), seconds
-
-    def finished(self, measurement: Measurement, row: Row, seconds: float) -> None:
-        """Note that a measurement is done, and print its row."""
-        self.left = [m for m in self.left if m.key != measurement.key]
-        self._record((measurement.solver, measurement.form), measurement.scene, seconds)
+    def finished(self, row: Row) -> None:
+        """Print the row of a measurement that is done."""
         self.console.print(row_text(row), soft_wrap=True)
-        self.progress.update(self.task, advance=1, left=self._time_left())
+        self.passed_over(1)
 
-    def passed_over(self, batch: list[Measurement]) -> None:
-        """Note that these need not be made."""
-        self.left = [m for m in self.left if m not in batch]
-        self.progress.update(self.task, advance=len(batch), left=self._time_left())
-
-    def _time_left(self) -> str:
-        """Estimated from the last time of the same step, scaled by size; else from the other steps."""
-        if not self.timed or not self.left:
-            return ""
-        total = sum(self._estimate(SCENE, scene) for scene in self.unopened)
-        total += sum(min(self._estimate((m.solver, m.form), m.scene), m.time_limit_s) for m in self.left)
-        return f"{time.strftime('%H:%M:%S', time.gmtime(total))} left"
-
-    def _estimate(self, step: tuple[str, str], scene: str) -> float:
-        mean = sum(seconds for _, seconds in self.timed.values()) / len(self.timed)
-        size, seconds = self.timed.get(step, (0, mean))
-        growth = (self.sizes.get(scene, 0) / size) ** GROWTH if size else 1.0
-        return seconds * growth
+    def passed_over(self, count: int) -> None:
+        """Note that so many measurements need not be made any more."""
+        self.progress.update(self.task, advance=count)

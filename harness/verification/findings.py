@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 from harness.results.digits import floor_mm
 from harness.results.records import Row, replace_text, to_line
 from harness.results.sides import Side, measurement, read_side, refuse_incomparable
-from harness.terminal.plain_console import legible
+from harness.terminal.console import legible
 
 from .judge import Judgement
 

@@ -1,7 +1,8 @@
 """In how many cases of a series the remaining gap is larger than allowed, and at which contacts.
 
-The gaps of a case are known up to its gap_error_mm. It exceeds the allowed gap if its largest gap does by
-more than that, and is undecided if it does by less, or if its row does not say how well its gaps are known.
+A gap y is known up to an e (harness/verification/assess.py). It is larger than allowed if y − e is, and
+not if y + e is not; between the two nothing can be said, nor of an allowed gap below e. A case is judged by
+its largest gap and its gap_error_mm; it is undecided if its row does not say how well its gaps are known.
 The gaps of the contacts are stored as float32, whose rounding, 6e-8 of the gap, is added.
 """
 
@@ -13,11 +14,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib.colors import Normalize
+from numpy.typing import NDArray
 
 from report.figures import style
 from report.figures.maps import Map, Scale, drawn
 from report.results.series import Array, Series
 
+Flags = NDArray[np.bool_]
 ROUNDING = 2.0**-24
 
 
@@ -36,15 +39,20 @@ class Exceeding:
     largest: Array
 
 
+def larger(allowed_mm: float, gap: Array, e: Array) -> tuple[Flags, Flags]:
+    """Which gaps, (k,) mm known up to e (k,), are larger than allowed, and of which that cannot be told."""
+    told = allowed_mm >= e
+    certain = told & (gap - e > allowed_mm)
+    return certain, ~told | (~certain & (gap + e > allowed_mm))
+
+
 def exceeding(series: Series, allowed_mm: float) -> Exceeding:
     """The check of a series."""
     known = series.cases["gap_error_mm"].fillna(np.inf).to_numpy()
     gaps = series.cases["max_gap_mm"].to_numpy()
     e = known + ROUNDING * abs(gaps)
-    told = allowed_mm >= e
-    larger = told & (gaps - e > allowed_mm)
-    undecided = ~told | (~larger & (gaps + e > allowed_mm))
-    cases = series.cases.assign(e=e)[larger].sort_values("max_gap_mm", ascending=False, kind="stable")
+    exceeds, undecided = larger(allowed_mm, gaps, e)
+    cases = series.cases.assign(e=e)[exceeds].sort_values("max_gap_mm", ascending=False, kind="stable")
     counts, largest = np.zeros(series.gaps.m), np.zeros(series.gaps.m)
     for block, some in series.of_cases(cases):
         counts += (some - block["e"].to_numpy()[:, None] > allowed_mm).sum(axis=0)

@@ -61,7 +61,9 @@ def write(directory: Path) -> Path:
     blocks.append(Text(f"Every value: {links}, `solution.npz`. VTU for ParaView: {vtu}."))
     title = str(record["title"])
     write_page(directory / "index.html", title, answer_data(record, arrays))
-    sections = [Section("The answer", blocks), Section("What each effect adds", _effects(record))]
+    sections = [Section("The answer", blocks)]
+    if skipped := _skipped(record):
+        sections.append(Section("What was skipped", skipped))
     return written(directory / "answer.md", title, sections, [f"**{headline(record, arrays)['text']}**"])
 
 
@@ -111,21 +113,10 @@ def _range(heading: str, name: str) -> Column:
     return Column(heading, lambda row: f"{significant(row[name].min())} … {significant(row[name].max())}")
 
 
-def _effects(record: dict[str, Any]) -> list[Block]:
-    skipped = Text("Skipped:\n\n" + "\n".join(f"- {line}" for line in record["skipped"]))
-    if not record["ledger"]:
-        digits = f" {record['digits']}." if record["digits"] else ""
-        return [Text(f"The matrices were given; no effect was computed.{digits}"), skipped]
-    columns = [
-        word("effect", "effect"),
-        word("adds", "adds"),
-        word("what", "amount"),
-        number("seconds", "seconds"),
-    ]
-    return [
-        Table("", "*The effects*, each measured separately.", pd.DataFrame(record["ledger"]), columns),
-        skipped,
-    ]
+def _skipped(record: dict[str, Any]) -> list[Block]:
+    lines = [f"- {line}" for line in record["skipped"]]
+    digits = [f"The matrices were given. {record['digits']}."] if record["digits"] else []
+    return [Text(text) for text in (*digits, "\n".join(lines)) if text]
 
 
 def write_vtu(path: Path, record: dict[str, Any], arrays: dict[str, Any]) -> str:

@@ -165,13 +165,6 @@ def test_a_solver_object_is_judged_and_its_nonsense_named() -> None:
         solve(scene, Idle(), options={"lam": None})
 
 
-def test_without_contact_no_solver_is_called() -> None:
-    K, A, f, g = matrices()[2]
-    found = solve(own_matrices(K, A, f * 1e-9, g + 1.0), Idle(status="nonsense"))
-    assert found.judgement.verdict == "within"
-    assert not found.lam.any()
-
-
 @pytest.mark.parametrize(("solver", "form"), [("newton", "dual"), ("gi", "dual"), ("gi", "primal")])
 def test_a_series_of_own_load_cases(solver: str, form: Any) -> None:
     data, _, own = matrices()

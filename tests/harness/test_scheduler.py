@@ -34,7 +34,7 @@ from harness.measurement.scheduler import (
 )
 from harness.planning.suite import read_suite
 from harness.results import series_file
-from harness.series.on_worker import solve_on_worker
+from harness.series.places import solve_on_worker
 from harness.series.run import run
 from harness.series.session import Job
 from problems.errors import InputError

@@ -1,7 +1,6 @@
 """A suite of series: the cases of a scene in one process, a row each."""
 
 import json
-import re
 import shutil
 import time
 from collections.abc import Iterator
@@ -202,15 +201,6 @@ def test_what_is_for_a_series_is_refused_elsewhere_and_two_ways_need_two_names()
         *("solver.0.cases", "solver.1.batched", "solver.2.batched")
     }
     assert "other `batched`" in faults["solver.1.variant"]
-
-
-def test_the_table_of_the_report(two: Path) -> None:
-    from report.writers.markdown import write as report
-
-    text = report(two).read_text()
-    assert "## Series of load cases" in text
-    assert len(re.findall(r"\| +4 of 4 \|", text)) == 2
-    assert "Repeatability" not in text  # cases are no repeats
 
 
 def test_ratios_are_to_the_fastest_librarys_next_case_warm_or_cold() -> None:

@@ -209,16 +209,6 @@ def test_what_cannot_be_together_is_said_at_once() -> None:
     series("--sweep", "initial_gap.mean=1:2:3", "--cases", "5", "--out", "none", code=2)
 
 
-@pytest.mark.parametrize(("solver", "form"), [("gi", "primal"), ("osqp", "dual")])
-def test_other_solvers_and_forms(solver: str, form: str) -> None:
-    out = f"{solver}-{form}"
-    asked = f"--cases 12 --check 1 --solver {solver} --form {form} --tolerance 1e-10 --out {out}"
-    series(*asked.split())
-    rows = rows_of(out)
-    assert [row["status"] for row in rows] == ["solved"] * 12
-    assert all(row["displacement_error_mm"] <= min(1e-7, row["bound_mm"]) for row in rows)
-
-
 def results_of(count: int, check: int, **solver: Any) -> list[Result]:
     scene = read_scene("strip.toml")
     job = Job(scene, random_gaps(scene, count, 0), "faulty", "dual", 1e-9, 1e-7, check, 1, **solver)

@@ -1,16 +1,11 @@
-"""What the terminal shows: a line a row, and the time that is left."""
+"""What the terminal shows of a run: a line per row."""
 
 from io import StringIO
 from typing import Any
 
 from rich.console import Console
 
-from harness.planning.plan import Measurement
 from harness.terminal.progress import Display
-
-
-def measurement(scene: str, solver: str = "gi", time_limit_s: float = 1000.0) -> Measurement:
-    return Measurement("s", scene, scene, solver, "dual", "", {}, 1e-9, 2, 0, time_limit_s, 100, 1e-7, True)
 
 
 def row(**changes: Any) -> dict[str, Any]:
@@ -29,12 +24,11 @@ def row(**changes: Any) -> dict[str, Any]:
 
 def test_a_line_says_the_outcome_and_why() -> None:
     shown = StringIO()
-    plan = [measurement("small"), measurement("large")]
-    with Display(Console(file=shown, width=60), plan, 0, {}) as display:
-        display.finished(plan[0], row(), 1.0)
+    with Display(Console(file=shown, width=60), 2, 0) as display:
+        display.finished(row())
         nothing = dict.fromkeys(["convert_s", "prepare_s", "solve_s", "displacement_error_mm", "iterations"])
         failed = row(**nothing, status="crashed", verdict="no_answer", message="killed by SIGSEGV\nmore")
-        display.finished(plan[1], failed, 1.0)
+        display.finished(failed)
     heading, first, second, why = filter(str.strip, shown.getvalue().splitlines())
     assert heading.split()[:2] == ["scene", "solver"]
     assert " ".join(first.split()) == "small gi dual 1e-09 2 solved 7 0.50 0.75 2.0e-11 within"

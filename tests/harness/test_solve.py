@@ -1,4 +1,4 @@
-"""`solve` and `validate`: the answer, its files, the ledger, and what was not computed."""
+"""`solve` and `validate`: the answer, its files, and what was not computed."""
 
 import json
 import re
@@ -158,45 +158,14 @@ def test_files_hold_the_answer(solved: tuple[dict[str, Any], Path]) -> None:
     assert len(text.splitlines()) < 90
 
 
-def test_the_ledger_names_every_effect_and_what_it_added(solved: tuple[dict[str, Any], Path]) -> None:
-    record, folder = solved
-    added = {(entry["effect"], entry["adds"]): entry for entry in record["ledger"]}
-    assert list(added) == [
-        ("rigid_tool b", "constraints"),
-        ("rigid_tool b", "gap"),
-        ("initial_gap", "gap"),
-        ("fasteners", "load"),
-        ("ribs a", "stiffness"),
-        ("installed_fasteners", "stiffness"),
-        ("installed_fasteners", "load"),
-        ("self_weight b", "load"),
-    ]
-    assert added["rigid_tool b", "gap"]["amount"] == "0.4 … 0.4 mm at 55 contacts"
-    assert added["fasteners", "load"]["amount"] == "a +160 N on 2 nodes"  # through to the tool
-    assert "3e+04 N, b -3e+04 N" in added["installed_fasteners", "load"]["amount"]
-    assert all(entry["seconds"] > 0 for entry in record["ledger"] if entry["adds"] != "constraints")
-    constraints = added["rigid_tool b", "constraints"]
-    assert constraints["amount"] == "55 contacts of b and tool"
-    assert constraints["seconds"] is None
-    page = " ".join((folder / "out" / "answer.md").read_text().split())
-    for entry in record["ledger"]:
-        assert f"| {entry['effect']} | {entry['adds']} | {entry['amount']} |" in page
-        assert entry["amount"] in record["shown"]
-    assert all(line in page for line in record["skipped"])
-    (unnamed,) = (line for line in record["skipped"] if "not imported" in line)
-    assert "shims" in unnamed
-    assert "ribs" not in unnamed
-    assert any(name.startswith("matrices") for name in record["steps"])
-
-
 def test_a_change_of_loads_alone_reuses_the_assembly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(tmp_path)
     before = arrays(tmp_path)
     forbid_building(monkeypatch)
     record = run(tmp_path, preload=160.0)
-    assert any("came from the cache" in line for line in record["skipped"])
-    (ribs,) = (entry for entry in record["ledger"] if entry["effect"] == "ribs a")
-    assert (ribs["amount"], ribs["seconds"]) == ("in the assembly from the cache", None)
+    (line,) = record["skipped"]
+    assert "came from the cache" in line
+    assert line in (tmp_path / "out" / "answer.md").read_text()
     assert abs(arrays(tmp_path)["x"] - before["x"]).max() > 1e-4
 
 
@@ -232,7 +201,6 @@ def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         *("answer.md", "contacts.csv", "index.html", "nodes.csv", "solution.json", "solution.npz")
     }
-    assert json.loads((tmp_path / "out" / "solution.json").read_text())["ledger"] == []
     # One closed contact: x₀ − x₂ = 0.1 with K x = f − A λ, solved by hand: λ = 2 (x₀ − 0.1), 13 x₀ = 21.2.
     x = arrays(tmp_path)["x"]
     force = arrays(tmp_path)["lam"][0]

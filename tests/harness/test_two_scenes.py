@@ -10,8 +10,8 @@ from commands import harness
 from joints import two_parts
 from matplotlib.image import imread
 
-from harness.scene.fastener_forces import fastener_forces
-from harness.scene.starter import STARTER
+from harness.cli.scene import STARTER
+from harness.scene.layout import fastener_forces
 from problems.build import load_case, prepared
 from problems.scene import read_scene
 
@@ -154,5 +154,5 @@ def test_own_matrices_with_other_rows_are_refused(other: dict[str, float], tmp_p
         np.savez(paths[-1], K=np.eye(n), A=A, f=np.full(n, 2.0), g=np.ones(1))
     done = harness("solve", *paths, "--out", tmp_path / "both")
     assert done.exit_code == 5, done.output
-    assert "A with" in done.output
+    assert "A of shape" in done.output
     assert not (tmp_path / "both").exists()

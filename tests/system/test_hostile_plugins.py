@@ -17,7 +17,7 @@ from runs import all_end, processes, rows_of, wait_for
 
 import harness.conformance.isolated as isolated
 import harness.measurement.describe as describing
-import harness.terminal.waiting as waiting_module
+import harness.terminal.console as waiting_module
 from harness import InputError
 from harness.measurement.describe import describe, described
 from harness.planning.suite import read_suite
@@ -182,7 +182,7 @@ def test_a_check_that_lasts_says_what_it_is_doing(tmp_path: Path, monkeypatch: p
     terminal, log = StringIO(), StringIO()
     plugin = write(tmp_path, in_solve="time.sleep(0.05)")
     assert isolated.run(["mine"], plugin, 20, 1000, Console(file=terminal, force_terminal=True)) == 0
-    assert re.search(r"mine: dual, two parts: \d+ s", terminal.getvalue())
+    assert re.search(r"mine: dual, two parts and a tool: \d+ s", terminal.getvalue())
     assert isolated.run(["mine"], plugin, 20, 1000, Console(file=log)) == 0
     assert log.getvalue() == "mine: no faults\n"
 

@@ -17,10 +17,10 @@ from synthetic_results import no_answer, row, write_rows
 from typer import Typer
 from typer.testing import CliRunner
 
+from harness.cli.options import error_reporting
 from harness.results import series_file
 from harness.results.records import to_line
-from harness.terminal.console import error_reporting
-from harness.terminal.plain_console import PlainConsole
+from harness.terminal.console import PlainConsole
 from report.document import escape
 from report.figures import style
 from report.figures.answer import answer_figures
@@ -61,7 +61,6 @@ def solution(folder: Path, name: str) -> Path:
         "title": name, "method": name, "status": name, "verdict": "within", "n": 12, "m": 6, "qp": True,
         "closest_mm": 0.1, "judged_error_mm": 1e-9, "error_bound_mm": 1e-9, "parts": parts,
         "pairs": [{"pair": [name, name], "start": 0, "stop": 6}], "marks": {name: [[1.0, 2.0]]},
-        "ledger": [{"effect": name, "adds": name, "amount": name, "seconds": 1.0, "mib": 1.0}],
         "digits": None, "skipped": [name], "steps": {name: 1.0}, "peak_rss_mib": 100.0,
     }  # fmt: skip
     (folder / "solution.json").write_text(json.dumps(record))

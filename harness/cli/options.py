@@ -1,0 +1,83 @@
+"""What commands share: arguments, and user errors shown as red lines with an exit code."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from harness.terminal.exit_codes import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+NOTHING_WRITTEN = ("", "Interrupted: nothing was written.")
+WIDTH_OF_A_LOG = 160
+MOST_FAULTS = 100  # shown at once
+LONGEST_LINE = 200  # characters of a file quoted in a message
+
+
+def option(metavar: str, help: str, **limits: Any) -> Any:
+    return typer.Option(metavar=metavar, help=help, **limits)
+
+
+class FormName(StrEnum):
+    primal = "primal"
+    dual = "dual"
+    sparse = "sparse"
+
+
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a scene, path of its .toml, or .npz with matrices.")
+]
+Plugin = Annotated[Path | None, option("FILE", "Python file with your own solver.")]
+MemoryLimit = Annotated[int, option("MIB", "Memory limit, over all processes of the solver.", min=1)]
+ReferenceLimit = Annotated[
+    float | None,
+    option(
+        "SECONDS", "For each reference's search.  [default: 60 per thousand contacts, at least 60]", min=0.001
+    ),
+]
+AllowGap = Annotated[
+    float | None, option("MM", "Fail if a remaining gap is larger than this, and say where.", min=0.0)
+]
+Scheduler = Annotated[
+    str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
+]
+
+
+@contextmanager
+def error_reporting(
+    safe: str = "; rows already written are safe, run again to continue",
+    interrupted: str = "Interrupted. The rows so far are kept: run the same command again to continue.",
+) -> Iterator[Console]:
+    """A console; each user error becomes a red line and an exit code, not a traceback."""
+    from harness.results.incomparable import Incomparable
+    from harness.terminal.console import PlainConsole
+    from problems.errors import InputError
+
+    errors = PlainConsole(stderr=True, soft_wrap=True)
+    try:
+        yield PlainConsole(width=None if sys.stdout and sys.stdout.isatty() else WIDTH_OF_A_LOG)
+    except InputError as error:
+        for fault in error.faults[:MOST_FAULTS]:
+            errors.print(str(fault), style="red")
+        if (more := len(error.faults) - MOST_FAULTS) > 0:
+            errors.print(f"… and {more} more", style="red")
+        raise typer.Exit(NOT_COMPARABLE if isinstance(error, Incomparable) else WRONG_USAGE) from None
+    except UnicodeEncodeError as error:
+        where = error.object.count("\n", 0, error.start)
+        line = error.object.split("\n")[where][:LONGEST_LINE]
+        errors.print(f"{line}: a name that is not UTF-8 cannot be written: rename the file", style="red")
+        raise typer.Exit(WRONG_USAGE) from None
+    except OSError as error:
+        errors.print(f"{error}{safe}", style="red")
+        raise typer.Exit(WRONG_USAGE) from None
+    except KeyboardInterrupt:
+        errors.print(interrupted, style="yellow")
+        raise typer.Exit(INTERRUPTED) from None

@@ -1,0 +1,197 @@
+"""The commands for a suite: run, report, gate."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
+
+
+def run(
+    suite: Annotated[
+        str,
+        typer.Argument(
+            metavar="SUITE", help="Name of a suite, path of its TOML file, or directory that `run` wrote."
+        ),
+    ] = "default",
+    size: Annotated[list[int] | None, option("N", "Only scenes with N unknowns. Repeatable.")] = None,
+    scene: Annotated[
+        list[str] | None,
+        option("NAME", "These scenes: name, glob, .toml or .npz file. Repeatable."),
+    ] = None,
+    solver: Annotated[
+        list[str] | None, option("NAME", "Only these solvers, in the suite or not. Repeatable.")
+    ] = None,
+    with_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="NAME==VERSION",
+            help="Only this library, in this version; NAME alone: as installed here. Repeatable.",
+        ),
+    ] = None,
+    form: Annotated[
+        list[FormName] | None, option("FORM", "Only this form: primal, dual or sparse. Repeatable.")
+    ] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        option("TOL", "Tolerance passed to the solvers, repeatable; auto: the loosest decade that suffices."),
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="SOLVER.KEY=VALUE", help="An option of a solver. Repeatable."),
+    ] = None,
+    repeat: Annotated[int | None, option("N", "Number of repeats.", min=1)] = None,
+    threads: Annotated[
+        list[int] | None,
+        option("N", "Threads for linear algebra. Repeatable.  [with local:N: cores / N]", min=1),
+    ] = None,
+    time_limit: Annotated[
+        float | None,
+        option("SECONDS", "Time limit per measurement, from the start of the solver.", min=0.001),
+    ] = None,
+    memory_limit: Annotated[
+        int | None, option("MIB", "Memory limit, over all processes of the solver.", min=1)
+    ] = None,
+    reference_limit: ReferenceLimit = None,
+    out: Annotated[Path | None, option("DIR", "Output directory.  [default: results/SUITE]")] = None,
+    plugin: Plugin = None,
+    scheduler: Scheduler = None,
+    key: Annotated[str | None, option("KEY", "Only the row with this key, measured again.")] = None,
+) -> None:
+    """Measure a suite and write rows, answers and report.
+
+    Each measurement is a process of its own, stopped at its time or memory limit. Rows are saved as they are
+    finished: stop with Ctrl-C, run the same command again, and it continues where it stopped.
+
+    --with measures versions of a library side by side. pip installs each once, into an environment in the
+    cache that has all other packages from here. A version that cannot be installed, or that its adapter
+    cannot call, gives rows `failed` with the reason. If its solver has another name, add --solver.
+
+    \b
+    Examples:
+      python -m harness run --size 4386
+      python -m harness run --scene 4386/0107 --solver ipm --solver piqp --form dual
+      python -m harness run --scene my-matrices.npz --tolerance 1e-6 --tolerance 1e-9
+      python -m harness run --size 4386 --with piqp --with piqp==0.6.2 --repeat 3 --out results/piqp
+      python -m harness run my-suite.toml --repeat 5 --threads 1 --threads 2
+      python -m harness run --scheduler tcp://10.0.0.5:8786
+      python -m harness run results/default --key "4386/0107 gi dual tol=1e-10 threads=2 repeat=0" --out again
+
+    \b
+    Exit codes: 0 measured, 1 incomplete: workers were lost, 2 wrong usage or bad input,
+                3 nothing could be judged, 130 interrupted.
+    """
+    with error_reporting() as console:
+        from harness.measurement.run import run as run_suite
+        from harness.measurement.scheduler import threads_per_worker
+        from harness.planning.overrides import Overrides, overridden, tolerances_of
+        from harness.planning.suite import read_suite, read_written
+        from harness.results.records import MEASUREMENTS
+
+        change = Overrides(
+            sizes=tuple(size or ()),
+            scenes=tuple(scene or ()),
+            solvers=tuple(solver or ()),
+            requirements=tuple(with_ or ()),
+            forms=tuple(choice.value for choice in form or ()),
+            tolerances=tolerances_of(tolerance or []),
+            options=tuple(setting or ()),
+            repeats=repeat,
+            threads=tuple(threads or ()),
+            time_limit_s=time_limit,
+            memory_limit_mib=memory_limit,
+            reference_limit_s=reference_limit,
+            plugin=plugin,
+        )
+        written = Path(suite) / "suite.toml"
+        read = read_written(written) if written.is_file() else read_suite(suite)
+        chosen = overridden(read, change)
+        if not threads and "threads" not in read.model_fields_set:
+            chosen = chosen.model_copy(
+                update={"threads": [threads_per_worker(scheduler) or chosen.threads[0]]}
+            )
+        directory = out or Path("results") / chosen.name
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        code = run_suite(chosen, directory, console, scheduler, key)
+        if (directory / MEASUREMENTS).is_file():
+            from report.writers.markdown import write  # slow to import: not before the first row
+
+            console.print(f"Report: {write(directory)}")
+        raise typer.Exit(code)
+
+
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` or `series` wrote.")],
+) -> None:
+    """Rewrite DIR/report/report.md from the rows.
+
+    \b
+    Example:
+      python -m harness report results/default
+    """
+    with error_reporting() as console:
+        from harness.planning.suite import read_written
+        from harness.results import records
+        from harness.results.kinds import refuse_unreadable
+        from harness.results.schema import SERIES
+        from harness.results.series_file import refuse_damaged
+        from problems.errors import InputError
+
+        if (directory / SERIES).exists():
+            from report.writers.series import write as write_series
+
+            refuse_damaged(directory)
+            console.print(f"Report: {write_series(directory)}")
+            return
+        path = directory / records.MEASUREMENTS
+        if not path.is_file():
+            raise InputError.one("DIR", "directory", str(directory), f"has no {path.name}; `run` creates one")
+        refuse_unreadable(directory)
+        suite = directory / "suite.toml"
+        if suite.is_file():
+            read_written(suite)
+        from report.writers.markdown import write
+
+        console.print(f"Report: {write(directory)}")
+
+
+def gate(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory that `run` wrote.")],
+    reference_limit: ReferenceLimit = None,
+    baseline: Annotated[
+        Path | None, option("DIR", "An earlier run, whose errors must not be exceeded by the margin.")
+    ] = None,
+    margin: Annotated[float, option("FACTOR", "The allowed factor over the baseline.", min=1.0)] = 10.0,
+    json: Annotated[Path | None, option("FILE", "Write the findings as JSON.")] = None,
+    junit: Annotated[Path | None, option("FILE", "Write the findings as JUnit XML.")] = None,
+) -> None:
+    """Judge the saved answers again, and fail if accuracy was lost.
+
+    The numbers in the rows are not trusted: each answer is compared with the reference of its scene. With a
+    baseline, an error that is still within the limit fails if it is more than the margin times what it was;
+    what lies below the reference's error bound does not count.
+
+    \b
+    Examples:
+      python -m harness run gate && python -m harness gate results/gate
+      python -m harness gate results/gate --baseline baseline --margin 10 --junit gate.xml
+
+    \b
+    Exit codes:
+      0  every gated row is within 1e-7 mm (on a rung of a ladder, within what conditioning allows)
+      1  accuracy lost: a gated row is outside, cannot be judged, has no answer, was never measured, or is
+         worse than the baseline
+      2  wrong usage or bad input
+      3  nothing could be judged
+      5  the baseline has none of these measurements, other problems or other limits
+    """
+    with error_reporting() as console:
+        from harness.verification.gate import gate as judge_directory
+
+        code = judge_directory(directory, console, reference_limit, baseline, margin, json, junit)
+        raise typer.Exit(code)
