@@ -18,7 +18,7 @@ from problems.input.stored_matrices import SMALL, holds_sparse, stored_matrices
 from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
 from problems.scene import read_scene
-from problems.stiffness.operator import dense_slices
+from problems.stiffness.dense import dense_slices
 
 if TYPE_CHECKING:
     from .plan import Measurement  # which imports the solvers

@@ -33,7 +33,7 @@ from problems.drawn import EXAMPLES, drawn_names
 from problems.errors import Fault, InputError
 from problems.input.bounded import Finite, Positive, Seed, resolved
 from problems.input.validation import VALUE, WORD, is_word, unknown, validation_faults
-from problems.manufactured.ladder import prefix_of, rung_names
+from problems.ladders import prefix_of, rung_names
 from problems.scene import read_toml, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names

@@ -10,8 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.stiffness.block import scaled
-from problems.stiffness.operator import Stiffness
-from problems.stiffness.scaled import ScaledStiffness
+from problems.stiffness.operator import ScaledStiffness, Stiffness
 
 from .approximate_inverse import ApproximateInverse, of_dense, of_products
 from .assembly import Assembly, LoadCase, Matrix, Vector, stacked

@@ -11,7 +11,8 @@ import scipy.sparse as sp
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.stiffness.operator import Stiffness, dense_blocks
+from problems.stiffness.dense import dense_blocks
+from problems.stiffness.operator import Stiffness
 
 from . import sparse_npz
 from .bounded import LARGEST

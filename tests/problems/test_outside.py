@@ -16,9 +16,8 @@ from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.names import FORMS
-from problems.manufactured.ladder import rung_names
-from problems.outside import journal_bearing
-from problems.outside.hemisphere import FREE, alone, exact
+from problems.ladders import journal_bearing, rung_names
+from problems.ladders.membranes import FREE, alone, exact
 from problems.scene import read_scene
 from report.results.reader import read
 from report.sections import outside

@@ -8,12 +8,12 @@ from sparse_matrices import band_matrix, graph_matrix, renumbered
 
 from problems.forms.assembly import Assembly
 from problems.forms.prepared import Prepared
-from problems.stiffness.banded import BandedBlock, half_bandwidth
+from problems.stiffness.band import half_bandwidth
+from problems.stiffness.banded import BandedBlock
 from problems.stiffness.dense import DenseBlock
-from problems.stiffness.general import GeneralBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.selected_inverse import selected_inverse
-from problems.stiffness.sparse import sparse_block
+from problems.stiffness.sparse import GeneralBlock, sparse_block
 
 SINGLE = 2e-5  # of √(Z_ii Z_jj): float32, through a few dozen blocks
 

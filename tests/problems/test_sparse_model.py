@@ -19,7 +19,7 @@ from problems.full_model.joint_model import JointModel
 from problems.model.effect import effect_class
 from problems.model.scene import JointScene
 from problems.scene import read_scene, scene_names
-from problems.stiffness.banded import half_bandwidth
+from problems.stiffness.band import half_bandwidth
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
 END = {"length": 90.0, "elements": 2}

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from synthetic_results import results, row
 
-from problems.manufactured.ladder import ladders
+from problems.ladders import ladders
 from report.analysis.outcomes import with_outcomes
 from report.figures import style
 from report.figures.ladder_map import COUNTED, ladder_map

@@ -18,8 +18,8 @@ from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
 from problems.forms.compliance import DenseCompliance
 from problems.forms.prepared import Prepared, dual_alone
 from problems.forms.problem import in_form
+from problems.ladders import make_rung
 from problems.load_cases.random_gaps import random_gaps
-from problems.manufactured.ladder import make_rung
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.active_set import sweeps

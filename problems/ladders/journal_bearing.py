@@ -14,10 +14,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
-from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.ladder import Ladder
-from problems.manufactured.membrane import bounded, membrane, nodes, second_difference
-from problems.model.scene import PrintedOptimum, Scene
+from problems.model.scene import ManufacturedProblem, PrintedOptimum
+
+from . import Ladder, Scene
+from .membranes import bounded, membrane, nodes, second_difference
 
 HALF_WIDTH = 10.0  # b
 CUTEST = {10: -0.1789600, 23: -0.1800500, 32: -0.1803000, 75: -0.1805500, 100: -0.1805700, 125: -0.1805800}
@@ -49,7 +49,7 @@ def _rung(nx: int, ny: int, eccentricity: float = 0.1, printed: PrintedOptimum |
     return membrane(title, nx * ny, partial(problem, nx, ny, eccentricity), printed=printed)
 
 
-RUNGS: dict[str, Ladder] = {
+OUTSIDE: dict[str, Ladder] = {
     "journal_bearing": {
         **{f"{cells}": partial(_rung, cells - 1, cells - 1) for cells in (20, 40, 80, 160, 320)},
         **{
