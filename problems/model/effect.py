@@ -25,10 +25,10 @@ import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
 
-from problems.fem.plate import Plate, Range
 from problems.forms.assembly import Matrix, Vector
 
 from .joint import TOOL, Faults, Joint, Table
+from .plate import Plate, Range
 
 Pair = tuple[str, str]
 

@@ -8,8 +8,8 @@ import scipy.linalg as sla
 from joints import make_joint, make_scene
 
 from problems.forms.prepared import Prepared
-from problems.full_model.joint_model import JointModel
 from problems.model.effect import Effect, effect_class
+from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
 from problems.scene import read_scene, scene_names
 
