@@ -37,9 +37,8 @@ from problems.forms.assembly import LoadCase, Vector
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
-from problems.input.stored_matrices import SMALL
-from problems.input.user_matrices import SYMMETRY, checked
-from problems.load_cases.base import Listed, LoadCases
+from problems.input.user_matrices import SMALL, SYMMETRY, checked
+from problems.load_cases import Listed, LoadCases
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import ManufacturedProblem, ManufacturedScene, Scene
 from solvers.base import Answer, Solver

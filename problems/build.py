@@ -74,7 +74,7 @@ class GivenModel:
     def of(cls, scene: MatricesScene | ManufacturedScene) -> GivenModel:
         """Raises InputError if contacts of a rung depend on one another; a user's are checked when read."""
         if isinstance(scene, ManufacturedScene):
-            from problems.input.dependent_contacts import refuse_dependent
+            from problems.input.user_matrices import refuse_dependent
 
             refuse_dependent(scene.made.assembly.A, scene.source_of("A"))
         return cls(scene)
@@ -113,6 +113,6 @@ class GivenModel:
         scene = self.scene
         if isinstance(scene, ManufacturedScene):
             return scene.made.assembly, scene.made.load, 0.0, scene.assembly_key
-        from problems.input.stored_matrices import stored_matrices  # only for own matrices
+        from problems.input.user_matrices import stored_matrices  # only for own matrices
 
         return stored_matrices(dict(scene.files), scene.assembly_key, sparse)

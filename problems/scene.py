@@ -19,8 +19,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from problems.drawn import EXAMPLES, drawn_table
-from problems.input.bounded import regular_file, resolved
-from problems.input.validation import unknown, validation_faults
+from problems.input.bounded import regular_file, resolved, unknown, validation_faults
 from problems.ladders import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable

@@ -21,7 +21,7 @@ from harness.terminal.console import (
 )
 
 if TYPE_CHECKING:
-    from problems.load_cases.base import LoadCases
+    from problems.load_cases import LoadCases
 
 app = typer.Typer(rich_markup_mode=None)
 

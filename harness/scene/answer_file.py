@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 from problems.input.bounded import regular_file
-from problems.input.user_matrices import read_mtx
+from problems.input.matrix_files import read_mtx
 
 MIB = 1024
 #: The headings of a column of displacements and of contact forces, in a table with several.

@@ -13,7 +13,7 @@ from harness.results import series_file
 from harness.results.records import to_line
 from harness.results.schema import SERIES
 from problems.errors import Fault, InputError
-from problems.load_cases.base import LoadCases
+from problems.load_cases import LoadCases
 
 OTHER = "name another directory with --out"
 MAX_FAULTS = 10  # named at once

@@ -2,12 +2,9 @@
 
 import csv
 import math
-import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationInfo
 
 from problems.errors import Fault, InputError
 
@@ -18,23 +15,17 @@ CSV_MIB = 100
 
 @dataclass(frozen=True)
 class Rows:
-    """The good rows of a file that a table names instead of a field, their line numbers, and the faults."""
+    """The good rows of a file, their line numbers, and the faults."""
 
     path: Path
-    field: str
-    rows: list[tuple[float, ...]]
-    lines: list[int]
-    faults: list[Fault]
-
-    def line(self, key: str) -> tuple[str, str] | None:
-        """The file and line of the row that a key such as `points[3]` refers to."""
-        place = re.fullmatch(rf"{self.field}\[(\d+)\]", key)
-        return (str(self.path), f"line {self.lines[int(place[1])]}") if place else None
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
 
 
-def read_columns(path: Path, field: str, names: tuple[str, ...]) -> Rows:
+def read_columns(path: Path, names: tuple[str, ...]) -> Rows:
     """The named columns of a file, row by row; other columns are ignored. Bad rows are faults."""
-    read = Rows(path, field, [], [], [])
+    read = Rows(path)
     try:
         with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
             _read(csv.reader(file), names, read)
@@ -68,20 +59,3 @@ def _read(reader: Any, names: tuple[str, ...], read: Rows) -> None:
             read.faults.append(Fault(str(read.path), f"line {reader.line_num}", ",".join(cells), allowed))
     if not read.rows and not read.faults:
         read.faults.append(Fault(str(read.path), "rows", 0, "at least one row below the header"))
-
-
-def rows_from_file(data: Any, info: ValidationInfo, field: str, names: tuple[str, ...]) -> Any:
-    """Replace `file = "x.csv"` in a table by the file's good rows as `field`, so that a key depends on them.
-
-    The validation context holds `folder`, the scene's folder, to which the path is relative, and `files`, a
-    list to which the rows read are appended.
-    """
-    if not isinstance(data, dict) or "file" not in data:
-        return data
-    if field in data:
-        raise ValueError(f"give either {field} or file")
-    rest = {key: value for key, value in data.items() if key != "file"}
-    context: dict[str, Any] = info.context or {}
-    read = read_columns(context["folder"] / str(data["file"]), field, names)
-    context["files"].append(read)
-    return rest | {field: read.rows}

@@ -19,7 +19,7 @@ import importlib
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -53,6 +53,8 @@ EXCLUDED = {
 class Effect(Table):
     """Parameters of an effect, each with its unit, as in Annotated[Positive, "mm"]."""
 
+    #: Of the CSV that a table may name as `file` in place of `points`; none if there is no such file.
+    columns: ClassVar[tuple[str, ...]] = ()
     kind: str
 
     @property

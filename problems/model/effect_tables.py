@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,20 +12,20 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from problems.errors import Fault
-from problems.input.validation import unknown, validation_faults
+from problems.input.bounded import unknown, validation_faults
 
 from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
 from .joint import Faults, Joint
 
 if TYPE_CHECKING:
-    from problems.input.csv_table import Rows  # imported by the effects that read a file
+    from problems.input.csv_table import Rows
 
 
 @dataclass
 class EffectTable:
-    """A table, its file and index, its effect (None if invalid), and the rows of the files that it names.
+    """A table, its file and index, its effect (None if invalid), and the rows of the file that it names.
 
-    If a file has bad rows, the effect is made of the good ones, so that these and the other parameters are
+    If that has bad rows, the effect is made of the good ones, so that these and the other parameters are
     still checked.
     """
 
@@ -32,7 +33,7 @@ class EffectTable:
     index: int
     content: dict[str, Any]
     effect: Effect | None = None
-    files: list[Rows] = field(default_factory=list)
+    rows: Rows | None = None
 
     def read(self) -> Iterator[Fault]:
         """Make the effect; yields the faults of the table by itself."""
@@ -43,16 +44,25 @@ class EffectTable:
                 allowed = f"the model excludes {excluded} ({EXCLUDED[excluded]}); {allowed}"
             yield Fault(str(self.where), f"effect[{self.index}].kind", kind, allowed)
             return
-        effect = effect_class(kind)
+        effect, content = effect_class(kind), self.content
+        if effect.columns and "file" in content:
+            if "points" in content:
+                yield Fault(
+                    str(self.where), f"{self._name}.file", content["file"], "give either points or file"
+                )
+                return
+            from problems.input.csv_table import read_columns  # only where a table names a file
+
+            self.rows = read_columns(self.where.parent / str(content["file"]), effect.columns)
+            content = {key: value for key, value in content.items() if key != "file"}
+            content["points"] = self.rows.rows
         try:
-            context = {"folder": self.where.parent, "files": self.files}
-            self.effect = effect.model_validate(self.content, context=context)
+            self.effect = effect.model_validate(content)
         except ValidationError as error:
             for fault in validation_faults(self.where, effect, error, self._name):
                 if not self._is_consequence(fault.key.removeprefix(self._name).lstrip(".")):
                     yield fault
-        for rows in self.files:
-            yield from rows.faults
+        yield from self.rows.faults if self.rows else ()
 
     def misfits(self, joint: Joint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
         """The faults with respect to the joint and to the effects of the other tables."""
@@ -72,11 +82,12 @@ class EffectTable:
     def _faults(self, found: Faults) -> Iterator[Fault]:
         """The faults of parameters; those of a file's rows are located by line."""
         for key, value, allowed in found:
-            lines = [line for rows in self.files if (line := rows.line(key))]
-            where, name = lines[0] if lines else (str(self.where), f"{self._name}.{key}")
-            if not self._is_consequence(key):
-                yield Fault(where, name, value, allowed)
+            row = re.fullmatch(r"points\[(\d+)\]", key)
+            if self.rows and row:
+                yield Fault(str(self.rows.path), f"line {self.rows.lines[int(row[1])]}", value, allowed)
+            elif not self._is_consequence(key):
+                yield Fault(str(self.where), f"{self._name}.{key}", value, allowed)
 
     def _is_consequence(self, key: str) -> bool:
-        """Whether a fault of a whole field, or of the whole table, may result from bad rows of a file."""
-        return any(rows.faults and key in ("", rows.field) for rows in self.files)
+        """Whether a fault of all points, or of the whole table, may result from bad rows of a file."""
+        return bool(self.rows and self.rows.faults and key in ("", "points"))

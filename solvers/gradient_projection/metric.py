@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from problems.forms.assembly import Mask, Vector
-from problems.forms.compliance import Compliance
+from problems.forms.product import Compliance
 from solvers.active_set.block_pivoting import TrialSolution, block_pivoting
 from solvers.active_set.contact_sets import OpenFactor, banded_set
 

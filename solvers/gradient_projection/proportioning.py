@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.forms.assembly import Mask, Vector
-from problems.forms.compliance import Compliance
+from problems.forms.product import Compliance
 from solvers.kkt import kkt_residual, rounding_of
 
 from .metric import Diagonal

@@ -14,6 +14,7 @@ from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
 from problems.effects.rigid_tool import RigidTool
 from problems.effects.shims import Shims
+from problems.model.effect_tables import EffectTable
 
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
 THREE = make_joint(PART, PART | {"name": "b"}, PART | {"name": "c"}, nodes=(9, 5))
@@ -116,6 +117,6 @@ def test_positions_from_a_file_are_those_of_the_list(tmp_path: Path) -> None:
     (tmp_path / "rivets.csv").write_text("hole,x,y\n1,100,30\n\n2, 250.5 ,90\n")
     data = {"kind": "fasteners", "preload": 7.0}
     listed = Fasteners.model_validate(data | {"points": [[100, 30], [250.5, 90]]})
-    context = {"folder": tmp_path, "files": []}
-    read = Fasteners.model_validate(data | {"file": "rivets.csv"}, context=context)
-    assert read == listed
+    table = EffectTable(tmp_path / "scene.toml", 0, data | {"file": "rivets.csv"})
+    assert list(table.read()) == []
+    assert table.effect == listed

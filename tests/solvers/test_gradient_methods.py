@@ -7,7 +7,7 @@ import pytest
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 
 from harness.verification.judge import conditioned_limit
-from problems.forms import compliance
+from problems.forms import product
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.banded_inverse import banded_inverse
 from problems.forms.prepared import Prepared
@@ -92,7 +92,7 @@ def test_the_products_that_are_told_are_those_made(
     name: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = []
-    for module in (compliance, parametric_path, projected_newton):
+    for module in (product, parametric_path, projected_newton):
         original = module.product  # type: ignore[attr-defined]
 
         def counted(Q: Any, v: Vector, original: Any = original) -> Vector:

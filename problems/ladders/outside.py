@@ -1,4 +1,4 @@
-"""Membranes on a square, bounded by an obstacle, as others wrote them.
+"""Problems that others wrote, with printed optima: membranes bounded by an obstacle, and an oil film.
 
 On squares of two right triangles each, the stiffness of linear elements is the five-point stencil, free of h.
 
@@ -25,6 +25,15 @@ from E. Bueler, PETSc, src/snes/tutorials/ex9.c. Contacts are the nodes with r <
 unknowns are x = v − w, where w is the membrane without the hemisphere, so that f = 0; the objective is the
 energy that the hemisphere adds.
 
+journal_bearing  the pressure in an oil film, nowhere negative: v = 0 on the edge of (0, 2π) × (0, 2b), and
+
+    min ∫ ½ w(x)|∇v|² − ε sin(x) v,   v ≥ 0,   w = (1 + ε cos x)³
+
+G. Cimatti, Appl. Math. Optim. 3:227–242 (1977); Averick, Carter, Moré and Xue, The MINPACK-2 Test Problem
+Collection, ANL/MCS-P153-0692 (1992), with ε = 0.1 and b = 10. Linear triangles; the mean of w over a triangle
+is that of its corners. With an even number of cells, sin(x) = 0 on the line in the middle: the contacts there
+carry hardly any force.
+
 CUTEst's OBSTCLAE and TORSION1 sum over the four differences of each inner node, so that those to the edge
 count half.
 """
@@ -49,6 +58,13 @@ COPS = "COPS 3.0, torsion, nx = ny = 50 (as MadNLP/COPSBenchmark.jl quotes it)"
 #: Nodes a side, edges included, and the optimum that CUTEst prints.
 OBSTCLAE = {4: 0.753659753, 10: 1.397897560, 23: 1.678027027, 32: 1.748270031}
 TORSION1 = {4: -5.1851852e-1, 10: -4.9234185e-1, 22: -4.5608771e-1}
+HALF_WIDTH = 10.0  # b
+JNLBRNG1 = {10: -0.1789600, 23: -0.1800500, 32: -0.1803000, 75: -0.1805500, 100: -0.1805700, 125: -0.1805800}
+PETSC = {  # inner nodes in x and y, ε, optimum, its digits
+    "8x12": (8, 12, 0.1, PrintedOptimum(-0.183437, 6, "PETSc/TAO, jbearing2_1.out")),
+    "10x16": (10, 16, 0.9, PrintedOptimum(-15.607, 5, "PETSc/TAO, jbearing2_3.out")),
+    "50x50": (50, 50, 0.99, PrintedOptimum(-60.1509, 6, "PETSc/TAO, jbearing2_2.out")),
+}
 FREE = float(brentq(lambda a: a**2 * np.log(2 / a) - 1 + a**2, 0.5, 0.9, xtol=1e-15))  # a of the hemisphere
 
 
@@ -156,11 +172,42 @@ def _hemisphere(cells: int) -> Scene:
     return membrane(f"A membrane over a hemisphere, {cells} × {cells} cells", len(at), make, len(covered))
 
 
+def journal_bearing(nx: int, ny: int, eccentricity: float) -> ManufacturedProblem:
+    """With nx × ny inner nodes."""
+    hx, hy = 2 * np.pi / (nx + 1), 2 * HALF_WIDTH / (ny + 1)
+    w: Vector = (1 + eccentricity * np.cos(hx * np.arange(nx + 2))) ** 3
+    # ∫w over the two triangles of a cell: two corners of one are on its left line, of the other on its right.
+    left, right = hx * hy / 6 * (2 * w[:-1] + w[1:]), hx * hy / 6 * (w[:-1] + 2 * w[1:])
+    along = (left + right) / hx**2  # of the differences in x, between lines
+    across = (left[1:] + right[:-1]) / hy**2  # of those in y, on a line
+    of_lines = sp.diags_array([-along[1:-1], along[:-1] + along[1:], -along[1:-1]], offsets=[-1, 0, 1])
+    K = sp.kron(of_lines, sp.eye_array(ny)) + sp.kron(sp.diags_array(across), second_difference(ny))
+    x: Vector = hx * np.arange(1.0, nx + 1)
+    y: Vector = hy * np.arange(1.0, ny + 1)
+    f = np.repeat(hx * hy * eccentricity * np.sin(x), ny)
+    return bounded(sp.csc_array(K), f, nodes(x, y), -1.0, np.zeros(nx * ny))
+
+
+def _bearing(nx: int, ny: int, eccentricity: float = 0.1, printed: PrintedOptimum | None = None) -> Scene:
+    title = f"Journal bearing, {nx + 1} × {ny + 1} cells, eccentricity {eccentricity:g}"
+    return membrane(title, nx * ny, partial(journal_bearing, nx, ny, eccentricity), printed=printed)
+
+
 _obstacle = partial(_unit_square, "A membrane on an obstacle", 1.0, -1.0, _sines)
 _torsion = partial(_unit_square, "Elastic–plastic torsion", COUPLE, 1.0, _distance)
 
 OUTSIDE: dict[str, Ladder] = {
     "hemisphere": {f"{cells}": partial(_hemisphere, cells) for cells in (8, *CELLS)},
+    "journal_bearing": {
+        **{f"{cells}": partial(_bearing, cells - 1, cells - 1) for cells in CELLS},
+        **{
+            f"cutest-{side}": partial(
+                _bearing, side - 2, side - 2, printed=PrintedOptimum(value, 5, "CUTEst, JNLBRNG1.SIF")
+            )
+            for side, value in JNLBRNG1.items()
+        },
+        **{f"petsc-{name}": partial(_bearing, *given) for name, given in PETSC.items()},
+    },
     "obstacle": {
         **{f"{cells}": partial(_obstacle, cells) for cells in CELLS},
         **{
