@@ -1,24 +1,35 @@
-"""The [[effect]] tables of a scene, read into effects, and all their faults."""
+"""The [[effect]] tables of a scene and the CSV files that they name, read into effects; all their faults."""
 
 from __future__ import annotations
 
+import csv
+import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
-from problems.errors import Fault
-from problems.input.bounded import unknown, validation_faults
+from problems.errors import Fault, InputError
+from problems.input.bounded import regular_file, unknown, validation_faults
 
 from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
 from .joint import Faults, Joint
 
-if TYPE_CHECKING:
-    from problems.input.csv_table import Rows
+CSV_MIB = 100
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The good rows of a file, their line numbers, and the faults."""
+
+    path: Path
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
 
 
 @dataclass
@@ -51,8 +62,6 @@ class EffectTable:
                     str(self.where), f"{self._name}.file", content["file"], "give either points or file"
                 )
                 return
-            from problems.input.csv_table import read_columns  # only where a table names a file
-
             self.rows = read_columns(self.where.parent / str(content["file"]), effect.columns)
             content = {key: value for key, value in content.items() if key != "file"}
             content["points"] = self.rows.rows
@@ -91,3 +100,41 @@ class EffectTable:
     def _is_consequence(self, key: str) -> bool:
         """Whether a fault of all points, or of the whole table, may result from bad rows of a file."""
         return bool(self.rows and self.rows.faults and key in ("", "points"))
+
+
+def read_columns(path: Path, names: tuple[str, ...]) -> Rows:
+    """The named columns of a file, row by row; other columns are ignored. Bad rows are faults."""
+    read = Rows(path)
+    try:
+        with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
+            _read(csv.reader(file), names, read)
+    except InputError as error:
+        read.faults.extend(error.faults)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        read.faults.append(Fault(str(path), "file", why, "a readable comma-separated file"))
+    return read
+
+
+def _read(reader: Any, names: tuple[str, ...], read: Rows) -> None:
+    header = [cell.strip() for cell in next(reader, [])]
+    if not set(names) <= set(header):
+        wanted = f"a header line with the columns {', '.join(names)}, separated by commas"
+        read.faults.append(Fault(str(read.path), "line 1", ",".join(header), wanted))
+        return
+    columns = [header.index(name) for name in names]
+    for cells in reader:
+        if not any(cell.strip() for cell in cells):
+            continue
+        try:
+            row = tuple(float(cells[column]) for column in columns)
+        except (ValueError, IndexError):
+            row = (math.nan,)
+        if all(map(math.isfinite, row)):
+            read.rows.append(row)
+            read.lines.append(reader.line_num)
+        else:
+            allowed = f"a finite number in each of the columns {', '.join(names)}"
+            read.faults.append(Fault(str(read.path), f"line {reader.line_num}", ",".join(cells), allowed))
+    if not read.rows and not read.faults:
+        read.faults.append(Fault(str(read.path), "rows", 0, "at least one row below the header"))
