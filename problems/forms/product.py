@@ -25,12 +25,15 @@ def product(G: Matrix, v: Matrix) -> Matrix:
 
     Only SciPy's BLAS is called: NumPy's has its own thread pool, and each pool spins while the other works.
     """
-    if v.ndim == 2:
-        return product(G, v[:, 0])[:, None] if v.shape[1] == 1 else blas.dgemm(1.0, G, v)
-    support = np.flatnonzero(v)
-    if support.size > SPARSE_LIMIT * len(v):
-        return blas.dsymv(1.0, G, v)
-    return blas.dgemv(1.0, G.T[support].T, v[support]) if support.size else np.zeros(len(v))
+    if v.ndim == 2 and v.shape[1] != 1:
+        return blas.dgemm(1.0, G, v)
+    one = v.ravel()
+    support = np.flatnonzero(one)
+    if support.size > SPARSE_LIMIT * len(one):
+        found = blas.dsymv(1.0, G, one)
+    else:
+        found = blas.dgemv(1.0, G.T[support].T, one[support]) if support.size else np.zeros(len(one))
+    return found.reshape(v.shape)
 
 
 @dataclass(frozen=True)
