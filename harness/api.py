@@ -34,15 +34,13 @@ from harness.verification.reference_problem import opened
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
-from problems.input.stored_matrices import SMALL
-from problems.input.user_matrices import SYMMETRY, checked
-from problems.load_cases.base import Listed, LoadCases
+from problems.input.user_matrices import SMALL, SYMMETRY, checked
+from problems.load_cases import Listed, LoadCases
 from problems.load_cases.random_gaps import random_gaps
-from problems.model.scene import ManufacturedScene, Scene
+from problems.model.scene import ManufacturedProblem, ManufacturedScene, Scene
 from solvers.base import Answer, Solver
 
 __all__ = [
@@ -79,7 +77,7 @@ def own_matrices(
     arrays |= {name: np.array(value) for name, value in given.items()}
     sparse = sp.issparse(K) and K.shape[0] > SMALL
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
-    return ManufacturedScene(title, title, ManufacturedProblem(assembly, load))
+    return ManufacturedScene.of(title, ManufacturedProblem(assembly, load), title)
 
 
 def judge(

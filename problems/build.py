@@ -6,19 +6,28 @@ form needs is imported.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from problems.forms.assembly import LoadCase
+from problems.errors import InputError
+from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress, silent
+from problems.forms.stages import DensePrepared, SparsePrepared
 from problems.model.effect import Effect
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
+from problems.storage.cache import digest
+from problems.storage.fingerprint import fingerprint
 
 if TYPE_CHECKING:
-    from problems.full_model.given_model import GivenModel
-    from problems.full_model.joint_model import JointModel
+    from problems.model.joint_model import JointModel
+
+DENSEST = 0.25  # of a block's entries: a denser K gains nothing from the sparse form
+SMALL = 200  # unknowns up to which any K is taken
 
 _last: tuple[Scene, JointModel | GivenModel] | None = None  # of several, only the last one stays in memory
 
@@ -28,12 +37,10 @@ def model_of(scene: Scene) -> JointModel | GivenModel:
     global _last
     if _last is None or _last[0] is not scene:
         if isinstance(scene, JointScene):
-            from problems.full_model.joint_model import JointModel
+            from problems.model.joint_model import JointModel
 
             _last = scene, JointModel.of(scene)
         else:
-            from problems.full_model.given_model import GivenModel
-
             assert isinstance(scene, MatricesScene | ManufacturedScene)
             _last = scene, GivenModel.of(scene)
     return _last[1]
@@ -55,3 +62,57 @@ def load_case(scene: Scene, form: Form = "dual", effects: Iterable[Effect] | Non
     effects : of a joint, those that count; by default all.
     """
     return model_of(scene).load_case(form == "sparse", effects)
+
+
+@dataclass(frozen=True)
+class GivenModel:
+    """As JointModel, of the scene's own K, A, f and g: there is nothing to condense."""
+
+    scene: MatricesScene | ManufacturedScene
+
+    @classmethod
+    def of(cls, scene: MatricesScene | ManufacturedScene) -> GivenModel:
+        """Raises InputError if contacts of a rung depend on one another; a user's are checked when read."""
+        if isinstance(scene, ManufacturedScene):
+            from problems.input.user_matrices import refuse_dependent
+
+            refuse_dependent(scene.made.assembly.A, scene.source_of("A"))
+        return cls(scene)
+
+    def sparse(self) -> SparsePrepared:
+        """Raises InputError also if K is dense."""
+        start, scene = time.perf_counter(), self.scene
+        given, *_ = self._given(sparse=True)
+        K = given.K.as_sparse(given.nodes)
+        for block in K.blocks:
+            share = block.matrix.nnz / block.size**2
+            if block.size > SMALL and share > DENSEST:
+                allowed = f"at most {DENSEST:.0%} of a block's entries; K is dense: use --form dual or primal"
+                raise InputError.one(scene.source_of("K"), "nonzero entries of K", f"{share:.0%}", allowed)
+        seconds = time.perf_counter() - start
+        key = digest("sparse", scene.assembly_key, fingerprint([Path(__file__)], ("problems/input",)))
+        own = isinstance(scene, MatricesScene)
+        return SparsePrepared(replace(given, K=K), key, seconds, scene.source_of, own)
+
+    def dense(self, progress: Progress = silent) -> DensePrepared:
+        given, _, seconds, key = self._given(sparse=False)
+        K = given.K.as_dense()
+        if K is not given.K:
+            given = replace(given, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))
+        return DensePrepared(given, key, {"condensation": seconds}, self.scene.source_of, progress)
+
+    def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
+        return self._given(sparse)[1]
+
+    @property
+    def built(self) -> bool:
+        return self.dense().built
+
+    def _given(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
+        """The matrices and loads, the seconds that reading them took, and their key."""
+        scene = self.scene
+        if isinstance(scene, ManufacturedScene):
+            return scene.made.assembly, scene.made.load, 0.0, scene.assembly_key
+        from problems.input.user_matrices import stored_matrices  # only for own matrices
+
+        return stored_matrices(dict(scene.files), scene.assembly_key, sparse)

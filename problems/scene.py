@@ -19,9 +19,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from problems.drawn import EXAMPLES, drawn_table
-from problems.input.bounded import regular_file, resolved
-from problems.input.validation import unknown, validation_faults
-from problems.manufactured.ladder import make_rung, prefix_of, rung_names
+from problems.input.bounded import regular_file, resolved, unknown, validation_faults
+from problems.ladders import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
 from problems.model.joint import Joint, Table

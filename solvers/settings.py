@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from problems.errors import Fault, InputError
-from problems.input.validation import unknown
+from problems.input.bounded import unknown
 
 #: Beginnings of what the adapters decide: accuracy, limits, output.
 STOPPING = ("eps", "tol", "reduced_tol", "max_iter", "check_du", "time", "compute_timings")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from problems.forms.assembly import Assembly, LoadCase, Mask, Vector
-from problems.forms.manufactured_problem import ManufacturedProblem
+from problems.model.scene import ManufacturedProblem
 
 Exact = list[Fraction]
 

@@ -45,7 +45,7 @@ def make_scene(joint: Joint, *effects: Effect) -> JointScene:
 def forbid_building(monkeypatch: pytest.MonkeyPatch) -> None:
     """From here on every matrix has to come from the cache."""
     for stage in (
-        "full_model.condense.condense",
+        "model.condense.condense",
         "stiffness.dense.cholesky",
         "stiffness.dense.DenseBlock.compliance",
     ):

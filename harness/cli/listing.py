@@ -8,7 +8,7 @@ from harness.planning.suite import read_suite, suite_names
 from problems import formats
 from problems.drawn import SIZES
 from problems.errors import InputError
-from problems.manufactured.ladder import PREFIXES, rung_names
+from problems.ladders import PREFIXES, rung_names
 from problems.scene import read_scene, scene_names
 from solvers.registry import make_solver, modules, solver_names, solver_version
 

@@ -21,7 +21,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from problems.load_cases.base import LoadCases
+    from problems.load_cases import LoadCases
 
 SEED = 0
 

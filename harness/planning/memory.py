@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 from harness.results.machine import physical_memory_mib
 from problems.errors import Fault, InputError
 from problems.forms.names import DENSE_FORMS, Form, form_family
-from problems.input.stored_matrices import SMALL, holds_sparse, stored_matrices
+from problems.input.user_matrices import SMALL, holds_sparse, stored_matrices
 from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
 from problems.scene import read_scene
-from problems.stiffness.operator import dense_slices
+from problems.stiffness.dense import dense_slices
 
 if TYPE_CHECKING:
     from .plan import Measurement  # which imports the solvers

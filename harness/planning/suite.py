@@ -31,9 +31,18 @@ from pydantic import (
 
 from problems.drawn import EXAMPLES, drawn_names
 from problems.errors import Fault, InputError
-from problems.input.bounded import Finite, Positive, Seed, resolved
-from problems.input.validation import VALUE, WORD, is_word, unknown, validation_faults
-from problems.manufactured.ladder import prefix_of, rung_names
+from problems.input.bounded import (
+    VALUE,
+    WORD,
+    Finite,
+    Positive,
+    Seed,
+    is_word,
+    resolved,
+    unknown,
+    validation_faults,
+)
+from problems.ladders import prefix_of, rung_names
 from problems.scene import read_toml, scene_names
 from solvers.base import Form
 from solvers.registry import modules, solver_names

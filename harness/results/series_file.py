@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, InstanceOf, ValidationError
 
 from problems.errors import InputError
-from problems.input.bounded import Positive, regular_file
-from problems.input.validation import validation_faults
+from problems.input.bounded import Positive, regular_file, validation_faults
 
 from . import records
 from .records import Row, to_line

@@ -27,7 +27,7 @@ from problems.forms.assembly import LoadCase
 from problems.forms.names import FORMS, Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.input import sparse_npz
+from problems.input import matrix_files
 from problems.model.scene import MatricesScene, Scene
 from problems.scene import read_scene
 
@@ -107,7 +107,7 @@ def _write_npz(path: Path, arrays: Arrays, about: Arrays) -> None:
     """Matrices of the sparse form as compressed columns, all others whole."""
     whole = about["form"] != "sparse"
     arrays = {name: M.toarray() if whole and sp.issparse(M) else M for name, M in arrays.items()}
-    sparse_npz.write(path, {name: np.array(value) for name, value in about.items()} | arrays)
+    matrix_files.write(path, {name: np.array(value) for name, value in about.items()} | arrays)
 
 
 def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:

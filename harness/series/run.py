@@ -24,7 +24,7 @@ from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
 from problems.errors import Fault, InputError
-from problems.load_cases.base import LoadCases
+from problems.load_cases import LoadCases
 from problems.model.scene import JointScene
 
 from .places import results_of

@@ -24,7 +24,7 @@ from problems.build import prepared
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
-from problems.load_cases.base import LoadCases
+from problems.load_cases import LoadCases
 from problems.model.scene import Scene
 from solvers.base import Answer, Form, Solver, failed
 from solvers.registry import make_solver

@@ -22,7 +22,7 @@ from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
 from problems.errors import Fault, InputError
 from problems.forms.names import form_family
-from problems.input.validation import validation_faults
+from problems.input.bounded import validation_faults
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit
 from .judge import LIMIT_MM, REFERENCE_SHARE, Judgement

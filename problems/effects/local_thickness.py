@@ -6,10 +6,10 @@ from typing import Annotated
 
 import scipy.sparse as sp
 
-from problems.fem.plate import Plate, Range
 from problems.input.bounded import Finite, Positive
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.joint import Faults, Joint
+from problems.model.plate import Plate, Range
 
 
 class LocalThickness(StiffnessEffect):

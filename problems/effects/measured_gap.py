@@ -1,15 +1,14 @@
 """Measured gap: values measured at points, interpolated to the contacts."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
-from problems.input.csv_table import rows_from_file
 from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
 from problems.model.joint import Faults, Joint
 
@@ -21,12 +20,8 @@ class MeasuredGap(ContactEffect, GapEffect):
     Points may lie outside the junction.
     """
 
+    columns: ClassVar[tuple[str, ...]] = ("x", "y", "gap")
     points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3), "mm"]
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_file(cls, data: Any, info: ValidationInfo) -> Any:
-        return rows_from_file(data, info, "points", ("x", "y", "gap"))
 
     def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)

@@ -5,10 +5,10 @@ from typing import Annotated
 import scipy.sparse as sp
 from pydantic import Field
 
-from problems.fem.plate import Plate
 from problems.input.bounded import Finite, NotNegative, Positive
 from problems.model.effect import StiffnessEffect
 from problems.model.joint import Faults
+from problems.model.plate import Plate
 
 
 class Ribs(StiffnessEffect):

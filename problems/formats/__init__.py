@@ -12,9 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.input import sparse_npz
-from problems.input.stored_matrices import SMALL
-from problems.input.user_matrices import NAMES
+from problems.input import matrix_files
+from problems.input.user_matrices import NAMES, SMALL
 
 from . import nastran, text
 
@@ -48,7 +47,7 @@ def _write_npz(path: Path, data: Data) -> None:
     n = data["K"].shape[0]
     if n <= SMALL or data["K"].nnz > DENSEST * n**2:
         data = data | {name: data[name].toarray() for name in "KA"}
-    sparse_npz.write(path, data)
+    matrix_files.write(path, data)
 
 
 FORMATS = {
@@ -74,7 +73,7 @@ FORMATS = {
         text.is_matrix_market,
     ),
     "npz": Format(
-        "a file .npz, bit for bit", (".npz",), _write_npz, lambda path: sparse_npz.read(path, NAMES)
+        "a file .npz, bit for bit", (".npz",), _write_npz, lambda path: matrix_files.read(path, NAMES)
     ),
     "op4": Format(
         "a file .op4 (Nastran OUTPUT4, binary), bit for bit", (".op4",), nastran.write_op4, nastran.read_op4

@@ -15,7 +15,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from problems.errors import Fault, InputError
-from problems.input.user_matrices import read_mtx
+from problems.input.matrix_files import read_mtx
 
 HEADER = b"%%MatrixMarket"
 NORMAL = 3  # the degree of freedom under which displacements are written to Abaqus

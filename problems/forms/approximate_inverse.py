@@ -9,7 +9,7 @@ import numpy as np
 
 from .assembly import Assembly, Vector
 from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, of_windows
-from .compliance import Compliance, DenseCompliance
+from .product import Compliance, DenseCompliance
 
 SAMPLE = 3  # contacts, for the size of Q
 FEW = 3000  # contacts for which Q is small beside K

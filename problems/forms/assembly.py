@@ -6,10 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from problems.stiffness.arrays import Indices as Indices
-from problems.stiffness.arrays import Mask as Mask
-from problems.stiffness.arrays import Matrix as Matrix
-from problems.stiffness.arrays import Vector as Vector
+from problems.stiffness import Indices, Matrix, Vector
+from problems.stiffness import Mask as Mask
 from problems.stiffness.operator import Stiffness
 
 

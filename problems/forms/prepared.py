@@ -10,13 +10,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.stiffness.block import scaled
-from problems.stiffness.operator import Stiffness
-from problems.stiffness.scaled import ScaledStiffness
+from problems.stiffness.operator import ScaledStiffness, Stiffness
 
 from .approximate_inverse import ApproximateInverse, of_dense, of_products
 from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
-from .compliance import Compliance, ComplianceProducts, DenseCompliance
 from .names import Form
+from .product import Compliance, ComplianceProducts, DenseCompliance
 
 MIB = 2**20
 EPS = float(np.finfo(float).eps)

@@ -1,6 +1,9 @@
-"""A user's own K, A, f, g: from one .npz, from Matrix Market files, or as arrays."""
+"""A user's own K, A, f, g: from one .npz, from Matrix Market files, or as arrays; read and checked once, then
+from the cache.
+"""
 
-import re
+import time
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -8,19 +11,66 @@ from typing import Any
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.stiffness.operator import Stiffness, dense_blocks
+from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.dense import dense_blocks
+from problems.stiffness.operator import Stiffness
+from problems.stiffness.sparse import sparse_block
+from problems.storage import cache
+from problems.storage.fingerprint import fingerprint
 
-from . import sparse_npz
+from . import matrix_files
 from .bounded import LARGEST
-from .dependent_contacts import refuse_dependent
 
 NAMES = ("K", "A", "f", "g", "nodes")
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
-LONGEST_LINE = 60  # characters quoted in a message
+SMALL = 2000  # unknowns up to which a K is solved in the dense forms
+LOST = 2.0**-44  # of ‖a_j‖₂², per contact and entry: 256 ulps, for ‖z‖²
 SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
+
+
+def stored_matrices(
+    files: dict[str, Path], files_key: str, sparse: bool
+) -> tuple[Assembly, LoadCase, float, str]:
+    """The assembly, its blocks dense and memory-mapped or `sparse`, the load case, the seconds that reading
+    took, and the key.
+
+    files_key : a hash of the files' content. Raises InputError.
+    """
+    code = fingerprint([Path(__file__)], within=("problems/input",))
+    key = cache.digest("own", files_key, sparse, code)
+
+    def made() -> cache.Entry:
+        start = time.perf_counter()
+        assembly, load = read_matrices(files, sparse)
+        arrays = {f"K{k}": matrix for k, matrix in enumerate(assembly.K.matrices)}
+        arrays |= {"A": assembly.A, "f": load.f, "g": load.g}
+        if assembly.nodes is not None:
+            arrays["nodes"] = assembly.nodes
+        facts = {"parts": assembly.parts, "notes": assembly.notes, "seconds": time.perf_counter() - start}
+        return matrix_files.packed(arrays), facts
+
+    arrays, facts = cache.load_or_make(key, made)
+    nodes, names = arrays.get("nodes"), [f"K{k}" for k in range(len(facts["parts"]))]
+    K = Stiffness.of(*(matrix_files.unpacked(arrays, k) if sparse else arrays[k] for k in names), nodes=nodes)
+    A = matrix_files.unpacked(arrays, "A")
+    assembly = Assembly(K, A, nodes, tuple(facts["parts"]), tuple(facts["notes"]))
+    return assembly, LoadCase(np.array(arrays["f"]), np.array(arrays["g"])), facts["seconds"], key
+
+
+def holds_sparse(files: dict[str, Path]) -> bool:
+    """Whether K is stored as a sparse matrix, and large; a file that cannot be read does not."""
+    try:
+        if "problem" in files:
+            with np.load(files["problem"]) as archive:
+                return "K_shape" in archive.files and archive["K_shape"][0] > SMALL
+        rows, _, _, layout, _, _ = scipy.io.mminfo(files["K"])
+        return bool(layout == "coordinate" and rows > SMALL)
+    except Exception:  # zipfile, pickle and mminfo raise their own kinds; whoever reads it says what is wrong
+        return False
 
 
 def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembly, LoadCase]:
@@ -35,7 +85,7 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
     data: dict[str, Any] = {}
     for key, path in files.items():
         try:
-            found = sparse_npz.read(path, NAMES) if key == "problem" else {key: read_mtx(path)}
+            found = matrix_files.read(path, NAMES) if key == "problem" else {key: matrix_files.read_mtx(path)}
         except Exception as error:  # zipfile and pickle raise their own kinds
             kind = ".npz with K, A, f, g" if key == "problem" else "Matrix Market file"
             where = "file" if key == "problem" else key
@@ -135,49 +185,30 @@ def _fits(given: Any) -> bool:
     return bool(inside.all() and (nearest.astype(values.dtype) == values).all())
 
 
-CHUNK = 2**20  # bytes of lines that are checked at once
-INTEGER = rb"[-+]?+\d++"
-REAL = rb"(?:[-+]?+(?:\d++\.?+\d*+|\.\d++)(?:[eE][-+]?+\d++)?+|[-+]?+(?i:nan|inf(?:inity)?+))"
-#: The number of an entry, by the field in the header.
-NUMBER = {"real": [REAL], "double": [REAL], "complex": [REAL, REAL], "integer": [INTEGER], "pattern": []}
+def refuse_dependent(A: sp.csc_array, where: object) -> None:
+    """Raise InputError naming the first column of A (n, m), none zero, that depends on those before it.
 
-
-def read_mtx(path: Path) -> Any:
-    """A Matrix Market file, array or sparse.
-
-    Raises ValueError if entries are missing, a line holds anything else than one entry, a number is out of
-    range, or a symmetric matrix is not square. mmread would take missing entries for zeros, read 3,5 and 3D5
-    as 3, and crash on a NUL, on an array without entries, and on a symmetric one that is not square.
+    By the pivots of AᵀA = LLᵀ, l_jj² = min_z ‖a_j − Σ_{i<j} z_i a_i‖₂². AᵀA is block diagonal, a block per
+    group of contacts that share unknowns, and is factored as a band or a sparse matrix. The rounding of l_jj²
+    is some k + (entries of a_j) ulps of ‖a_j‖₂² in a group of k contacts, times ‖z‖².
     """
+    if _dependent(A):
+        first = bisect_left(range(A.shape[1]), True, key=lambda j: _dependent(A[:, : j + 1]))
+        allowed = "must not depend on the columns before it"
+        raise InputError.one(where, f"A[:, {first}]", "dependent", allowed)
+
+
+def _dependent(A: sp.csc_array) -> bool:
+    if A.shape[1] == 0:
+        return False
+    exponents = np.frexp(abs(A).max(axis=0).toarray().ravel())[1]
+    scaled = A @ sp.diags_array(np.exp2(-exponents.astype(float)))  # without rounding; no square overflows
+    G = sp.csc_array(scaled.T @ scaled)
+    terms = np.bincount(connected_components(G, directed=False)[1]).max() + np.diff(A.indptr).max()
+    block = sparse_block(G)
+    block.lost = float(terms * LOST)
     try:
-        rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
-        if symmetry != "general" and rows != columns:
-            raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
-        words = NUMBER[field]
-        if layout == "array":
-            entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
-        else:
-            words = [INTEGER, INTEGER, *words]
-        _refuse_wrong_lines(path, entries, rb"[ \t]++".join(words))
-        return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))
-    except OverflowError as error:
-        raise ValueError(str(error)) from error
-
-
-def _refuse_wrong_lines(path: Path, entries: int, entry: bytes) -> None:
-    """Raise ValueError unless the lines after the sizes are `entries` times `entry`, or empty."""
-    line = rb"[ \t]*+(?:%b)?+[ \t\r]*+\n" % entry
-    one, many = re.compile(line), re.compile(rb"(?:%b)*+" % line)
-    with path.open("rb") as file:
-        before = 1 + next(k for k, text in enumerate(file) if text.strip() and not text.startswith(b"%"))
-        found = 0
-        while lines := file.readlines(CHUNK):
-            lines[-1] = lines[-1].removesuffix(b"\n") + b"\n"
-            if not many.fullmatch(b"".join(lines)):
-                number, wrong = next((k, text) for k, text in enumerate(lines) if not one.fullmatch(text))
-                text = wrong[:LONGEST_LINE].decode(errors="replace").rstrip()
-                raise ValueError(f"line {before + number + 1}: {text!r}; each line must hold one entry")
-            found += sum(map(bool, map(bytes.strip, lines)))
-            before += len(lines)
-    if found != entries:
-        raise ValueError(f"truncated: {found} of {entries} entries")
+        block.factor()
+    except NotPositiveDefinite:
+        return True
+    return False

@@ -20,16 +20,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.exact import contacts, deferred, exact_assembly, spectrum, two_parts
-from problems.manufactured.ladder import Ladder, Scene, matrices
+from problems.model.scene import ManufacturedProblem
 from problems.stiffness.operator import Stiffness
+
+from . import Ladder, Scene, matrices
+from .manufactured import contacts, deferred, exact_assembly, spectrum, two_parts
 
 KILO, MEGA = 2.0**10, 2.0**20
 
 
 def _conditioned(n: int, seed: int, condition: float) -> Scene:
-    return matrices(f"Two parts, cond(K) = {condition:g}", deferred(n, condition, seed))
+    return deferred(f"Two parts, cond(K) = {condition:g}", n, condition, seed)
 
 
 def _beyond(condition: float) -> Scene:
@@ -40,17 +41,15 @@ def _beyond(condition: float) -> Scene:
 
 
 def _degenerate(n: int, percent: int) -> Scene:
-    weak = percent / 100
-    problem = deferred(n, 1e6, seed=2, closed=min(0.4, 1 - weak), weak=weak)
-    return matrices(f"Two parts, {percent} % of the contacts touch without a force", problem)
+    weak, title = percent / 100, f"Two parts, {percent} % of the contacts touch without a force"
+    return deferred(title, n, 1e6, seed=2, closed=min(0.4, 1 - weak), weak=weak)
 
 
 def _duplicated(n: int, duplicated: int, tilt: float) -> Scene:
-    problem = deferred(n, 1e4, seed=3, A=contacts(n // 2, duplicated, tilt))
-    if tilt:
-        return matrices(f"Two parts, {duplicated} contacts duplicated, {tilt:.0e} apart", problem)
-    refused = "must not depend on the columns before it"
-    return matrices(f"Two parts, {duplicated} contacts duplicated exactly", problem, refused=refused)
+    how = f", {tilt:.0e} apart" if tilt else " exactly"
+    refused = "" if tilt else "must not depend on the columns before it"
+    A = contacts(n // 2, duplicated, tilt)
+    return deferred(f"Two parts, {duplicated} contacts duplicated{how}", n, 1e4, 3, A, refused)
 
 
 def _coincident(bits: int) -> Scene:

@@ -21,10 +21,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.exact import manufacture, spectrum
-from problems.manufactured.ladder import Ladder, Scene, matrices
+from problems.model.scene import ManufacturedProblem
 from problems.stiffness.operator import Stiffness
+
+from . import Ladder, Scene, matrices
+from .manufactured import manufacture, spectrum
 
 GRID = 2.0**24  # the chain's gaps are multiples of 1/GRID
 

@@ -12,10 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from problems.manufactured.ladder import Ladder, Scene
 from problems.model.effect import effect_class
 from problems.model.joint import Joint
 from problems.model.scene import JointScene
+
+from . import Ladder, Scene
 
 Tables = dict[str, Any]  # as in the file of a scene
 

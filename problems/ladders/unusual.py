@@ -12,10 +12,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase
-from problems.forms.manufactured_problem import ManufacturedProblem
-from problems.manufactured.exact import exact_assembly, manufacture, spectrum, two_parts
-from problems.manufactured.ladder import Ladder, Scene, matrices
+from problems.model.scene import ManufacturedProblem
 
+from . import Ladder, Scene, matrices
+from .manufactured import exact_assembly, manufacture, spectrum, two_parts
 from .plates import CLAMPED, FREE, Tables, plates
 
 N, CONDITION = 64, 1e6  # contacts, cond(K)

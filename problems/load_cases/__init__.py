@@ -1,1 +1,51 @@
-"""Many load cases on one assembly: random gaps, measured gaps, sweeps."""
+"""Many load cases on one assembly, f and g, made on demand: listed, random gaps, measured gaps, sweeps."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from problems.forms.assembly import LoadCase
+from problems.storage.cache import digest
+
+
+class LoadCases(ABC):
+    """Cases 0 … count − 1. Case k depends on k alone: not on `count`, nor on the cases made before it."""
+
+    count: int
+
+    @property
+    @abstractmethod
+    def key(self) -> str:
+        """Hash of everything that determines the cases, except their count."""
+
+    @abstractmethod
+    def load(self, k: int) -> LoadCase:
+        """f (n,) N and g (m,) mm of case k. Cases with the same forces return the same array f."""
+
+    def only(self, numbers: Sequence[int]) -> LoadCases:
+        """The data of these cases alone, for a worker. They keep their numbers."""
+        return self
+
+    def parameters(self, k: int) -> dict[str, float | str]:
+        """What distinguishes case k, for its row."""
+        return {}
+
+
+@dataclass(frozen=True)
+class Listed(LoadCases):
+    """Case k is cases[k]. Cases with the same forces should share the array f: K⁻¹f is then computed once."""
+
+    cases: tuple[LoadCase, ...]
+
+    @property
+    def count(self) -> int:  # type: ignore[override]
+        return len(self.cases)
+
+    @property
+    def key(self) -> str:
+        return digest(*(array.tobytes() for case in self.cases for array in (case.f, case.g)))
+
+    def load(self, k: int) -> LoadCase:
+        return self.cases[k]

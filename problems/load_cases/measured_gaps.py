@@ -18,7 +18,7 @@ from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
-from .base import LoadCases
+from . import LoadCases
 
 ALLOWED = "every gap must be a finite number, in mm"
 MAX_FAULTS = 10  # reported one by one; the rest are counted

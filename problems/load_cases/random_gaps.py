@@ -11,12 +11,12 @@ from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
-from problems.input.validation import validation_faults
+from problems.input.bounded import validation_faults
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
-from .base import LoadCases
+from . import LoadCases
 
 #: The bits of a case's seed: integers of this size are exact in every JSON reader.
 SEED_BITS = 53

@@ -12,12 +12,12 @@ from problems.build import load_case
 from problems.errors import Fault, InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.names import Form
-from problems.input.validation import validation_faults
+from problems.input.bounded import validation_faults
 from problems.model.effect import SpringEffect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage.cache import digest
 
-from .base import LoadCases
+from . import LoadCases
 
 SYNTAX = "KIND.KEY=FIRST:LAST:COUNT or KIND.KEY=V1,V2,…, as in initial_gap.mean=0.1:1.0:10"
 MOST, MOST_CASES = 100_000, 10_000_000  # values of a key; combinations

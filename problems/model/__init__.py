@@ -1,1 +1,1 @@
-"""What a scene is made of: the joint, its parts, and the effects that act on them."""
+"""A joint, its parts as finite elements, what an effect is; the model of a scene, whole or condensed."""

@@ -19,16 +19,16 @@ import importlib
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
 from pydantic import Field
 
-from problems.fem.plate import Plate, Range
 from problems.forms.assembly import Matrix, Vector
 
 from .joint import TOOL, Faults, Joint, Table
+from .plate import Plate, Range
 
 Pair = tuple[str, str]
 
@@ -53,6 +53,8 @@ EXCLUDED = {
 class Effect(Table):
     """Parameters of an effect, each with its unit, as in Annotated[Positive, "mm"]."""
 
+    #: Of the CSV that a table may name as `file` in place of `points`; none if there is no such file.
+    columns: ClassVar[tuple[str, ...]] = ()
     kind: str
 
     @property

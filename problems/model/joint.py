@@ -18,9 +18,10 @@ import numpy as np
 import scipy.sparse as sp
 from pydantic import BaseModel, ConfigDict, Field
 
-from problems.fem.plate import Plate
 from problems.forms.assembly import Matrix
 from problems.input.bounded import Name, Positive
+
+from .plate import Plate
 
 MOST = 100_000  # grid lines; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]

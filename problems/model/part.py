@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from problems.fem.hermite import LineLoads, line_loads
-from problems.fem.plate import WHOLE, Plate
 from problems.forms.assembly import Indices, Vector
 
 from .effect import PartEffect, StiffnessEffect
 from .joint import Joint, Part
+from .plate import WHOLE, LineLoads, Plate, line_loads
 
 
 @dataclass(frozen=True)

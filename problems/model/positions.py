@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 
 from problems.forms.assembly import Indices, Matrix, Vector
 from problems.input.bounded import Finite, NotNegative
-from problems.input.csv_table import rows_from_file
 
 from .effect import Effect, ForceEffect
 from .joint import Faults, Joint, Table
@@ -27,13 +26,9 @@ class Pattern(Table):
 class Positions(ForceEffect):
     """Forces at `points`, a list of (x, y) in mm; or `file`, a CSV with columns x and y; or a `pattern`."""
 
+    columns: ClassVar[tuple[str, ...]] = ("x", "y")
     points: Annotated[tuple[tuple[Finite, Finite], ...], "mm"] = ()
     pattern: Pattern | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_file(cls, data: Any, info: ValidationInfo) -> Any:
-        return rows_from_file(data, info, "points", ("x", "y"))
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Positions:

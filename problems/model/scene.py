@@ -1,16 +1,15 @@
 """A scene: a joint with its effects, a user's matrices, or matrices constructed for a rung of a ladder."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import KW_ONLY, dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
-from problems.forms.assembly import Matrix
-from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem, made
+from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.storage.cache import digest
 
 from .effect import Effect, ForceEffect, StiffnessEffect
@@ -124,29 +123,47 @@ class MatricesScene(Scene):
         return own.get("problem") or own.get(matrix)
 
 
+@dataclass(frozen=True, eq=False)
+class ManufacturedProblem:
+    """Matrices and load case of a rung without plates, with the exact solution if it is known.
+
+    x (n,), lam (m,) : K x + A λ = f, Aᵀx ≤ g, λ ≥ 0, λᵀ(g − Aᵀx) = 0 hold exactly for these numbers, without
+        any rounding; None if the solution is unknown.
+    unit_mm (n,), gap_unit_mm (m,) : the length of one unit of x and of g, mm.
+    """
+
+    assembly: Assembly
+    load: LoadCase
+    x: Vector | None = None
+    lam: Vector | None = None
+    unit_mm: Vector | float = 1.0
+    gap_unit_mm: Vector | float = 1.0
+
+
 @dataclass(frozen=True)
 class ManufacturedScene(Scene):
-    """Matrices constructed in memory: a rung of a ladder without plates."""
+    """Matrices constructed in memory: a rung of a ladder without plates.
 
-    problem: ManufacturedProblem | DeferredProblem
+    make : makes the same problem at every call, when it is needed. block_sizes : the unknowns of each block
+    of K. m : the contacts. sparse : whether K's blocks are.
+    """
+
+    make: Callable[[], ManufacturedProblem]
+    block_sizes: tuple[int, ...]
+    m: int
+    sparse: bool = False
+
+    @classmethod
+    def of(cls, title: str, problem: ManufacturedProblem, name: str = "", refused: str = "") -> Self:
+        """That of a problem which is there."""
+        K, m = problem.assembly.K, problem.assembly.m
+        sizes = tuple(block.size for block in K.blocks)
+        return cls(name, title, lambda: problem, sizes, m, not K.dense, refused=refused)
 
     @property
     def made(self) -> ManufacturedProblem:
-        return self.problem if isinstance(self.problem, ManufacturedProblem) else made(self.problem)
-
-    @property
-    def sparse(self) -> bool:
-        """Whether K's blocks are, without making it."""
-        if isinstance(self.problem, DeferredProblem):
-            return self.problem.sparse
-        return not self.problem.assembly.K.dense
-
-    @property
-    def block_sizes(self) -> tuple[int, ...]:
-        """The unknowns of each block of K, without making it."""
-        if isinstance(self.problem, DeferredProblem):
-            return self.problem.sizes
-        return tuple(block.size for block in self.problem.assembly.K.blocks)
+        """The problem; of several, only the last one stays in memory."""
+        return _made(self.make)
 
     @cached_property
     def assembly_key(self) -> str:
@@ -161,8 +178,12 @@ class ManufacturedScene(Scene):
 
     @property
     def expected_size(self) -> tuple[int, int]:
-        known = self.problem
-        return sum(self.block_sizes), known.m if isinstance(known, DeferredProblem) else known.assembly.m
+        return sum(self.block_sizes), self.m
+
+
+@lru_cache(maxsize=1)
+def _made(make: Callable[[], ManufacturedProblem]) -> ManufacturedProblem:
+    return make()
 
 
 def plain(table: Table) -> dict[str, Any]:

@@ -9,13 +9,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import blas
 
-from .arrays import Indices, Matrix, Vector
-from .band_solve import band_cholesky, band_solve
+from . import Indices, Matrix, Vector
+from .band import band_blocks, band_cholesky, band_solve, lower_band
 from .block import NotPositiveDefinite, SparseBlock, scaled
 from .rounding import U, gamma
-from .selected_inverse import BlockPart, band_blocks
-
-COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
+from .selected_inverse import BlockPart
 
 
 class BandedBlock(SparseBlock):
@@ -90,7 +88,7 @@ class BandedBlock(SparseBlock):
             right = rows[start:stop, :count].toarray(order="F")
             if Y.size:
                 right[:, : Y.shape[1]] -= below @ Y
-            diagonal, below = band_blocks(self.L, start, stop, width, np.dtype(float))
+            diagonal, below = band_blocks(self.L, start, stop, width)
             Y = blas.dtrsm(1.0, diagonal, right, lower=1, overwrite_b=1)
             found[:count, :count] += Y.T @ Y
         Q = np.empty_like(found)
@@ -102,29 +100,6 @@ class BandedBlock(SparseBlock):
 
     def _rows(self, A: sp.csc_array) -> sp.csc_array:
         return A if self.order is None else sp.csc_array(A[self.order])
-
-
-def half_bandwidth(K: sp.csc_array) -> int:
-    """max |i − j| over the entries of K."""
-    columns = np.repeat(np.arange(K.shape[1], dtype=K.indices.dtype), np.diff(K.indptr))
-    return int((K.indices - columns).max(initial=0))
-
-
-def lower_band(K: sp.csc_array) -> Matrix:
-    """(b + 1, N) column-major, K[j + d, j] in row d, b the half-bandwidth. K : without duplicates."""
-    size, width = K.shape[0], half_bandwidth(K)
-    band = np.empty((width + 1, size), order="F")  # in large pages, where zeros() would be given small ones
-    entries = band.ravel(order="K")
-    for start in range(0, size, COLUMNS_AT_A_TIME):
-        stop = min(start + COLUMNS_AT_A_TIME, size)
-        band[:, start:stop] = 0.0
-        stored = slice(K.indptr[start], K.indptr[stop])
-        columns = np.repeat(np.arange(start, stop), np.diff(K.indptr[start : stop + 1]))
-        rows, values = K.indices[stored], K.data[stored]
-        lower = rows >= columns
-        # row − column + column (width + 1)
-        entries[columns[lower] * width + rows[lower]] = values[lower]
-    return band
 
 
 def _norm(L: Matrix) -> float:

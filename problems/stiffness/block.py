@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .arrays import Indices, Matrix, Vector
+from . import Indices, Matrix, Vector
 from .selected_inverse import BlockPart
 
 ENTRIES_AT_A_TIME = 2**15  # of a sparse block: a panel stays in the processor's cache

@@ -1,7 +1,8 @@
-"""A dense block: K = UᵀU by LAPACK."""
+"""A dense block: K = UᵀU by LAPACK; and the dense blocks of a sparse K."""
 
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,15 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from .arrays import Matrix, Vector
+from . import Matrix, Vector
 from .block import ENTRIES_AT_A_TIME, Block, NotPositiveDefinite
 from .rounding import SAFE, gamma
 from .rounding import U as ROUNDING
 
+DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
 SMALL = 50  # unknowns below which eigenvalues are computed densely
 LEAST_ROWS = 16  # of a panel
 NORM_STEPS = 5  # of the power method, for v
@@ -143,6 +146,29 @@ class InverseBlock(DenseBlock):
 
     def solve(self, b: Matrix) -> Matrix:
         return self.Q @ b
+
+
+def dense_blocks(K: sp.csr_array) -> list[Matrix]:
+    """The diagonal blocks of a sparse K, by columns."""
+    return [K[rows, rows].toarray(order="F") for rows in dense_slices(K)]
+
+
+def dense_slices(K: sp.csr_array) -> list[slice]:
+    """The unknowns of each dense block of a sparse K: bodies, neighbours put together while they have no more
+    unknowns than the largest, or `DENSE_BLOCK`. One block, where the bodies' unknowns are interleaved.
+    """
+    count, label = connected_components(K, directed=False)
+    starts = np.flatnonzero(np.diff(label, prepend=-1))
+    if len(starts) != count:
+        starts = starts[:1]
+    ends = np.append(starts[1:], K.shape[0])
+    most = max(int((ends - starts).max()), DENSE_BLOCK)
+    found, begin = [], 0
+    for end, following in pairwise([*ends.tolist(), K.shape[0] + most + 1]):
+        if following - begin > most:
+            found.append(slice(begin, end))
+            begin = end
+    return found
 
 
 def cholesky(K: Matrix) -> Matrix:

@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
-from .arrays import Indices, Matrix, Vector
-from .balance import POWER_STEPS, balanced_units, least_eigenvalue
-from .block import Block, NotPositiveDefinite
-from .dense import DenseBlock
+from . import Indices, Matrix, Vector
+from .block import Block, NotPositiveDefinite, scaled
+from .dense import DenseBlock, dense_blocks
+from .rounding import balanced_units
 from .selected_inverse import BlockPart
 from .sparse import sparse_block
 
-DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
+POWER_STEPS = 5
 
 
 class Stiffness:
@@ -156,7 +155,7 @@ class Stiffness:
     def least_eigenvalues(self, D: Vector, steps: int = POWER_STEPS) -> list[float]:
         """About λmin of each block of DKD, no smaller."""
         _ = self.factors
-        return [least_eigenvalue(block.solve, D[rows], steps) for block, rows in self._own_rows()]
+        return [_least_eigenvalue(block.solve, D[rows], steps) for block, rows in self._own_rows()]
 
     def condition(self, D: Vector) -> float:
         """About the condition number of DKD, whose largest eigenvalue is at most ‖DKD‖_∞."""
@@ -196,24 +195,56 @@ class Stiffness:
         return local
 
 
-def dense_blocks(K: sp.csr_array) -> list[Matrix]:
-    """The diagonal blocks of a sparse K, by columns."""
-    return [K[rows, rows].toarray(order="F") for rows in dense_slices(K)]
+class ScaledStiffness(Stiffness):
+    """K in other units, DKD: a view that solves with K's factors. Powers of two round nothing.
 
-
-def dense_slices(K: sp.csr_array) -> list[slice]:
-    """The unknowns of each dense block of a sparse K: bodies, neighbours put together while they have no more
-    unknowns than the largest, or `DENSE_BLOCK`. One block, where the bodies' unknowns are interleaved.
+    base : K, of sparse blocks. D (n,) : powers of two.
     """
-    count, label = connected_components(K, directed=False)
-    starts = np.flatnonzero(np.diff(label, prepend=-1))
-    if len(starts) != count:
-        starts = starts[:1]
-    ends = np.append(starts[1:], K.shape[0])
-    most = max(int((ends - starts).max()), DENSE_BLOCK)
-    found, begin = [], 0
-    for end, following in itertools.pairwise([*ends.tolist(), K.shape[0] + most + 1]):
-        if following - begin > most:
-            found.append(slice(begin, end))
-            begin = end
-    return found
+
+    def __init__(self, base: Stiffness, D: Vector) -> None:
+        super().__init__(base.blocks, lambda _: base.factors)
+        self.base, self.D = base, D
+
+    @cached_property
+    def matrices(self) -> tuple[Any, ...]:
+        """Made when first asked for, read-only."""
+        own = zip(self.blocks, (self.D[rows] for rows in self.slices), strict=True)
+        found = tuple(scaled(block.matrix, D, D) for block, D in own)
+        for matrix in found:
+            matrix.data.flags.writeable = False
+        return found
+
+    @cached_property
+    def diagonal(self) -> Vector:
+        return self.D**2 * self.base.diagonal
+
+    def multiply(self, x: Matrix) -> Matrix:
+        return _times(self.D, self.base.multiply(_times(self.D, x)))
+
+    def solve(self, b: Matrix) -> Matrix:
+        """(DKD)⁻¹b = D⁻¹K⁻¹D⁻¹b."""
+        return _times(1 / self.D, self.base.solve(_times(1 / self.D, b)))
+
+    def panels(self) -> Iterator[tuple[slice, slice, Any]]:
+        for rows, own, panel in self.base.panels():
+            yield rows, own, sp.diags_array(self.D[rows]) @ panel @ sp.diags_array(self.D[own])
+
+    def compliance(self, A: sp.csc_array) -> Matrix:
+        """With D⁻¹A, Aᵀ(DKD)⁻¹A is that of K."""
+        return self.base.compliance(scaled(A, 1 / self.D, np.ones(A.shape[1])))
+
+
+def _times(D: Vector, x: Matrix) -> Matrix:
+    return (D * x.T).T
+
+
+def _least_eigenvalue(solve: Callable[[Vector], Vector], D: Vector, steps: int) -> float:
+    """About λmin(DKD), no smaller, by the power method on its inverse. solve : b → K⁻¹b."""
+    v = np.random.default_rng(0).standard_normal(len(D))
+    largest = 0.0
+    for _ in range(steps):
+        v = v / abs(v).max()  # whose square does not overflow
+        v = v / np.linalg.norm(v)
+        w = solve(v / D) / D
+        largest, v = float(v @ w), w
+    return 1 / largest if largest > 0 else 0.0

@@ -16,20 +16,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
-from .arrays import Indices, Matrix
+from . import Indices, Matrix
+from .band import Entries, band_blocks
 
 UNBLOCKED = 64  # LAPACK's inverse of a triangle is slower than products beyond that
 FURTHEST = 20  # half-bandwidths between the contacts of a window
 SMALL = 2000  # unknowns between them that are never too many
-
-Entries = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ class SelectedInverse:
 
 def selected_inverse(L: Matrix, rows: Indices, reach: int, single: bool = True) -> SelectedInverse:
     """K⁻¹ at pairs of `rows`, ascending, that are at most `reach` unknowns apart. single : the precision."""
-    dtype = np.dtype(np.float32 if single else np.float64)
+    dtype = np.float32 if single else np.float64
     trmm = blas.strmm if single else blas.dtrmm
     size = L.shape[1]
     width = max(L.shape[0] - 1, 1)
@@ -88,19 +85,6 @@ def selected_inverse(L: Matrix, rows: Indices, reach: int, single: bool = True) 
         columns = np.asfortranarray(np.hstack([Z[:, own], after]))
         panels[i] = columns[own]
     return SelectedInverse(rows, starts, tuple(panels))
-
-
-def band_blocks(
-    L: Matrix, start: int, stop: int, width: int, dtype: np.dtype[Any]
-) -> tuple[Entries, Entries]:
-    """L_ii, lower triangular, and L_{i+1,i} (upper triangular, as many rows as there are)."""
-    wide, after = stop - start, min(stop + width, L.shape[1]) - stop
-    whole = np.zeros((wide + len(L), wide), dtype, order="F")
-    row, column = whole.strides
-    # Entry L[d, start + c] is entry (c + d, c) of these columns: a view with a slanted stride.
-    slanted = np.lib.stride_tricks.as_strided(whole, shape=(len(L), wide), strides=(row, row + column))
-    slanted[...] = L[:, start:stop]
-    return np.asfortranarray(whole[:wide]), np.asfortranarray(whole[wide : wide + after])
 
 
 def _continued(diagonal: Entries, below: Entries, width: int) -> tuple[Entries, Entries]:

@@ -30,8 +30,8 @@ from problems.build import load_case, prepared
 from problems.effects.fasteners import Fasteners
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.prepared import Prepared
-from problems.full_model.joint_model import JointModel
 from problems.model.joint import Joint
+from problems.model.joint_model import JointModel
 from solvers.base import failed
 from solvers.registry import modules
 

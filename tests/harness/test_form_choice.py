@@ -7,7 +7,7 @@ import pytest
 from harness.planning import form_choice, memory
 from harness.planning.form_choice import chosen_form
 from problems.errors import InputError
-from problems.full_model.joint_model import JointModel
+from problems.model.joint_model import JointModel
 from problems.scene import read_scene
 from solvers.base import FORMS
 

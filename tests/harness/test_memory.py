@@ -12,7 +12,7 @@ from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.names import Form
 from problems.scene import read_scene
-from problems.stiffness.banded import half_bandwidth
+from problems.stiffness.band import half_bandwidth
 
 GALLERY = ("three-part-stack", "installed-fasteners", "sheet-over-former", "plate-on-frame", "padded-panel")
 

@@ -10,7 +10,7 @@ import pytest
 from harness.results import schema
 from harness.verification.judge import Judgement
 from problems.drawn import EXAMPLES
-from problems.manufactured.ladder import LADDERS
+from problems.ladders import LADDERS
 from solvers.base import Status
 
 PUBLISHED = Path(__file__).parents[2] / "results" / "published"

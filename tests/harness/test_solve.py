@@ -189,7 +189,6 @@ def test_only_what_is_called_for_is_imported(tmp_path: Path) -> None:
         "problems.effects.initial_gap",
         "problems.effects.pressure",
     }
-    assert "problems.input.csv_table" not in modules
     assert not modules & {"solvers.methods.ipm", "solvers.methods.gi", "solvers.registry"}
 
 

@@ -11,7 +11,7 @@ from harness.api import own_matrices, solve
 from harness.planning.form_choice import chosen_form
 from problems.build import load_case, prepared
 from problems.forms.names import FORMS
-from problems.input import sparse_npz
+from problems.input import matrix_files
 from problems.scene import read_scene
 from problems.storage import cache
 
@@ -31,7 +31,7 @@ def liswet(n: int) -> dict[str, sp.csc_array | np.ndarray]:
 @pytest.fixture
 def scene_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    sparse_npz.write(tmp_path / "liswet.npz", liswet(10_002))
+    matrix_files.write(tmp_path / "liswet.npz", liswet(10_002))
     return str(tmp_path / "liswet.npz")
 
 

@@ -181,7 +181,7 @@ OWN = "input.user_matrices"  # makes a user's matrices, no joint's
 @pytest.mark.parametrize(
     "module",
     [
-        *("fem.hermite", "fem.plate", "full_model.condense", "full_model.condense"),
+        *("model.plate", "model.condense"),
         *("model.joint", "model.part", "stiffness.dense", "forms.stages", "effects.supports", OWN),
     ],
 )

@@ -14,7 +14,7 @@ from problems.effects.supports import Supports
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
-from problems.full_model.condense import NotPositiveDefinite, condense
+from problems.model.condense import NotPositiveDefinite, condense
 
 SHORT, LONG = {"length": 90.0, "elements": 2}, {"length": 250.0, "elements": 4}
 PARTS: list[dict[str, Any]] = [

@@ -10,7 +10,7 @@ from commands import harness
 
 from harness import LoadCase, own_matrices, solve_series
 from problems.errors import InputError
-from problems.input.dependent_contacts import refuse_dependent
+from problems.input.user_matrices import refuse_dependent
 
 N = 100
 

@@ -7,11 +7,9 @@ from exact_answer import is_exact
 
 from harness.planning.plan import expand
 from harness.planning.suite import read_suite
-from problems.forms import manufactured_problem
-from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
-from problems.manufactured.exact import contacts, exact_assembly, spectrum, two_parts
-from problems.manufactured.ladder import ladders, make_rung, rung_names
-from problems.model.scene import ManufacturedScene
+from problems.ladders import ladders, make_rung, rung_names
+from problems.ladders.manufactured import contacts, exact_assembly, spectrum, two_parts
+from problems.model.scene import ManufacturedProblem, ManufacturedScene
 from problems.scene import read_scene
 
 RUNGS = rung_names("hard-full/")
@@ -62,15 +60,13 @@ def test_nothing_is_made_before_it_is_needed_and_one_is_kept(monkeypatch: pytest
     for name in RUNGS:
         scene = make_rung(name)
         if isinstance(scene, ManufacturedScene):
-            assert isinstance(scene.problem, DeferredProblem)
-            monkeypatch.setitem(vars(scene.problem), "make", lambda name=name: make(name))
+            monkeypatch.setitem(vars(scene), "make", lambda name=name: make(name))
     expand(read_suite("hard-full"))
     assert not made
     first, second = read_scene("hard-full/degeneracy/4386-025"), read_scene("hard-full/degeneracy/4386-050")
     for scene in (first, first, second, second, first):
         _ = scene.made  # type: ignore[attr-defined]
     assert made == [first.name, second.name, first.name]
-    manufactured_problem.made.cache_clear()
 
 
 def test_the_suite_measures_every_rung_with_every_solver_of_ours() -> None:

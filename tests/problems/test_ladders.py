@@ -16,11 +16,10 @@ from harness.verification.reference_problem import ReferenceProblem, reference_p
 from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
-from problems.forms.manufactured_problem import ManufacturedProblem
 from problems.forms.problem import in_form
-from problems.manufactured.exact import spectrum
-from problems.manufactured.ladder import make_rung, rung_names
-from problems.model.scene import ManufacturedScene
+from problems.ladders import make_rung, rung_names
+from problems.ladders.manufactured import spectrum
+from problems.model.scene import ManufacturedProblem, ManufacturedScene
 from problems.scene import read_scene, scene_names
 from solvers.base import Answer, Form
 from solvers.registry import make_solver

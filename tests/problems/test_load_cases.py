@@ -10,7 +10,7 @@ from strip import write_strip
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.prepared import Prepared
-from problems.load_cases.base import LoadCases
+from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
 from problems.load_cases.sweep import sweep

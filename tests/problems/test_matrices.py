@@ -13,7 +13,8 @@ from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.prepared import Prepared
-from problems.input.user_matrices import checked, read_mtx
+from problems.input.matrix_files import read_mtx
+from problems.input.user_matrices import checked
 from problems.scene import read_scene
 
 RNG = np.random.default_rng(11)

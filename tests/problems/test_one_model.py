@@ -11,7 +11,7 @@ from problems import scene as reading
 from problems.build import load_case, model_of, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
-from problems.full_model.joint_model import JointModel
+from problems.model.joint_model import JointModel
 
 TEXT = (
     two_parts()

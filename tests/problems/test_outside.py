@@ -16,9 +16,8 @@ from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.names import FORMS
-from problems.manufactured.ladder import rung_names
-from problems.outside import journal_bearing
-from problems.outside.hemisphere import FREE, alone, exact
+from problems.ladders import rung_names
+from problems.ladders.outside import FREE, alone, exact, journal_bearing
 from problems.scene import read_scene
 from report.results.reader import read
 from report.sections import outside
@@ -102,7 +101,7 @@ def test_the_matrices_are_those_of_linear_triangles() -> None:
                 at = [a * (ny + 2) + b for a, b in corners]
                 K[np.ix_(at, at)] += w * hx * hy / 2 * gradients.T @ gradients
     inner = [a * (ny + 2) + b for a in range(1, nx + 1) for b in range(1, ny + 1)]
-    made = journal_bearing.problem(nx, ny, eccentricity).assembly.K.matrices[0]
+    made = journal_bearing(nx, ny, eccentricity).assembly.K.matrices[0]
     assert sp.issparse(made)
     np.testing.assert_allclose(made.toarray(), K[np.ix_(inner, inner)], rtol=1e-12, atol=1e-14)
 

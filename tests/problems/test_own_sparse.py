@@ -17,7 +17,7 @@ from problems.build import load_case, prepared
 from problems.formats.nastran import pyyeti
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
-from problems.input import user_matrices
+from problems.input import matrix_files
 from problems.scene import read_scene
 from problems.stiffness.dense import DenseBlock
 
@@ -133,10 +133,10 @@ def test_a_wrong_line_far_down_a_file_is_found_and_counted(
     wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In blocks of a few lines, of which most are plain; a line that is left out is missed."""
-    monkeypatch.setattr(user_matrices, "CHUNK", 64)
+    monkeypatch.setattr(matrix_files, "CHUNK", 64)
     lines = [f"{k + 1} {k + 1} {k + 0.5!r}" for k in range(200)]
     lines[150] = wrong
     path = tmp_path / "K.mtx"
     path.write_text("%%MatrixMarket matrix coordinate real general\n200 200 200\n" + "\n".join(lines) + "\n")
     with pytest.raises(ValueError, match="line 153" if wrong else "truncated: 199 of 200"):
-        user_matrices.read_mtx(path)
+        matrix_files.read_mtx(path)

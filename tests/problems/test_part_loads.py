@@ -14,9 +14,9 @@ from problems.effects.self_weight import SelfWeight
 from problems.effects.supports import Supports
 from problems.effects.thermal_bending import ThermalBending
 from problems.forms.prepared import Prepared
-from problems.full_model.joint_model import JointModel
 from problems.model.effect import Effect
 from problems.model.joint import Joint
+from problems.model.joint_model import JointModel
 
 E, T = 70e3, 6.0
 #: A strip along y, clamped at y = −200, free at y = 150, bending like a beam since ν = 0.

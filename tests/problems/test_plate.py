@@ -15,8 +15,7 @@ from skfem.helpers import dd, ddot, eye, trace
 from problems.effects.ribs import Ribs
 from problems.effects.stringers import Stringers
 from problems.effects.supports import Supports
-from problems.fem.hermite import line_matrices
-from problems.fem.plate import Plate
+from problems.model.plate import Plate, line_matrices
 
 UNEVEN_X = np.array([0.0, 70.0, 110.0, 260.0, 300.0])
 UNEVEN_Y = np.array([-90.0, 0.0, 35.0, 50.0])

@@ -16,12 +16,12 @@ from problems.errors import InputError
 from problems.forms.assembly import Matrix
 from problems.forms.names import FORMS
 from problems.scene import read_scene
-from problems.stiffness import band_solve
-from problems.stiffness.banded import BandedBlock, half_bandwidth, lower_band
+from problems.stiffness import band
+from problems.stiffness.band import half_bandwidth, lower_band
+from problems.stiffness.banded import BandedBlock
 from problems.stiffness.block import NotPositiveDefinite
-from problems.stiffness.general import GeneralBlock
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.sparse import sparse_block
+from problems.stiffness.sparse import GeneralBlock, sparse_block
 
 
 def close(found: Matrix, expected: Matrix) -> None:
@@ -36,7 +36,7 @@ def scattered(random: np.random.Generator, n: int, half: int) -> tuple[sp.csc_ar
 
 def test_a_band_is_factored_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit holds for the factorisation alone."""
-    seen, dpbtrf = [], band_solve.lapack.dpbtrf
+    seen, dpbtrf = [], band.lapack.dpbtrf
 
     def counted() -> set[int]:
         return {pool["num_threads"] for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"}
@@ -45,9 +45,9 @@ def test_a_band_is_factored_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> No
         seen.append(counted())
         return dpbtrf(band, **how)
 
-    monkeypatch.setattr(band_solve, "lapack", SimpleNamespace(dpbtrf=factor))
+    monkeypatch.setattr(band, "lapack", SimpleNamespace(dpbtrf=factor))
     before = counted()
-    L, info = band_solve.band_cholesky(np.array([[4.0, 5.0], [2.0, 0.0]], order="F"))
+    L, info = band.band_cholesky(np.array([[4.0, 5.0], [2.0, 0.0]], order="F"))
     assert (L.tolist(), info, seen, counted()) == ([[2.0, 2.0], [1.0, 0.0]], 0, [{1}], before)
 
 

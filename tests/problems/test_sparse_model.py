@@ -15,11 +15,11 @@ from problems.build import load_case, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
 from problems.forms.assembly import Assembly, Matrix
-from problems.full_model.joint_model import JointModel
 from problems.model.effect import effect_class
+from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
 from problems.scene import read_scene, scene_names
-from problems.stiffness.banded import half_bandwidth
+from problems.stiffness.band import half_bandwidth
 
 GALLERY = [name for name in scene_names() if name.startswith("gallery/")]
 END = {"length": 90.0, "elements": 2}

@@ -9,7 +9,7 @@ from joints import two_parts
 
 from harness import load_scene, solve
 from problems.forms.prepared import Prepared
-from problems.full_model.joint_model import JointModel
+from problems.model.joint_model import JointModel
 from problems.stiffness.dense import DenseBlock
 
 pytestmark = pytest.mark.slow

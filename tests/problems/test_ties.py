@@ -74,7 +74,7 @@ def test_blocks_are_those_of_the_dense_sum() -> None:
 def test_installing_a_fastener_condenses_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     effect = Supports(kind="supports", part="a", points=((0.0, 0.0),), stiffness_per_point=123.0)
     prepared(make_scene(TWO, effect))
-    condense = "problems.full_model.condense.condense"
+    condense = "problems.model.condense.condense"
     monkeypatch.setattr(condense, lambda *_: pytest.fail("condensed the parts again"))
     first = prepared(make_scene(TWO, effect, fastener((100.0, 0.0))))
     again = prepared(

@@ -178,10 +178,10 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "trans=1), lower=1).max()": ("trans=1), lower=1).min()",),
         "return None if info else ": ("return ",),
     },
-    "problems/stiffness/balance.py": {
+    "problems/stiffness/rounding.py": {
         "np.sqrt(np.where(diagonal > 0, diagonal, 1.0))": ("np.where(diagonal > 0, diagonal, 1.0)",),
-        "solve(v / D) / D": ("solve(v)",),
     },
+    "problems/stiffness/operator.py": {"solve(v / D) / D": ("solve(v)",)},
     "solvers/kkt.py": {
         "max(float((-y).max(initial=0.0)), float(": ("max(float(",),
         "float(abs(y[lam > 0]).max(initial=0.0))": ("0.0", "float(y[lam > 0].min(initial=0.0))"),
@@ -213,6 +213,7 @@ TESTS = {
     "harness/verification/judge.py": ("proofs/test_terms_verdict.py", "harness/test_judge.py"),
     "problems/stiffness/dense.py": ("proofs/test_definite.py",),
     "problems/stiffness/banded.py": ("proofs/test_definite.py",),
-    "problems/stiffness/balance.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
+    "problems/stiffness/rounding.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
+    "problems/stiffness/operator.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "solvers/kkt.py": ("proofs/test_terms_verdict.py",),
 }

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from synthetic_results import results, row
 
-from problems.manufactured.ladder import ladders
+from problems.ladders import ladders
 from report.figures import style
 from report.figures.maps import CLOSED, LARGER, MARK, RIM, Map, drawn, rooted
 from report.sections.ladders import COUNTED, ladder_map, with_outcomes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small import make_load, make_strips, solve_by_nnls
 
-from problems.forms import compliance
+from problems.forms import product
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
@@ -46,7 +46,7 @@ def test_no_step_increases_the_objective(preconditioner: str) -> None:
     Q, p = prepared.Q, load.p
     solver, state = opened(preconditioner, prepared)
     metric = solver._metric(state)
-    case = Proportioning(prepared.compliance, p, metric.diagonal, metric, lambda lam: Q @ lam - p, 0 * p, -p)
+    case = Proportioning(prepared.product, p, metric.diagonal, metric, lambda lam: Q @ lam - p, 0 * p, -p)
     before = 0.0
     for _ in range(200):
         if not case._step():
@@ -64,13 +64,13 @@ def test_the_products_that_are_told_are_those_made(
     preconditioner: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And from its own answer few are left."""
-    made, original = [], compliance.product
+    made, original = [], product.product
 
     def counted(Q: Any, v: Vector) -> Vector:
         made.append(1)
         return original(Q, v)
 
-    monkeypatch.setattr(compliance, "product", counted)
+    monkeypatch.setattr(product, "product", counted)
     prepared, load = strips(120)
     solver, state = opened(preconditioner, prepared)
     made.clear()

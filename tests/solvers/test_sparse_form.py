@@ -20,8 +20,8 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.scene import read_scene, scene_names
 from problems.stiffness.banded import BandedBlock
-from problems.stiffness.general import GeneralBlock
 from problems.stiffness.operator import Stiffness
+from problems.stiffness.sparse import GeneralBlock
 from solvers.base import Answer
 from solvers.registry import make_solver
 

@@ -15,11 +15,11 @@ from problems.build import load_case, prepared
 from problems.forms.approximate_inverse import of_dense
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
-from problems.forms.compliance import DenseCompliance
 from problems.forms.prepared import Prepared, dual_alone
 from problems.forms.problem import in_form
+from problems.forms.product import DenseCompliance
+from problems.ladders import make_rung
 from problems.load_cases.random_gaps import random_gaps
-from problems.manufactured.ladder import make_rung
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.algorithms import sweeps

@@ -21,19 +21,19 @@ from scipy.sparse.csgraph import connected_components
 from problems.forms.assembly import Assembly, Indices, LoadCase, Matrix, Vector
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
-from problems.model.effect import Effect, ForceEffect, GapEffect, SpringEffect
-from problems.model.part import PartLoadEffect, PartModel
-from problems.model.scene import JointScene
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse import sparse_block
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
+from .effect import Effect, ForceEffect, GapEffect, SpringEffect
 from .graded import graded
 from .numbering import Numbering
+from .part import PartLoadEffect, PartModel
+from .scene import JointScene
 
-CODE = ("problems/fem", "problems/model", "problems/effects", "problems/full_model")
+CODE = ("problems/model", "problems/effects")
 WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
 
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from problems.forms.assembly import Indices
-from problems.model.part import PartModel
+
+from .part import PartModel
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,14 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from problems.forms.assembly import Indices, Matrix, Vector
-from problems.model.part import PartLoadEffect, PartModel
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.storage import cache
 from problems.storage.fingerprint import fingerprint
 
+from .part import PartLoadEffect, PartModel
+
 #: The folders whose code makes a part's stiffness.
-CODE = ("problems/fem", "problems/model", "problems/effects")
+CODE = ("problems/model", "problems/effects")
 
 
 def condense(

@@ -18,7 +18,7 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.manufactured_problem import DeferredProblem, ManufacturedProblem
+from problems.model.scene import ManufacturedProblem, ManufacturedScene
 from problems.stiffness.operator import Stiffness
 
 STIFFNESS = 64.0  # N/mm: the smallest eigenvalue of K
@@ -77,12 +77,20 @@ def two_parts(
 
 
 def deferred(
-    n: int, condition: float, seed: int, A: sp.csc_array | None = None, **shares: float
-) -> DeferredProblem:
-    """`two_parts` with n unknowns together, made when needed."""
+    title: str,
+    n: int,
+    condition: float,
+    seed: int,
+    A: sp.csc_array | None = None,
+    refused: str = "",
+    **shares: float,
+) -> ManufacturedScene:
+    """The rung of `two_parts` with n unknowns together, made when needed."""
     size = n // 2
-    m = size if A is None else A.shape[1]
-    return DeferredProblem((size, size), m, partial(two_parts, size, condition, seed, A, **shares))
+    make = partial(two_parts, size, condition, seed, A, **shares)
+    return ManufacturedScene(
+        "", title, make, (size, size), size if A is None else A.shape[1], refused=refused
+    )
 
 
 def _stiffness(d: Vector) -> Matrix:

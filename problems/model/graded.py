@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from problems.model.part import PartModel
+from .part import PartModel
 
 GROWTH = 1.2  # of the distance between lines, away from the junction
 PEAK = 2.0  # times the median beyond the junction: the stiffness that effects add to a line that is kept

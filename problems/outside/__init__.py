@@ -1,1 +1,0 @@
-"""Problems that others wrote, with printed optima or closed forms: each file is one, in several sizes."""
