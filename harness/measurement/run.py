@@ -13,16 +13,11 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.planning.memory import refuse_limits_too_low
-from harness.planning.one_row import of_key, with_key
-from harness.planning.plan import Measurement, expand
-from harness.planning.search import due
-from harness.planning.stopping import stopped_at
+from harness.planning.due import due, predicted_timeout, stopped_at
+from harness.planning.plan import Measurement, expand, of_key, with_key
 from harness.planning.suite import Suite, to_toml
-from harness.planning.timeouts import predicted_timeout
 from harness.results import records
-from harness.results.machine import machine
-from harness.results.provenance import provenance
+from harness.results.provenance import machine, provenance
 from harness.results.records import Row
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import Display
@@ -59,7 +54,6 @@ def run(
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite) if key is None else of_key(expand(suite), key)
-    refuse_limits_too_low(plan)
     with records.locked(directory):
         rows = resumed(directory, plan, solvers, console)
         records.replace_text(directory / "suite.toml", to_toml(suite))

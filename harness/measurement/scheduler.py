@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from harness.results.machine import PACKAGES, installed_version, usable_cores
+from harness.results.provenance import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
 from problems.storage.fingerprint import ROOT, fingerprint
 

@@ -18,7 +18,7 @@ import threadpoolctl
 from scipy.linalg import lapack
 
 from harness.planning.plan import Measurement
-from harness.results.machine import blas_kernels, resident_mib
+from harness.results.provenance import blas_kernels, resident_mib
 from harness.results.records import Row
 from harness.solving.answers import InvalidAnswer, figures, save
 from harness.solving.session import SolverSession

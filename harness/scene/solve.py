@@ -19,8 +19,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from harness.results.machine import machine, resident_mib
-from harness.results.provenance import provenance
+from harness.results.provenance import machine, provenance, resident_mib
 from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.gap_error import GapError
 from harness.verification.judge import LIMIT_MM

@@ -7,9 +7,8 @@ import inspect
 from rich.console import Console
 from rich.table import Table
 
-from harness.planning.form_choice import chosen_form
-from harness.planning.memory import size_of
-from harness.results.machine import physical_memory_mib
+from harness.planning.form_choice import chosen_form, size_of
+from harness.results.provenance import physical_memory_mib
 from problems.build import model_of, prepared
 from problems.forms.names import FORMS
 from problems.model.effect import SpringEffect

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from harness.measurement.scheduler import done_as_completed, workers
 from harness.results import records, series_file
-from harness.results.machine import installed_version, machine
+from harness.results.provenance import installed_version, machine
 from harness.results.schema import VERDICTS
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN

@@ -2,7 +2,7 @@
 
 A finding is worse than the baseline if
 
-    error > margin · max(error then, floor),    floor: harness/results/digits.py
+    error > margin · max(error then, floor),    floor: harness/results/sides.py
 
 so that 1e-11 mm becoming 9e-8 mm is news, although both are within the limit. The errors of the baseline are
 those in its rows; its answers need not have been kept.
@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
-from harness.results.digits import floor_mm
 from harness.results.records import Row
-from harness.results.sides import Side, measurement, read_side, refuse_incomparable
+from harness.results.sides import Side, floor_mm, measurement, read_side, refuse_incomparable
 
 from .findings import Finding
 
