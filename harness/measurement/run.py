@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -88,14 +88,8 @@ def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
     return suite.model_copy(update={"solver": filled})
 
 
-@dataclass(frozen=True)
-class Pending:
-    """A task that is being done, and the problem that its answers are judged on."""
-
-    task: Task
-    problem: ReferenceProblem
-
-
+#: A task that is being done, and the problem that its answers are judged on.
+Pending = tuple[Task, ReferenceProblem]
 #: Does tasks, each beside what stays here; gives back the latter with the result, or what was raised.
 Outcomes = Callable[[Iterator[tuple[Pending, Task]]], Iterator[tuple[Pending, TaskResult | BaseException]]]
 
@@ -125,8 +119,8 @@ def measure_remaining(
     sizes = {m.scene: size[0] for m in remaining if (size := read_scene(m.source).expected_size)}
     rows = list(rows)
     with Display(console, remaining, done, sizes) as display:
-        for pending, outcome in outcomes(pending_tasks(remaining, rows, directory, solvers, display)):
-            batch = pending.task.batch
+        for (task, problem), outcome in outcomes(pending_tasks(remaining, rows, directory, solvers, display)):
+            batch = task.batch
             if isinstance(outcome, BaseException):
                 why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
                 console.print(f"{batch[0].key}: not measured: {why}", style="red")
@@ -134,7 +128,7 @@ def measure_remaining(
             of_worker = origin
             if outcome.machine and outcome.code:
                 of_worker = {"machine": record_machine(directory, outcome.machine), **outcome.code}
-            new = rows_of(pending.task, outcome, pending.problem, directory, of_worker)
+            new = rows_of(task, outcome, problem, directory, of_worker)
             records.append(directory / records.MEASUREMENTS, *new)
             rows += new
             for m, row in zip(batch, new, strict=True):
@@ -166,7 +160,7 @@ def pending_tasks(
         batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
         timed_out_on = predicted_timeout(batch[0], problem.prepared.assembly.asked, rows)
         task = Task(batch, solvers[m.solver, m.variant], timed_out_on)
-        yield Pending(task, problem), task
+        yield (task, problem), task
 
 
 def batches(remaining: list[Measurement]) -> list[list[Measurement]]:
