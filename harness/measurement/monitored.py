@@ -24,6 +24,8 @@ import psutil
 
 from harness.results.records import Row
 
+from .process_tree import end_children
+
 ROOT = Path(__file__).parents[2]
 POLL_S = 0.05
 STDERR_TAIL = 2000  # bytes
@@ -31,7 +33,6 @@ CHUNK = 2**16  # bytes
 LONGEST_EVENT = 2**24  # bytes
 FINAL_READS = 64  # chunks of what a dead process had written
 SCAN_S = 0.5  # between two searches for processes that it forked
-END_S = 10.0  # for children that keep forking
 
 THREAD_VARIABLES = (
     *("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"),
@@ -202,7 +203,8 @@ class Monitored:
             return
         self._find_descendants()
         if self.process.poll() is None:
-            self._end_children()
+            os.kill(self.process.pid, signal.SIGSTOP)
+            end_children(self.process.pid)
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self.process.pid, signal.SIGKILL)
         for process in self.descendants:
@@ -214,23 +216,6 @@ class Monitored:
             if stream is not None:
                 with contextlib.suppress(BrokenPipeError):  # it died before it read its job
                     stream.close()
-
-    def _end_children(self) -> None:
-        """Stop the process and kill its children until none is left, however fast they fork.
-
-        Orphans become its children, too: it is a subreaper (child.py).
-        """
-        os.kill(self.process.pid, signal.SIGSTOP)
-        deadline = time.monotonic() + END_S
-        alive = True
-        while alive and time.monotonic() < deadline:
-            alive = False
-            with contextlib.suppress(psutil.NoSuchProcess):
-                for child in reversed(
-                    self.root.children()
-                ):  # the youngest first, before its parent forks another
-                    alive |= child.status() != psutil.STATUS_ZOMBIE
-                    child.kill()
 
 
 def _end(status: str, message: str) -> Row:
