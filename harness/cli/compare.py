@@ -21,7 +21,7 @@ LEFT_OUT = ("seconds", "status")  # for whole lines on a terminal
 
 
 def compare(
-    old: Annotated[str, typer.Argument(metavar="OLD", help="Directory that `run` wrote, or DIR@COMMIT.")],
+    old: Annotated[str, typer.Argument(metavar="OLD", help="Directory that `run` wrote.")],
     new: Annotated[list[str], typer.Argument(metavar="NEW...", help="Those to compare with it.")],
     max_digits_lost: Annotated[float, option("N", "Digits of the error that may be lost.", min=0.0)] = 1.0,
     max_slowdown: Annotated[
@@ -34,13 +34,11 @@ def compare(
 
     Worse is a worse verdict, more digits of the error lost than allowed, a time per load case beyond the
     allowed ratio and beyond the noise of both sides, or a measurement that is missing. Every NEW is compared
-    with OLD. DIR@COMMIT are the rows of one commit alone, those that `run` has set aside included. Times are
-    compared if both sides are of one machine.
+    with OLD. Times are compared if both sides are of one machine.
 
     \b
     Examples:
       python -m harness compare results/published/default results/default
-      python -m harness compare results/gate@1a2b3c4 results/gate@5d6e7f8
       python -m harness compare before after --max-digits-lost 0.5 --max-slowdown 2 --out compared
 
     \b
@@ -64,8 +62,7 @@ def compare(
 def _compared(old: Side, new: Side, max_digits_lost: float, max_slowdown: float | None) -> Comparison:
     import pandas as pd
 
-    from harness.results.incomparable import Incomparable
-    from harness.results.sides import measurement, refuse_incomparable
+    from harness.results.sides import Incomparable, measurement, refuse_incomparable
     from report.analysis.comparison import compared
     from report.document.escape import quoted
     from report.results.rows import of_records

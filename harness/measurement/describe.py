@@ -1,10 +1,12 @@
-"""The forms, versions and faulty options of a suite's solvers, found in a separate process.
+"""The forms, versions, code and faulty options of a suite's solvers.
 
-A library that prints, crashes or hangs while it is imported then does no harm, and the driver imports none.
+Libraries and plug-ins are asked in a process of their own: one that prints, crashes or hangs while it is
+imported then does no harm, and the driver imports none. The project's own methods are asked here.
 """
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -15,12 +17,14 @@ from harness.results.records import Row
 from harness.solving.answers import shown
 from problems.errors import Fault, InputError
 from problems.forms.names import FORMS, default_form
-from solvers.base import Form
+from problems.storage.fingerprint import ROOT, fingerprint
+from solvers.base import Form, Solver
+from solvers.plugin import own_files
+from solvers.registry import make_solver, owner_of, solver_version
 
 from .child import Events
 from .environments import interpreter, refuse_other_copies
 from .monitored import Monitored
-from .solver_code import code_of
 
 IMPORT_S = 60.0  # for the imports of all the solvers
 IMPORT_MIB = 8192
@@ -78,6 +82,8 @@ def described(
     where : what names them. doing : called with what is being imported, again and again.
     requirements : what the environment has in other versions than this one.
     """
+    if not requirements and all(owner_of(name) != "library" for name, _ in solvers):
+        return found_here(solvers, None)
     name, job = "the solvers", (list(solvers), Path(plugin) if plugin else None, requirements)
     python = interpreter(requirements, doing)
     limits = {"importing the solvers": IMPORT_S}
@@ -101,14 +107,23 @@ def refuse_unimportable(end: Row, process: Monitored, where: str | Path, name: s
 def describe_here(
     job: tuple[list[tuple[str, dict[str, Any]]], Path | None, Sequence[str]], events: Events
 ) -> Row:
-    """The descriptions; in the process of its own. Raises InputError, all faults at once."""
-    from solvers.registry import make_solver, owner_of, solver_version
-
+    """The same, in the process of its own."""
     solvers, plugin, requirements = job
+    found = found_here(solvers, plugin, lambda name: events.report(name=name))
+    refuse_other_copies(requirements)
+    return {"found": [asdict(each) for each in found]}
+
+
+def found_here(
+    solvers: Sequence[tuple[str, dict[str, Any]]],
+    plugin: Path | None,
+    begin: Callable[[str], None] = lambda name: None,
+) -> list[Description]:
+    """The descriptions, made in this process. Raises InputError, all faults at once."""
     found: list[Description] = []
     faults: list[Fault] = []
     for name, options in solvers:
-        events.report(name=name)
+        begin(name)
         try:
             solver = make_solver(name, options, plugin)
             forms = solver.forms
@@ -122,5 +137,15 @@ def describe_here(
             faults += error.faults
     if faults:
         raise InputError(faults)
-    refuse_other_copies(requirements)
-    return {"found": [asdict(each) for each in found]}
+    return found
+
+
+def code_of(solver: Solver) -> str:
+    """The fingerprint of the code that can change a solver's answer or its time.
+
+    This is its own file and what that imports from the package `solvers`, directly or indirectly; of a
+    plug-in also what it imports of the user's own. The version of the library is a field of its own.
+    """
+    file = Path(inspect.getfile(type(solver)))
+    files = [file] if ROOT / "solvers" in file.parents else own_files(file)
+    return fingerprint(files, within=["solvers"])

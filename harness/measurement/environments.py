@@ -12,6 +12,8 @@ import site
 import subprocess
 import sys
 import sysconfig
+import tempfile
+import time
 from collections.abc import Callable, Sequence
 from importlib.metadata import distribution
 from pathlib import Path
@@ -32,7 +34,7 @@ def interpreter(requirements: Sequence[str], doing: Callable[[str], None] = lamb
     """The Python that has these packages, each NAME==VERSION; without any, this one.
 
     The first call makes the environment, later ones find it. doing : called with what is being installed,
-    again and again. Raises InputError if pip fails; then there is no environment.
+    again and again. Raises InputError if pip fails; the next call tries anew.
     """
     if not requirements:
         return sys.executable
@@ -42,26 +44,21 @@ def interpreter(requirements: Sequence[str], doing: Callable[[str], None] = lamb
     with cache.lock(key):
         if not ((folder / COMPLETE).is_file() and python.exists()):  # else one was cut off, or its base moved
             shutil.rmtree(folder, ignore_errors=True)
-            try:
-                _make(folder, python, requirements, doing)
-            except BaseException:
-                shutil.rmtree(folder, ignore_errors=True)
-                raise
+            _make(folder, python, requirements, doing)
             (folder / COMPLETE).touch()
     return str(python)
 
 
 def _make(folder: Path, python: Path, requirements: Sequence[str], doing: Callable[[str], None]) -> None:
-    what = f"installing {' '.join(requirements)}"
     known = ["--without-pip"] if importlib.util.find_spec("pip") else []  # it sees that of this interpreter
-    _called([sys.executable, "-m", "venv", *known, str(folder)], requirements, lambda: doing(what))
+    _called([sys.executable, "-m", "venv", *known, str(folder)], requirements, doing)
     own = sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)})
     lines = [f"import site; site.addsitedir({folder!r})" for folder in _packages()]
     (Path(own) / PARENT).write_text("\n".join([CMEEL, *lines, ""]), "utf-8")
     pip = [str(python), "-I", "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
     # First what is asked for, even if this interpreter has it; then what that needs and nobody has.
     for more in (["--ignore-installed", "--no-deps"], []):
-        _called([*pip, *more, *requirements], requirements, lambda: doing(what))
+        _called([*pip, *more, *requirements], requirements, doing)
 
 
 def _packages() -> list[str]:
@@ -81,25 +78,24 @@ def refuse_other_copies(requirements: Sequence[str]) -> None:
                 raise InputError.one("--with", library, version, f"another copy is imported: {other}")
 
 
-def _called(command: Sequence[str], requirements: Sequence[str], doing: Callable[[], None]) -> None:
+def _called(command: Sequence[str], requirements: Sequence[str], doing: Callable[[str], None]) -> None:
     """Wait for a command. Raises InputError with the end of what it printed if it fails."""
-    nothing, pipe, same = subprocess.DEVNULL, subprocess.PIPE, subprocess.STDOUT
-    with subprocess.Popen(
-        command, stdin=nothing, stdout=pipe, stderr=same, text=True, errors="replace"
-    ) as process:
+    nothing, same = subprocess.DEVNULL, subprocess.STDOUT
+    with (
+        tempfile.TemporaryFile() as printed,
+        subprocess.Popen(command, stdin=nothing, stdout=printed, stderr=same) as process,
+    ):
         try:
-            while True:
-                try:
-                    printed, _ = process.communicate(timeout=POLL_S)
-                    break
-                except subprocess.TimeoutExpired:
-                    doing()
-        except BaseException:
+            while process.poll() is None:
+                doing(f"installing {' '.join(requirements)}")
+                time.sleep(POLL_S)
+        finally:
             process.kill()
-            raise
+        printed.seek(0)
+        text = printed.read().decode(errors="replace")
     if process.returncode:
         library, _, version = requirements[0].partition("==")
         allowed = f"pip cannot install it: `pip index versions {library}` lists all; run again to retry"
-        said = [line.strip() for line in printed.splitlines() if line.strip()]
+        said = [line.strip() for line in text.splitlines() if line.strip()]
         last = [line for line in said if not line.startswith("WARNING")][-LAST_LINES:]
         raise InputError.one("--with", library, version, "\n".join([allowed, *last]))

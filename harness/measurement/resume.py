@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from harness.planning.due import OUT_OF_TIME
 from harness.planning.plan import Measurement
-from harness.planning.timeouts import OUT_OF_TIME
 from harness.results import records
 from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
@@ -21,8 +21,8 @@ NEEDED = ("key", "scene", "status", "time_limit_s", "memory_limit_mib")
 def resumed(directory: Path, plan: list[Measurement], solvers: Solvers, console: Console) -> list[Row]:
     """The valid rows of DIRECTORY; outdated ones are moved to a file of their own."""
     path = directory / records.MEASUREMENTS
-    if records.move_torn_line(path):
-        console.print(f"{path}: the last line was torn; it is now in {records.TORN}", style="yellow")
+    if records.remove_torn_line(path):
+        console.print(f"{path}: the last line was torn, and is measured again", style="yellow")
     rows = records.read(path)
     refuse_wrong_kinds(path, rows, needed=NEEDED)
     planned = {m.key: m for m in plan}

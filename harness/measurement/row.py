@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.planning.plan import Measurement
-from harness.results.machine import installed_version, machine
-from harness.results.provenance import provenance
+from harness.results.provenance import installed_version, machine, provenance
 from harness.results.records import Row
 from harness.results.schema import MEASURED, MEASURED_OF_CASES, STEPS
 from harness.verification.judge import Judgement

@@ -5,23 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from harness.planning.memory import refuse_limits_too_low
-from harness.planning.one_row import of_key, with_key
-from harness.planning.plan import Measurement, expand
-from harness.planning.search import due
-from harness.planning.stopping import stopped_at
+from harness.planning.due import due, predicted_timeout, stopped_at
+from harness.planning.plan import Measurement, expand, of_key, with_key
 from harness.planning.suite import Suite, to_toml
-from harness.planning.timeouts import predicted_timeout
 from harness.results import records
-from harness.results.machine import machine
-from harness.results.provenance import provenance
+from harness.results.provenance import machine, provenance
 from harness.results.records import Row
 from harness.terminal.console import waiting
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
@@ -58,7 +53,6 @@ def run(
     suite = with_forms(suite, descriptions)
     solvers = {(e.name, e.label): d for e, d in zip(suite.solver, descriptions, strict=True)}
     plan = expand(suite) if key is None else of_key(expand(suite), key)
-    refuse_limits_too_low(plan)
     with records.locked(directory):
         rows = resumed(directory, plan, solvers, console)
         records.replace_text(directory / "suite.toml", to_toml(suite))
@@ -93,14 +87,8 @@ def with_forms(suite: Suite, descriptions: list[Description]) -> Suite:
     return suite.model_copy(update={"solver": filled})
 
 
-@dataclass(frozen=True)
-class Pending:
-    """A task that is being done, and the problem that its answers are judged on."""
-
-    task: Task
-    problem: ReferenceProblem
-
-
+#: A task that is being done, and the problem that its answers are judged on.
+Pending = tuple[Task, ReferenceProblem]
 #: Does tasks, each beside what stays here; gives back the latter with the result, or what was raised.
 Outcomes = Callable[[Iterator[tuple[Pending, Task]]], Iterator[tuple[Pending, TaskResult | BaseException]]]
 
@@ -129,8 +117,8 @@ def measure_remaining(
     """Make the measurements and append their rows. `rows` are those of DIRECTORY so far."""
     rows = list(rows)
     with Display(console, len(remaining), done) as display:
-        for pending, outcome in outcomes(pending_tasks(remaining, rows, directory, solvers, display)):
-            batch = pending.task.batch
+        for (task, problem), outcome in outcomes(pending_tasks(remaining, rows, directory, solvers, display)):
+            batch = task.batch
             if isinstance(outcome, BaseException):
                 why = f"{type(outcome).__name__}: {outcome}".splitlines()[0]
                 console.print(f"{batch[0].key}: not measured: {why}", style="red")
@@ -138,7 +126,7 @@ def measure_remaining(
             of_worker = origin
             if outcome.machine and outcome.code:
                 of_worker = {"machine": record_machine(directory, outcome.machine), **outcome.code}
-            new = rows_of(pending.task, outcome, pending.problem, directory, of_worker)
+            new = rows_of(task, outcome, problem, directory, of_worker)
             records.append(directory / records.MEASUREMENTS, *new)
             rows += new
             for row in new:
@@ -169,7 +157,7 @@ def pending_tasks(
         batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]
         timed_out_on = predicted_timeout(batch[0], problem.prepared.assembly.asked, rows)
         task = Task(batch, solvers[m.solver, m.variant], timed_out_on)
-        yield Pending(task, problem), task
+        yield (task, problem), task
 
 
 def batches(remaining: list[Measurement]) -> list[list[Measurement]]:

@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from harness.results.machine import PACKAGES, installed_version, usable_cores
+from harness.results.provenance import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
 from problems.storage.fingerprint import ROOT, fingerprint
 
@@ -78,22 +78,26 @@ def _connected(client: Any, scheduler: str) -> tuple[Executor, int]:
     ]
     if not threads:
         faults.append(Fault("--scheduler", "scheduler", scheduler, "has no worker; start one: dask worker"))
-    here = versions()
-    for who, theirs in _versions_of(client).items():
-        faults += other_versions(who, here, theirs)
+    faults += _other_versions(client)
     if faults:
         raise InputError(faults)
     return client.get_executor(pure=False, retries=RETRIES), len(threads)
 
 
-def _versions_of(client: Any) -> dict[str, dict[str, str]]:
-    """The versions of the scheduler and of each worker. Raises InputError if one lacks these packages."""
+def _other_versions(client: Any) -> list[Fault]:
+    """A fault for each package that a worker has in another version. Raises InputError if one lacks these."""
+    here = versions()
     try:
-        scheduler = {"scheduler": client.run_on_scheduler(versions)}
-        return scheduler | {f"worker {name}": found for name, found in client.run(versions).items()}
+        found = client.run(versions)
     except Exception as error:  # an import failed there
         allowed = "install rivetbench for the scheduler and its workers, or start them with PYTHONPATH"
         raise InputError.one("--scheduler", "import", str(error), allowed) from error
+    return [
+        Fault(f"worker {address}", name, there.get(name), f"the driver has {version}: install the same")
+        for address, there in found.items()
+        for name, version in here.items()
+        if there.get(name) != version
+    ]
 
 
 def versions() -> dict[str, str]:
@@ -101,15 +105,6 @@ def versions() -> dict[str, str]:
     code = fingerprint(file for folder in CODE for file in (ROOT / folder).rglob("*.py"))
     packages = {name: installed_version(name) for name in PACKAGES}
     return {"python": platform.python_version(), **packages, "code": code}
-
-
-def other_versions(who: str, here: dict[str, str], there: dict[str, str]) -> list[Fault]:
-    """A fault for each package that a worker has in another version."""
-    return [
-        Fault(who, name, there.get(name), f"the driver has {version}: install the same")
-        for name, version in here.items()
-        if there.get(name) != version
-    ]
 
 
 def done_as_completed(

@@ -1,24 +1,117 @@
-"""The form in which a scene is solved, where none is asked for.
+"""The memory that a scene will need in each form, and the form in which it is solved where none is asked for.
 
-The sparse form, unless the solver takes dense forms only, Q is in the cache, its dense matrices are small, or
-it is solved for so many load cases that condensing pays.
+The memory is counted from the entries of the matrices, before they are built. The dense forms keep K and its
+factors, Σ 2 b² entries for blocks of b unknowns, and Q, m² entries. The sparse form keeps the factors of K̂,
+Σ N (w + 1) entries for blocks of N unknowns and half-bandwidth w.
+
+The form is the sparse one, unless the solver takes dense forms only, Q is in the cache, or the dense matrices
+are small for the number of load cases that share them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import log2
 
-from harness.results.machine import physical_memory_mib
+from harness.results.provenance import physical_memory_mib
 from problems.build import model_of
 from problems.errors import InputError
 from problems.forms.names import DENSE_FORMS, Form, default_form
-from problems.model.scene import JointScene, Scene
+from problems.input.user_matrices import SMALL, holds_sparse, stored_matrices
+from problems.model.effect import SpringEffect
+from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
+from problems.stiffness.dense import dense_slices
 
-from .memory import Size, refuse_what_cannot_fit, size_of
+SMALL_MIB = 100.0  # of dense matrices, per load case
+MIB = 2**20
+PROCESS_MIB = 150  # without matrices
+MODEL_BYTES = 1500  # while K̂ is assembled, per unknown; measured at n = 4386 and 11308
+BYTES_PER_ENTRY = 200  # of a given K and its copies in sparse storage
+# Where the band is wide, a fill-reducing order: 31/4 n² log₂ n entries on an n × n grid (George 1973), with 4
+# unknowns per node, L and U, and their indices. Per unknown and log₂ of the nodes:
+GENERAL = 31 / 4 / 2 * 4 * 2 * 1.5
+FACTORS = 2  # of K̂ at a time: to solve with, and to prove λmin
 
-SMALL_MIB = 100.0  # of dense matrices
-MANY = 100  # load cases
+
+@dataclass(frozen=True)
+class Size:
+    """n unknowns, m contacts; MiB of the stored matrices, and of the process at its peak, in either form.
+
+    unknowns, half_bandwidth : of the finite-element model, without a condensation.
+    """
+
+    n: int
+    m: int
+    dense_mib: float
+    dense_peak_mib: float
+    sparse_mib: float
+    sparse_peak_mib: float
+    unknowns: int
+    half_bandwidth: int | None = None
+
+    def peak_mib(self, form: Form) -> float:
+        return self.dense_peak_mib if form in DENSE_FORMS else self.sparse_peak_mib
+
+
+def size_of(scene: Scene) -> Size | None:
+    """Of a joint, or of sparse matrices; None for matrices that are arrays, which then fit, or small."""
+    match scene:
+        case JointScene():
+            return _of_joint(scene)
+        case ManufacturedScene() if scene.sparse and sum(scene.block_sizes) > SMALL:
+            assembly = scene.made.assembly
+        case MatricesScene() if holds_sparse(files := dict(scene.files)):
+            assembly = stored_matrices(files, scene.assembly_key, sparse=True)[0]
+        case _:
+            return None
+    K = assembly.K.matrix
+    blocks = [rows.stop - rows.start for rows in dense_slices(K)]
+    sparse = 8 * assembly.K.numbers / MIB
+    peak = PROCESS_MIB + FACTORS * sparse + BYTES_PER_ENTRY * K.nnz / MIB
+    return Size(assembly.n, assembly.m, *_dense(blocks, assembly.m), sparse, peak, assembly.n)
+
+
+def _dense(blocks: Sequence[int], m: int) -> tuple[float, float]:
+    """MiB of K, its factors and Q, and at the peak: with a copy of the largest block and of Q."""
+    stored = 8 * (2 * sum(block**2 for block in blocks) + m**2) / MIB
+    return stored, PROCESS_MIB + stored + 8 * (max(blocks) ** 2 + m**2) / MIB
+
+
+def _of_joint(scene: JointScene) -> Size:
+    """From the numbering of the full model; springs between parts are taken to make one block of all.
+
+    An element joins a node, with 4 unknowns, to the next on the next line: 4 (nodes per line + 1) + 3.
+    """
+    joint, tied = scene.joint, any(scene.effects_of(SpringEffect))
+    (n, m), (nx, ny) = joint.size, joint.junction.nodes
+    dense = _dense([n] if tied else [joint.node_count] * len(joint.part), m)
+    # The grid lines y = const of each part that are not built in.
+    lines = [
+        ny + sum(side.elements for side in (part.south, part.north) if side) - len(set(part.clamped))
+        for part in joint.part
+    ]
+    blocks = [lines] if tied else [[count] for count in lines]
+    bands = [(4 * nx * sum(block), 4 * min(sum(block), nx * len(block)) + 7) for block in blocks]
+    entries = sum(size * (min(width, GENERAL * log2(size / 4)) + 1) for size, width in bands)
+    unknowns = sum(size for size, _ in bands)
+    peak = PROCESS_MIB + (MODEL_BYTES * unknowns + 8 * FACTORS * entries) / MIB
+    return Size(n, m, *dense, 8 * entries / MIB, peak, unknowns, max(width for _, width in bands))
+
+
+def refuse_what_cannot_fit(scene: Scene, size: Size | None, form: Form) -> None:
+    """Raise InputError where a form's matrices of a scene need more memory than this machine has."""
+    physical = physical_memory_mib()
+    if size is None or size.peak_mib(form) <= physical:
+        return
+    allowed = f"a {form} form needs about {size.peak_mib(form):.0f} MiB, this machine has {physical}"
+    if form in DENSE_FORMS and size.sparse_peak_mib <= physical:
+        allowed += f"; the sparse form (--form sparse) needs {size.sparse_peak_mib:.0f}"
+    if isinstance(scene, JointScene):
+        nodes = list(scene.joint.junction.nodes)
+        raise InputError.one(scene.name, "junction.nodes", nodes, f"fewer nodes: {allowed}")
+    assert isinstance(scene, MatricesScene | ManufacturedScene)
+    raise InputError.one(scene.source_of("K"), "K", f"{size.n} unknowns", allowed)
 
 
 @dataclass(frozen=True)
@@ -48,6 +141,6 @@ def _by_rule(scene: Scene, size: Size | None, taken: Sequence[Form], cases: int)
         return Choice(default_form(dense or taken))
     fits = size.dense_peak_mib <= physical_memory_mib()
     cached = isinstance(scene, JointScene) and model_of(scene).built
-    if fits and (cached or cases >= MANY or size.dense_mib <= SMALL_MIB):
+    if fits and (cached or size.dense_mib <= SMALL_MIB * cases):
         return Choice(default_form(dense))
     return Choice("sparse", f"dense matrices would take {size.dense_mib:.0f} MiB")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -55,7 +55,8 @@ def overridden(suite: Suite, change: Overrides) -> Suite:
     if change.scenes:
         data["scenes"] = resolved_scenes(list(change.scenes), "--scene", "scene", Path.cwd(), faults)
     if change.sizes:
-        sizes = dict(_sizes(data["scenes"])) if not faults else {}
+        known = {scene: read_scene(scene).expected_size for scene in ([] if faults else data["scenes"])}
+        sizes = {scene: size[0] for scene, size in known.items() if size is not None}
         for size in set(change.sizes) - set(sizes.values()):
             allowed = ", ".join(map(str, sorted(set(sizes.values()))))
             faults.append(Fault("--size", "size", size, f"no scene of that size here; allowed: {allowed}"))
@@ -130,13 +131,6 @@ def _set_options(entries: list[dict[str, Any]], options: Sequence[str], faults: 
             for entry in entries:
                 if entry["name"] == name:
                     entry["options"] = entry.get("options", {}) | {key: parsed}
-
-
-def _sizes(scenes: list[str]) -> Iterator[tuple[str, int]]:
-    for scene in scenes:
-        size = read_scene(scene).expected_size
-        if size is not None:
-            yield scene, size[0]
 
 
 def tolerances_of(words: Sequence[str]) -> tuple[float, ...] | Literal["auto"]:

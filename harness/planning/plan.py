@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import random
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -28,8 +28,8 @@ class Measurement:
     """One solver on one scene in one form: what one process will do.
 
     scene : the name in the tables; source : what `read_scene` takes, a name or an absolute path.
-    searched, paced : it may turn out to need no measuring (search.py).
-    stop : why its time limit is tighter than the suite's, or "" (stopping.py).
+    searched, paced : it may turn out to need no measuring (due.py).
+    stop : why its time limit is tighter than the suite's, or "" (due.py).
     requirements : what its environment has in other versions than this one.
     """
 
@@ -188,3 +188,32 @@ def _rounds(repeats: int | str) -> int:
 
 def _applies(entry: SolverEntry, name: str, source: str) -> bool:
     return entry.scenes is None or any(fnmatchcase(name, glob) or glob == source for glob in entry.scenes)
+
+
+def with_key(suite: Suite, key: str) -> Suite:
+    """The suite with the scene and the solver entries that a row's key names. Raises InputError."""
+    scenes = [scene for scene in suite.scenes if key.startswith(f"{read_scene(scene).name} ")]
+    words = key.split()
+    entries = [e for e in suite.solver if {e.name, *e.label.split()} <= set(words)]
+    if not scenes or not entries:
+        raise _unknown(suite.name, key)
+    return suite.model_copy(update={"scenes": scenes, "solver": entries})
+
+
+def of_key(plan: Sequence[Measurement], key: str) -> list[Measurement]:
+    """The measurement with this key. A load case of a series comes after those that its process solves before
+    it, because its start depends on them. Raises InputError.
+    """
+    chosen = next((m for m in plan if m.key == key), None)
+    if chosen is None:
+        raise _unknown(plan[0].suite, key)
+    if chosen.case is None:
+        return [chosen]
+    batch = chosen.batched or 1
+    end = (chosen.case // batch + 1) * batch
+    same = (m for m in plan if (m.process, m.batched) == (chosen.process, chosen.batched))
+    return [m for m in same if m.case is not None and m.case < end]
+
+
+def _unknown(suite: str, key: str) -> InputError:
+    return InputError.one("--key", "key", key, f"the `key` of a row that suite {suite} plans, in full")

@@ -72,7 +72,7 @@ class SolverEntry(BaseModel):
 
     The default of `forms` is the dual, or the primal if the solver takes no other. `threads` and `cases`
     override the suite's. "auto" as tolerances searches for the loosest decade that reaches the limit on each
-    scene, as repeats it repeats what is quick (see search.py). batched : load cases of a series solved at
+    scene, as repeats it repeats what is quick (see due.py). batched : load cases of a series solved at
     once, by the solver's `batched`. with = ["piqp==0.6.2"] measures it in an environment that has this
     version of its library, and what else is listed.
     """
@@ -124,7 +124,7 @@ class Suite(BaseModel):
 
     yardstick measures a Cholesky factorisation of Q and a product Qv after each solve, in its process.
     time_limit_by_size_s, as in { 11308 = 80 }, is for scenes of that size n; time_limit_s for the rest.
-    stop_at_times_fastest stops what takes that many times as long as the fastest library (stopping.py).
+    stop_at_times_fastest stops what takes that many times as long as the fastest library (due.py).
     after reference_limit_s no further method is tried for a reference; by default 60 s per thousand
     contacts, at least 60.
     """
@@ -192,8 +192,7 @@ def validated(data: dict[str, Any], path: Path, faults: Sequence[Fault] = ()) ->
     except ValidationError as error:
         faults += validation_faults(path, Suite, error)
     else:
-        faults += [*_indistinguishable(suite, path), *_without_series(suite, path)]
-        faults += _searched_in_series(suite, path)
+        faults += [*_indistinguishable(suite, path), *_of_series(suite, path)]
     if faults:
         raise InputError(faults)
     return suite
@@ -258,22 +257,21 @@ def _indistinguishable(suite: Suite, path: Path) -> Iterator[Fault]:
             yield Fault(str(path), f"solver.{k}.variant", entry.variant, allowed)
 
 
-def _searched_in_series(suite: Suite, path: Path) -> Iterator[Fault]:
+def _of_series(suite: Suite, path: Path) -> Iterator[Fault]:
+    """What only a suite with [series] has, and what such a suite has not."""
     places: list[tuple[str, Suite | SolverEntry]] = [("", suite)]
     places += [(f"solver.{k}.", entry) for k, entry in enumerate(suite.solver)]
-    for where, entry in places:
-        for key in ("tolerances", "repeats"):
-            if suite.series is not None and getattr(entry, key) == "auto":
-                yield Fault(
-                    str(path), where + key, "auto", "numbers: a suite with [series] searches for none"
-                )
-
-
-def _without_series(suite: Suite, path: Path) -> Iterator[Fault]:
-    for k, entry in enumerate(suite.solver):
-        for key in ("cases", "batched"):
-            if suite.series is None and (value := getattr(entry, key)) is not None:
-                yield Fault(str(path), f"solver.{k}.{key}", value, "needs a suite with [series]")
+    for where, place in places:
+        if suite.series is None:
+            wrong = {key: getattr(place, key, None) for key in ("cases", "batched")}
+            allowed = "needs a suite with [series]"
+        else:
+            wrong = {key: getattr(place, key) for key in ("tolerances", "repeats")}
+            wrong = {key: value for key, value in wrong.items() if value == "auto"}
+            allowed = "numbers: a suite with [series] searches for none"
+        for key, value in wrong.items():
+            if value is not None:
+                yield Fault(str(path), where + key, value, allowed)
 
 
 def to_toml(suite: Suite) -> str:

@@ -1,15 +1,19 @@
-"""The code that made a row: its commit and whether it had changes, or else its version."""
+"""What made a row: the machine, its memory and versions; the code, its commit and whether it had changes."""
 
 from __future__ import annotations
 
-import json
 import os
+import platform
 import subprocess
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
+
+import psutil
 
 from problems import __version__
 
+PACKAGES = ("rivetbench", "numpy", "scipy", "qpsolvers", "osqp", "clarabel", "proxsuite", "piqp")
 #: The folder that holds the project's packages.
 ROOT = Path(__file__).resolve().parents[2]
 #: What can change a row; what only shows rows, and results that are written meanwhile, are not part of it.
@@ -31,11 +35,9 @@ def commit() -> tuple[str, bool | None]:
 
     In a git work tree of the project, the 40 hexadecimal digits of the last commit that changed CODE, so that
     one to documents or results is no other code, and whether CODE has no changes; an untracked file is one,
-    because plug-ins are found by discovery. If pip installed the packages from
-    a git repository, the commit it recorded (PEP 610), which is clean. Otherwise, or if git is missing,
-    the version and None, not known.
+    because plug-ins are found by discovery. Otherwise, or if git is missing, the version and None, not known.
     """
-    return _of_work_tree() or _of_installation() or (__version__, None)
+    return _of_work_tree() or (__version__, None)
 
 
 def _of_work_tree() -> tuple[str, bool | None] | None:
@@ -66,13 +68,72 @@ def _git(*arguments: str) -> str | None:
     return done.stdout if done.returncode == 0 else None
 
 
-def _of_installation() -> tuple[str, bool] | None:
-    """The commit that the distribution holding these packages was installed from, if it was recorded."""
+def machine() -> dict[str, Any]:
+    """CPU, cores, memory, system, BLAS kernels and versions; `machine` names it in one line."""
+    cpu, cores = _cpu_model(), usable_cores()
+    system = f"{platform.system()} {platform.release()}"
+    return {
+        "machine": f"{cpu}, {cores} cores, {system}",
+        "cpu": cpu,
+        "cores": cores,
+        "memory_mib": physical_memory_mib(),
+        "system": system,
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        "blas": _blas(),
+        "versions": {name: installed_version(name) for name in PACKAGES},
+    }
+
+
+def usable_cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def physical_memory_mib() -> int:
+    return int(psutil.virtual_memory().total // 2**20)
+
+
+def resident_mib(name: str) -> float | None:
+    """Resident memory of this process, now (VmRSS) or at its highest (VmHWM), MiB.
+
+    (ru_maxrss also counts the process before exec on Linux.)
+    """
     try:
-        installed = distribution("rivetbench")
-        origin = json.loads(installed.read_text("direct_url.json") or "{}")
-    except (PackageNotFoundError, ValueError):
+        status = Path("/proc/self/status").read_text()
+    except OSError:
         return None
-    installed_here = Path(str(installed.locate_file("harness"))).resolve() == ROOT / "harness"
-    digits = origin.get("vcs_info", {}).get("commit_id")
-    return (digits, True) if installed_here and digits else None
+    return int(status.partition(f"{name}:")[2].split()[0]) / 1024
+
+
+def installed_version(package: str) -> str:
+    """The version of a package or "unknown"; rivetbench's is that of the running code."""
+    if package == "rivetbench":
+        return __version__
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _cpu_model() -> str:
+    info = Path("/proc/cpuinfo")
+    for line in info.read_text().splitlines() if info.exists() else []:
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def blas_kernels(pools: list[dict[str, Any]]) -> list[str]:
+    """Library, version and architecture of the BLAS among the pools of threadpoolctl."""
+    names = ("internal_api", "version", "architecture")
+    blas = [pool for pool in pools if pool["user_api"] == "blas"]
+    return sorted({" ".join(str(pool[name]) for name in names if pool.get(name)) for pool in blas})
+
+
+def _blas() -> list[str]:
+    """The BLAS libraries of numpy and scipy."""
+    import scipy.linalg  # noqa: F401  loads scipy's own
+    import threadpoolctl
+
+    return blas_kernels(threadpoolctl.threadpool_info())

@@ -1,7 +1,7 @@
 """The files of a results directory: rows that survive however the run ends.
 
 A row is one JSON line in measurements.jsonl, appended and synced before the next measurement starts. An
-abrupt end can only leave a torn last line, which is moved to a file of its own.
+abrupt end can only leave a torn last line, which the next run removes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from .schema import CRC, SERIES
 Row = dict[str, Any]
 
 MEASUREMENTS = "measurements.jsonl"
-TORN = "measurements.torn"
 OUTDATED = "measurements.outdated.jsonl"
 ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read
 
@@ -82,7 +81,7 @@ def read(path: Path) -> list[Row]:
             path,
             f"line {len(rows) + 1}",
             torn.decode(errors="replace"),
-            "torn by an interrupted run; `run` into the same directory sets it aside and continues",
+            "torn by an interrupted run; `run` into the same directory removes it and continues",
         )
     return rows
 
@@ -92,12 +91,10 @@ def read_complete_rows(path: Path) -> list[Row]:
     return _split(path)[0]
 
 
-def move_torn_line(path: Path) -> bool:
-    """Move a torn last line into measurements.torn; returns whether there was one."""
+def remove_torn_line(path: Path) -> bool:
+    """Remove a torn last line; returns whether there was one."""
     _, torn = _split(path)
     if torn:
-        with path.with_name(TORN).open("ab") as file:
-            file.write(torn + b"\n")
         os.truncate(path, path.stat().st_size - len(torn))
     return bool(torn)
 

@@ -1,27 +1,41 @@
-"""The rows of the two sides of a comparison, and whether they can be compared."""
+"""The rows of the two sides of a comparison, whether they can be compared, and the digits that one lost.
+
+Digits lost between two errors of the same measurement:
+
+    log10( max(after, floor) / max(before, floor) ),    floor = max(bound, NEGLIGIBLE · limit)
+
+bound is the error bound of the reference: below it, a difference says nothing of the answers. What lies a
+million times below the limit is not worth a difference either.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import isclose
+from math import isclose, log10
 from pathlib import Path
 
 from problems.errors import Fault, InputError
 
-from .incomparable import Incomparable
 from .kinds import MAX_FAULTS, refuse_wrong_kinds
-from .records import MEASUREMENTS, OUTDATED, Row, read
+from .records import MEASUREMENTS, Row, read
 
 #: What a comparison needs of a row.
 NEEDED = ("scene", "solver", "form", "tolerance", "status", "verdict")
 SAME_LIMIT = 1e-3  # relative; on a rung of a ladder, the limit is computed
-FEWEST_DIGITS = 4  # of a commit
+NEGLIGIBLE = 1e-6
+
+
+class Incomparable(InputError):
+    """Inputs that are each sound but do not belong together; commands end with an exit code of its own.
+
+    They are of different problems, limits, machines or suites, or an answer has another problem's length.
+    """
 
 
 @dataclass(frozen=True)
 class Side:
-    """Rows to compare. name : as the user gave it, DIR or DIR@COMMIT."""
+    """Rows to compare. name : the directory as the user gave it."""
 
     name: str
     rows: list[Row]
@@ -32,29 +46,14 @@ class Side:
 
 
 def read_side(name: str, key: str | None = None) -> Side:
-    """The rows of DIR, or of DIR@COMMIT: those that this commit measured, also where `run` has set them aside
-    since; with a key, only the row of that key. Raises InputError.
-    """
-    directory, at, commit = name.rpartition("@")
-    if Path(name).is_dir() or not at:
-        directory, at = name, ""
-    path = Path(directory) / MEASUREMENTS
+    """The rows of a directory; with a key, only the row of that key. Raises InputError."""
+    path = Path(name) / MEASUREMENTS
     if not path.is_file():
         raise InputError.one("DIR", "directory", name, f"has no {path.name}; `run` creates one")
-    files = (path.with_name(OUTDATED), path) if at else (path,)
-    rows: list[Row] = []
-    for file in files:
-        found = read(file)
-        refuse_wrong_kinds(file, found, needed=NEEDED)
-        rows += found
+    rows = read(path)
+    refuse_wrong_kinds(path, rows, needed=NEEDED)
     if not rows:
         raise InputError.one("DIR", "directory", name, f"{path.name} has no row yet")
-    if at:
-        known = sorted({str(row["commit"])[:12] for row in rows if row.get("commit")})
-        rows = [row for row in rows if str(row.get("commit")).startswith(commit)]
-        if len(commit) < FEWEST_DIGITS or len({row["commit"] for row in rows}) != 1:
-            allowed = f"a commit of these rows, at least {FEWEST_DIGITS} digits: {', '.join(known) or 'none'}"
-            raise InputError.one(directory, "commit", commit, allowed)
     if key is not None and not (rows := [row for row in rows if row.get("key") == key]):
         raise InputError.one("--key", "key", key, f"the key of a row in {name}")
     return Side(name, rows)
@@ -86,24 +85,30 @@ def refuse_incomparable(old: Side, new: Side) -> None:
         raise Incomparable.one(
             new.name, "suite", sorted({str(row.get("suite")) for row in new.rows}), allowed
         )
-    faults = list(dict.fromkeys([*_other_problems(old, new, shared), *_other_limits(old, new, shared)]))
+    faults = list(dict.fromkeys(fault for pair in shared for fault in _differences(old, new, *pair)))
     if faults:
         raise Incomparable(faults[:MAX_FAULTS])
 
 
-def _other_problems(old: Side, new: Side, shared: Sequence[tuple[Row, Row]]) -> Iterator[Fault]:
-    for one, other in shared:
-        for name in ("scene_key", "n", "m"):
-            values = one.get(name), other.get(name)
-            if None not in values and values[0] != values[1]:
-                allowed = f"another problem than in {old.name}, whose {name} is {values[0]}"
-                yield Fault(new.name, f"scene {other['scene']}", values[1], allowed)
-                break
+def _differences(old: Side, new: Side, one: Row, other: Row) -> Iterator[Fault]:
+    """Of the problem or of the limit, between two rows of one measurement."""
+    for name in ("scene_key", "n", "m"):
+        values = one.get(name), other.get(name)
+        if None not in values and values[0] != values[1]:
+            allowed = f"another problem than in {old.name}, whose {name} is {values[0]}"
+            yield Fault(new.name, f"scene {other['scene']}", values[1], allowed)
+            break
+    before, after = one.get("limit_mm"), other.get("limit_mm")
+    if before and after and not isclose(before, after, rel_tol=SAME_LIMIT):
+        allowed = f"another limit than in {old.name}: {before:g} mm"
+        yield Fault(new.name, f"limit_mm of {other['scene']}", after, allowed)
 
 
-def _other_limits(old: Side, new: Side, shared: Sequence[tuple[Row, Row]]) -> Iterator[Fault]:
-    for one, other in shared:
-        before, after = one.get("limit_mm"), other.get("limit_mm")
-        if before and after and not isclose(before, after, rel_tol=SAME_LIMIT):
-            allowed = f"another limit than in {old.name}: {before:g} mm"
-            yield Fault(new.name, f"limit_mm of {other['scene']}", after, allowed)
+def floor_mm(bound_mm: float, limit_mm: float) -> float:
+    """The smallest error that counts, mm."""
+    return max(bound_mm, NEGLIGIBLE * limit_mm)
+
+
+def digits_lost(before_mm: float, after_mm: float, floor: float) -> float:
+    """Negative if digits were gained. floor : positive."""
+    return log10(max(after_mm, floor) / max(before_mm, floor))

@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from harness.results.incomparable import Incomparable
+from harness.results.sides import Incomparable
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.progress import STYLES
 from harness.verification.judge import Judgement

@@ -18,8 +18,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from harness.results.machine import machine, resident_mib
-from harness.results.provenance import provenance
+from harness.results.provenance import machine, provenance, resident_mib
 from harness.terminal.exit_codes import DONE, FAILED
 from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM

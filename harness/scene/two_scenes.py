@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from harness.results.incomparable import Incomparable
+from harness.results.sides import Incomparable
 from harness.terminal.exit_codes import FAILED
 from problems.build import prepared
 from problems.model.scene import JointScene

@@ -8,9 +8,8 @@ import scipy.sparse as sp
 from rich.console import Console
 from rich.table import Table
 
-from harness.planning.form_choice import chosen_form
-from harness.planning.memory import size_of
-from harness.results.machine import physical_memory_mib
+from harness.planning.form_choice import chosen_form, size_of
+from harness.results.provenance import physical_memory_mib
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import model_of, prepared

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from harness.results import records, series_file
-from harness.results.machine import installed_version, machine
+from harness.results.provenance import installed_version, machine
 from harness.results.records import Row, to_line
 from harness.results.schema import SERIES, VERDICTS
 from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED

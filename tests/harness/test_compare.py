@@ -9,8 +9,7 @@ from commands import harness
 from synthetic_results import no_answer, row, write_rows
 from typer.testing import Result
 
-from harness.results.records import append
-from harness.results.sides import measurement, read_side
+from harness.results.sides import measurement
 
 
 def compare(*words: object) -> Result:
@@ -127,18 +126,6 @@ def test_times_of_other_machines_are_refused_and_accuracy_is_not(tmp_path: Path)
     assert compare(old, slow, "--max-slowdown", 2).exit_code == 5
     far = write_rows(tmp_path / "far", [row(machine="another", displacement_error_mm=9e-8)])
     assert compare(old, far).exit_code == 1
-
-
-def test_two_commits_of_one_directory(tmp_path: Path) -> None:
-    one, other = "1a2b3c" + 34 * "0", "5d6e7f" + 34 * "0"
-    append(tmp_path / "measurements.outdated.jsonl", row(commit=one))
-    append(tmp_path / "measurements.jsonl", row(commit=other, displacement_error_mm=9e-8))
-    done = compare(f"{tmp_path}@1a2b3c", f"{tmp_path}@5d6e7f")
-    assert done.exit_code == 1
-    assert "2.0 digits lost" in done.stdout
-    assert len(read_side(str(tmp_path)).rows) == 1
-    for commit in ("1a2", "9999", ""):
-        assert compare(tmp_path, f"{tmp_path}@{commit}").exit_code == 2
 
 
 def test_more_than_two_runs(tmp_path: Path) -> None:

@@ -1,23 +1,96 @@
-"""Which form a scene is solved in by default."""
+"""A scene's size and memory, before anything is built, and the form it is solved in by default."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
+from commands import harness
 
-from harness.planning import form_choice, memory
-from harness.planning.form_choice import chosen_form
+from harness.planning import form_choice
+from harness.planning.form_choice import chosen_form, refuse_what_cannot_fit, size_of
+from harness.scene import validate
+from problems.build import prepared
 from problems.errors import InputError
+from problems.forms.names import Form
 from problems.model.joint_model import JointModel
 from problems.scene import read_scene
+from problems.stiffness.band import half_bandwidth
 from solvers.base import FORMS
 
 LARGE, SMALL = read_scene("11308/4300"), read_scene("scaling/2522")
 DENSE = ("dual", "primal")
+GALLERY = ("three-part-stack", "installed-fasteners", "sheet-over-former", "plate-on-frame", "padded-panel")
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_the_sparse_forms_unknowns_bands_and_factors_are_known_before_they_are_made(name: str) -> None:
+    scene = read_scene(f"gallery/{name}")
+    estimate = size_of(scene)
+    assert estimate is not None
+    assert estimate.half_bandwidth is not None
+    data = prepared(scene, form="sparse")
+    assert not data.assembly.K.dense
+    assert (estimate.n, estimate.m) == (data.assembly.asked, data.assembly.m)
+    assert estimate.unknowns == data.assembly.n
+    assert estimate.half_bandwidth == max(map(half_bandwidth, data.assembly.K.matrices))
+    stored = 8 * data.assembly.K.numbers
+    assert estimate.sparse_mib == pytest.approx(stored / 2**20)
+
+
+def test_the_stored_matrices_of_the_dense_forms_are_known_before_they_are_made() -> None:
+    scene = read_scene("gallery/three-part-stack")
+    made = prepared(scene)
+    stored = sum(a.nbytes for a in (*made.assembly.K.matrices, *made.assembly.K.factors, made.Q))
+    estimate = size_of(scene)
+    assert estimate is not None
+    assert estimate.dense_mib == pytest.approx(stored / 2**20)
 
 
 def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (form_choice, memory):
+    for module in (form_choice, validate):
         monkeypatch.setattr(module, "physical_memory_mib", lambda: mib)
+
+
+@pytest.mark.parametrize(
+    ("scene", "form"), [("scaling/100352", "sparse"), ("4386/0107", "sparse"), ("scaling/1170", "dual")]
+)
+def test_validate_says_what_both_forms_take(scene: str, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    machine_of(24_000, monkeypatch)
+    done = harness("validate", scene)
+    said = " ".join(done.output.split())
+    assert done.exit_code == 0
+    assert "Dense forms: K, its factors and Q take" in said
+    assert f"One load case is solved in the {form} form" in said
+    if scene == "scaling/100352":
+        assert "the process up to 134606 MiB" in said
+        assert "634880 unknowns, half-bandwidth 395" in said
+
+
+@pytest.mark.parametrize("form", ["dual", "primal", "sparse"])
+def test_each_form_is_refused_by_what_it_needs(form: Form, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = read_scene("scaling/100352")
+    machine_of(24_000, monkeypatch)
+    if form == "sparse":
+        refuse_what_cannot_fit(scene, size_of(scene), form)
+    else:
+        with pytest.raises(InputError, match=r"the sparse form \(--form sparse\) needs 4\d{3}"):
+            refuse_what_cannot_fit(scene, size_of(scene), form)
+    machine_of(2_000, monkeypatch)
+    with pytest.raises(InputError, match=r"fewer nodes: a \w+ form needs .* this machine has 2000"):
+        refuse_what_cannot_fit(scene, size_of(scene), form)
+
+
+def test_a_wide_band_is_not_stored(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a square grid a fill-reducing order needs far less than the band."""
+    scene = read_scene("scaling/100352")
+    joint = scene.joint.model_copy(
+        update={"junction": scene.joint.junction.model_copy(update={"nodes": (1500, 1500)})}
+    )
+    estimate = size_of(replace(scene, joint=joint))
+    assert estimate is not None
+    assert estimate.half_bandwidth is not None
+    assert estimate.half_bandwidth > 5000
+    assert estimate.sparse_mib < 0.2 * 8 * estimate.unknowns * estimate.half_bandwidth / 2**20
 
 
 @pytest.mark.parametrize(
@@ -28,8 +101,9 @@ def machine_of(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
         (LARGE, ("primal",), 1, False, 1 << 20, "primal"),
         (LARGE, ("sparse",), 1, True, 1 << 20, "sparse"),
         (LARGE, FORMS, 1, True, 1 << 20, "dual"),
-        (LARGE, FORMS, form_choice.MANY, False, 1 << 20, "dual"),
-        (LARGE, FORMS, form_choice.MANY, True, 1000, "sparse"),
+        (LARGE, FORMS, 100, False, 1 << 20, "dual"),
+        (LARGE, FORMS, 2, False, 1 << 20, "sparse"),
+        (LARGE, FORMS, 100, True, 1000, "sparse"),
         (SMALL, FORMS, 1, False, 1 << 20, "dual"),
     ],
 )

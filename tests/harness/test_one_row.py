@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 from commands import harness
 
-from harness.planning.one_row import of_key
-from harness.planning.plan import expand
+from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite
 from harness.results import records
 

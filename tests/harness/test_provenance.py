@@ -28,7 +28,6 @@ COPIED = (
 )
 ASK = "from harness.results.provenance import commit; import json; print(json.dumps(commit()))"
 NOT_KNOWN = (__version__, None)
-ORIGIN = {"url": "https://example.org/rivetbench.git", "vcs_info": {"vcs": "git", "commit_id": "c" * 40}}
 
 
 @pytest.fixture
@@ -68,14 +67,6 @@ def asked(folder: Path, **environment: str) -> tuple[str, bool | None]:
     )
     name, clean = json.loads(done.stdout)
     return name, clean
-
-
-def installed(folder: Path, origin: object) -> None:
-    """As pip leaves it beside the packages."""
-    about = folder / f"rivetbench-{__version__}.dist-info"
-    about.mkdir(parents=True)
-    (about / "METADATA").write_text(f"Metadata-Version: 2.4\nName: rivetbench\nVersion: {__version__}\n")
-    (about / "direct_url.json").write_text(json.dumps(origin))
 
 
 def test_a_commit_of_documents_or_results_is_no_other_code(tree: Path) -> None:
@@ -122,22 +113,11 @@ def test_without_git_or_a_repository_the_version_is_named(tree: Path, tmp_path: 
 def test_the_repository_of_another_project_is_not_ours(tmp_path: Path, tracked: bool) -> None:
     """Its environment lies in its work tree, ignored as usual; or it keeps a copy of the packages."""
     site = copied(tmp_path / "other/.venv/site-packages")
-    installed(site, {"url": "file:///rivetbench.whl", "archive_info": {}})
     (tmp_path / "other/pyproject.toml").write_text('[project]\nname = "other"\n')
     if not tracked:
         (tmp_path / "other/.gitignore").write_text(".venv/\n")
     committed(tmp_path / "other")
     assert asked(site) == NOT_KNOWN
-
-
-def test_installed_from_a_repository_the_commit_that_pip_recorded(tree: Path, tmp_path: Path) -> None:
-    """Unless it is installed elsewhere; a work tree outweighs it."""
-    installed(tmp_path / "elsewhere", ORIGIN)
-    paths = os.pathsep.join([str(tree), str(tmp_path / "elsewhere")])
-    assert asked(tree, PYTHONPATH=paths) == NOT_KNOWN
-    installed(tree, ORIGIN)
-    assert asked(tree) == ("c" * 40, True)
-    assert committed(tree) == asked(tree)[0]
 
 
 def test_every_row_of_a_suite_and_of_a_series_names_its_code(tmp_path: Path) -> None:

@@ -30,31 +30,23 @@ def test_a_line_is_strict_json() -> None:
     assert json.loads(records.to_line(row)) == {"a": 1.5, "b": None, "c": [2, None], "d": True, "e": "p"}
 
 
-@pytest.mark.parametrize("torn", [b'{"key": "k3", "va', b'{"key": "k3"\n', b"\xff\xfe"])
-def test_a_torn_last_line_is_set_aside_by_run_and_stops_the_others(path: Path, torn: bytes) -> None:
+@pytest.mark.parametrize("torn", [b'{"key": "k3", "va', b'{"key": "k3"}', b'{"key": "k3"\n', b"\xff\xfe"])
+def test_a_torn_last_line_is_removed_by_run_and_stops_the_others(path: Path, torn: bytes) -> None:
     whole = path.read_bytes()
     path.write_bytes(whole + torn)
     with pytest.raises(InputError, match=r"measurements\.jsonl: line 4"):
         records.read(path)
-    assert records.move_torn_line(path)
+    assert records.remove_torn_line(path)
     assert path.read_bytes() == whole
-    assert path.with_name(records.TORN).read_bytes().strip() == torn.strip()
-    assert not records.move_torn_line(path)
+    assert not records.remove_torn_line(path)
     assert [row["value"] for row in records.read(path)] == [0, 1, 2]
-
-
-def test_a_last_line_without_its_end_is_torn_even_if_it_reads(path: Path) -> None:
-    """The next row would be glued to it."""
-    os.truncate(path, path.stat().st_size - 1)
-    assert records.move_torn_line(path)
-    assert [row["value"] for row in records.read(path)] == [0, 1]
 
 
 def test_damage_in_the_middle_is_named_and_nothing_is_changed(path: Path) -> None:
     path.write_bytes(b"nonsense\n" + path.read_bytes())
     before = path.read_bytes()
     with pytest.raises(InputError, match="line 1 = 'nonsense'"):
-        records.move_torn_line(path)
+        records.remove_torn_line(path)
     assert path.read_bytes() == before
 
 

@@ -28,7 +28,6 @@ from harness.measurement.run import run as run_suite
 from harness.measurement.scheduler import (
     TASKS_PER_WORKER,
     done_as_completed,
-    other_versions,
     versions,
     workers,
 )
@@ -118,14 +117,6 @@ def test_every_task_comes_back_once_and_few_are_handed_out() -> None:
             seen[k] = outcome
     assert isinstance(seen.pop(13), ValueError)
     assert seen == {k: 2 * k for k in range(40) if k != 13}
-
-
-def test_versions_that_differ_are_named() -> None:
-    here = versions()
-    assert other_versions("worker a", here, here) == []
-    (fault,) = other_versions("worker a", here, here | {"numpy": "1.0"})
-    assert "worker a: numpy = '1.0'" in str(fault)
-    assert here["numpy"] in str(fault)
 
 
 def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

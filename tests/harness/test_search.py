@@ -9,10 +9,9 @@ import tiny
 from runs import rows_of, said_by
 
 from harness.measurement.run import run
+from harness.planning.due import due, stopped_at
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import DECADES, Measurement, expand
-from harness.planning.search import due
-from harness.planning.stopping import stopped_at
 from harness.planning.suite import read_suite, suite_from
 from problems.errors import InputError
 from report.results.reader import read

@@ -8,9 +8,9 @@ import pytest
 from harness.measurement.describe import Description
 from harness.measurement.resume import outdated
 from harness.measurement.row import Task, run_task
+from harness.planning.due import predicted_timeout
 from harness.planning.plan import expand
 from harness.planning.suite import suite_from
-from harness.planning.timeouts import predicted_timeout
 
 
 def plan(**changes):

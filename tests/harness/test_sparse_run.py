@@ -91,14 +91,14 @@ def test_the_difference_of_the_roads_is_recorded_in_either_order(
 
 
 @pytest.mark.parametrize("form", ["dual", "sparse"])
-@pytest.mark.parametrize(("shift", "code"), [(5e-8, 0), (2e-7, 1), (np.nan, 1)])
+@pytest.mark.parametrize(("shift", "code"), [(5e-8, 0), (2e-7, 1)])
 def test_the_gate_sees_an_answer_that_was_moved(copy: Path, form: str, shift: float, code: int) -> None:
     """At the last displacement of the junction; an inner unknown is not judged."""
     row = by_form(copy)[form]
     problem = reference_problem(row["source"], form=row["form"])
     junction = problem.prepared.assembly.junction
     moved(copy / row["answer"], shift, -1 if junction is None else junction[-1])
-    if junction is not None and np.isfinite(shift):
+    if junction is not None:
         inner = np.setdiff1d(np.arange(problem.prepared.assembly.n), junction)
         moved(copy / row["answer"], 1e-3, inner[0])
     assert said_by(gate, copy)[0] == code

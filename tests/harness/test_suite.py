@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 import tiny
 
-from harness.planning.memory import refuse_limits_too_low
-from harness.planning.one_row import with_key
 from harness.planning.overrides import Overrides, overridden
-from harness.planning.plan import Measurement, expand
+from harness.planning.plan import Measurement, expand, with_key
 from harness.planning.suite import Suite, read_suite, suite_from, suite_names, to_toml, validated
 from problems.errors import InputError
 
@@ -186,29 +184,6 @@ class TestOverrides:
             overridden(suite, Overrides(solvers=("clarabell",)))
         with pytest.raises(InputError, match="no such scene"):
             overridden(suite, Overrides(scenes=("nowhere",)))
-
-
-def test_what_cannot_fit_is_refused(tmp_path: Path) -> None:
-    suite = read_suite(str(tiny.write_suite(tmp_path, scenes=["4386/0052"], memory_limit_mib=100)))
-    with pytest.raises(InputError, match=r"matrices of scene 4386/0052 alone take 18\d MiB"):
-        refuse_limits_too_low(expand(suite))
-    with pytest.raises(InputError, match="this machine has"):
-        refuse_limits_too_low(expand(overridden(suite, Overrides(memory_limit_mib=10**9))))
-    refuse_limits_too_low(expand(overridden(suite, Overrides(memory_limit_mib=400))))
-
-
-def test_a_memory_limit_holds_for_the_form_that_is_run(tmp_path: Path) -> None:
-    def plan(form: str) -> list[Measurement]:
-        entry = f'[[solver]]\nname = "newton"\nforms = ["{form}"]\n'
-        return expand(
-            read_suite(
-                str(tiny.write_suite(tmp_path, entry, scenes=["scaling/100352"], memory_limit_mib=2000))
-            )
-        )
-
-    refuse_limits_too_low(plan("sparse"))
-    with pytest.raises(InputError, match=r"take \d+ MiB in the dense forms, 16\d\d MiB in the sparse form"):
-        refuse_limits_too_low(plan("dual"))
 
 
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:

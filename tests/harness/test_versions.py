@@ -1,6 +1,5 @@
 """`run --with NAME==VERSION`: versions of a library, each in an environment of its own; no network."""
 
-import shutil
 import zipfile
 from io import StringIO
 from pathlib import Path
@@ -99,8 +98,7 @@ def test_versions_side_by_side_and_again(folder: Path, tmp_path: Path) -> None:
     assert (same, marks()) == (rows, made)
 
     write_wheel(folder / "wheels", "fakelib", "3.0", LIBRARY["1.0"], "needed")
-    (lock,) = cache.root().glob("fakelib==3.0-*.lock")
-    shutil.copytree(next(cache.root().glob("fakelib==2.0-*/bin")), lock.with_suffix("") / "bin")  # cut off
+    assert list(cache.root().glob("fakelib==3.0-*/bin/python"))  # the rest of what failed is no environment
     text, rows = run(folder, out, "1.0", "3.0")
     assert "2 measurements, 1 of them already" in text
     assert rows["1.0"] == same["1.0"]

@@ -95,7 +95,7 @@ def test_small_integers_are_refused_exactly_where_their_rank_says_so() -> None:
         "validate OWN",
         "judge X OWN --form sparse",
         "export OWN --format npz --out NEW.npz",
-        "export OWN --form sparse --format mtx --out NEW",
+        "export OWN --form sparse --out NEW",
         "series OWN --solver newton --form sparse --gaps GAPS --out NEW",
         "run --scene OWN --solver newton --form sparse --out NEW",
         "import OWN --out NEW.npz",
@@ -105,9 +105,9 @@ def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
     """In the sparse form there was a raw "Factor is exactly singular"."""
     K, A, f, g = np.eye(N) * 4, np.eye(N, 3)[:, [0, 1, 0]], np.ones(N), np.zeros(3)
     np.savez(own := tmp_path / "own.npz", K=K, A=A, f=f, g=g)
-    np.save(tmp_path / "x.npy", f)
+    np.savez(tmp_path / "x.npz", x=f)
     np.save(tmp_path / "gaps.npy", np.zeros((2, 3)))
-    places = {"OWN": "own.npz", "X": "x.npy", "GAPS": "gaps.npy", "NEW": "new", "NEW.npz": "new.npz"}
+    places = {"OWN": "own.npz", "X": "x.npz", "GAPS": "gaps.npy", "NEW": "new", "NEW.npz": "new.npz"}
     given = [str(tmp_path / places[word]) if word in places else word for word in words.split()]
     done = harness(*given)
     assert done.exit_code == 2, done.output

@@ -11,7 +11,7 @@ from commands import harness
 from scipy.sparse.linalg import spsolve
 from sparse_matrices import band_matrix, renumbered
 
-from harness.planning import form_choice, memory
+from harness.planning import form_choice
 from problems import formats
 from problems.build import load_case, prepared
 from problems.formats.nastran import pyyeti
@@ -32,8 +32,7 @@ def dense(self: Any) -> None:
 def _nothing_dense(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DenseBlock, "U", property(dense))
     monkeypatch.setattr(Prepared, "Q", property(dense))
-    for module in (form_choice, memory):
-        monkeypatch.setattr(module, "physical_memory_mib", lambda: 200)  # holds the sparse form alone
+    monkeypatch.setattr(form_choice, "physical_memory_mib", lambda: 200)  # holds the sparse form alone
 
 
 def files(folder: Path, K: sp.csc_array | None = None, scipy_npz: bool = False) -> list[str]:

@@ -1,8 +1,9 @@
-"""Which measurement is due, as the rows so far show.
+"""What of a plan is measured, and for how long, as the rows so far show.
 
 tolerances = "auto" searches, in decades, the loosest tolerance whose answer is within the limit on the scene,
 from the one found before; repeats = "auto" repeats what is quick: five times what takes under 2 s, three
-times what takes under 20 s.
+times what takes under 20 s. What is predicted to exceed its time limit is skipped. What is left far behind is
+stopped: a loss by more needs no figure.
 """
 
 from __future__ import annotations
@@ -13,12 +14,16 @@ from math import inf
 
 from harness.results.records import Row
 from harness.results.schema import STEPS
+from problems.forms.names import DENSE_FORMS
+from problems.scene import read_scene
 
 from .plan import DECADES, MOST_REPEATS, Measurement
-from .timeouts import OUT_OF_TIME
 
 #: (seconds of the first run below which, repeats).
 REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
+#: The statuses of a measurement that ran out of its time, or was not started because it would have.
+OUT_OF_TIME = ("time_limit", "not_run")
+LEAST_S = 10.0  # before what is left behind is stopped
 
 
 def due(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
@@ -82,5 +87,59 @@ def _place(tried: Sequence[Row]) -> tuple[int, int]:
 
 
 def _repeats(row: Row) -> int:
-    seconds = sum(row[name] or 0.0 for name in STEPS)
+    seconds = _seconds(row)
     return next(repeats for limit, repeats in REPEATS if seconds < limit)
+
+
+def _seconds(row: Row) -> float:
+    """Of all steps."""
+    return sum(row[name] or 0.0 for name in STEPS)
+
+
+def stopped_at(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
+    """The time limit of m, s, and why it is tighter than the suite's; "" if it is not.
+
+    max(10 s, k × the seconds of the fastest library other than m's within the limit on m's scene), by the
+    first of its repeats, with k = `stop_at_times_fastest` of the suite.
+    """
+    others = [
+        (_seconds(row), f"{row['solver']} {row['form']}")
+        for row in rows
+        if row["scene"] == m.scene and row["owner"] == "library" and row["solver"] != m.solver
+        if row["verdict"] == "within" and row["repeat"] == 0
+    ]
+    if m.stop_at_times_fastest is None or not others:
+        return m.time_limit_s, ""
+    seconds, name = min(others)
+    limit_s = max(LEAST_S, m.stop_at_times_fastest * seconds)
+    if limit_s >= m.time_limit_s:
+        return m.time_limit_s, ""
+    return limit_s, f"{m.stop_at_times_fastest:g} × {name} ({seconds:.2g} s), at least {LEAST_S:g} s"
+
+
+def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
+    """The scenes that show that m would exceed its time limit, or "".
+
+    The scene of m itself, if the solver exceeded at least the same limit there at this tolerance or a looser
+    one. Else all scenes of the next smaller size n' on which the same solver, form and settings were
+    measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T', or (n/n') T' in
+    the sparse form: with dense matrices, time grows at least like n², with sparse ones like n. (Not on rungs
+    of ladders, where size is not what makes them hard.)
+    """
+    own = [row for row in rows if m.same_settings(row)]
+    looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
+    for row in looser:
+        if row["status"] in OUT_OF_TIME and m.time_limit_s <= row["time_limit_s"]:
+            return f"{m.scene} at {row['tolerance']:g}"
+    if read_scene(m.source).on_ladder:
+        return ""
+    smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
+    largest = max((row["n"] for row in smaller), default=0)
+    comparable = [row for row in smaller if row["n"] == largest]
+    growth = (n / largest) ** (2 if m.form in DENSE_FORMS else 1) if largest else 0.0
+    timed_out = [
+        row
+        for row in comparable
+        if row["status"] in OUT_OF_TIME and m.time_limit_s <= growth * row["time_limit_s"]
+    ]
+    return ", ".join(sorted({row["scene"] for row in timed_out})) if len(timed_out) == len(comparable) else ""
