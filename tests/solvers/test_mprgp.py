@@ -46,7 +46,7 @@ def test_no_step_increases_the_objective(preconditioner: str) -> None:
     Q, p = prepared.Q, load.p
     solver, state = opened(preconditioner, prepared)
     metric = solver._metric(state)
-    case = Proportioning(prepared.product, p, metric.diagonal, metric, lambda lam: Q @ lam - p, 0 * p, -p)
+    case = Proportioning(prepared.compliance, p, metric.diagonal, metric, lambda lam: Q @ lam - p, 0 * p, -p)
     before = 0.0
     for _ in range(200):
         if not case._step():
