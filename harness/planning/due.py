@@ -23,6 +23,7 @@ from .plan import DECADES, MOST_REPEATS, Measurement
 REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
 #: The statuses of a measurement that ran out of its time, or was not started because it would have.
 OUT_OF_TIME = ("time_limit", "not_run")
+FEWEST_SCENES = 2  # of a size, that predict another one of it
 LEAST_S = 10.0  # before what is left behind is stopped
 
 
@@ -124,7 +125,8 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     one. Else all scenes of the next smaller size n' on which the same solver, form and settings were
     measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T', or (n/n') T' in
     the sparse form: with dense matrices, time grows at least like n², with sparse ones like n. (Not on rungs
-    of ladders, where size is not what makes them hard.)
+    of ladders, where size is not what makes them hard.) Or else the other scenes of the size of m, if it was
+    left far behind (`stopped_at`) on two or more of them, and on all.
     """
     own = [row for row in rows if m.same_settings(row)]
     looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
@@ -133,13 +135,21 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
             return f"{m.scene} at {row['tolerance']:g}"
     if read_scene(m.source).on_ladder:
         return ""
-    smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
-    largest = max((row["n"] for row in smaller), default=0)
-    comparable = [row for row in smaller if row["n"] == largest]
+    others = [row for row in own if row["scene"] != m.scene and row["tolerance"] == m.tolerance]
+    largest = max((row["n"] for row in others if row["n"] < n), default=0)
     growth = (n / largest) ** (2 if m.form in DENSE_FORMS else 1) if largest else 0.0
-    timed_out = [
-        row
-        for row in comparable
-        if row["status"] in OUT_OF_TIME and m.time_limit_s <= growth * row["time_limit_s"]
-    ]
-    return ", ".join(sorted({row["scene"] for row in timed_out})) if len(timed_out) == len(comparable) else ""
+
+    def in_time(row: Row) -> bool:
+        """Or late only because its limit was too tight to tell."""
+        if row["status"] not in OUT_OF_TIME:
+            return True
+        if row["n"] < n:
+            return m.time_limit_s > growth * row["time_limit_s"]
+        return not (m.stop and row.get("stop"))
+
+    for size, fewest in ((largest, 1), (n, FEWEST_SCENES)):
+        of_size = [row for row in others if row["n"] == size]
+        scenes = {row["scene"] for row in of_size}
+        if len(scenes) >= fewest and not any(map(in_time, of_size)):
+            return ", ".join(sorted(scenes))
+    return ""

@@ -8,7 +8,7 @@ import pytest
 from harness.measurement.describe import Description
 from harness.measurement.resume import outdated
 from harness.measurement.row import Task, run_task
-from harness.planning.due import predicted_timeout
+from harness.planning.due import OUT_OF_TIME, predicted_timeout
 from harness.planning.plan import expand
 from harness.planning.suite import suite_from
 
@@ -25,7 +25,14 @@ def plan(**changes):
 
 def row(scene, n, status="time_limit", limit=30.0, **changes):
     same = {"solver": "piqp", "form": "primal", "variant": "", "tolerance": 1e-9, "options": {}}
-    facts = {"scene": scene, "n": n, "status": status, "time_limit_s": limit, "threads_asked": 2}
+    facts = {
+        "scene": scene,
+        "n": n,
+        "status": status,
+        "time_limit_s": limit,
+        "threads_asked": 2,
+        "stop": None,
+    }
     return same | facts | changes
 
 
@@ -51,6 +58,20 @@ def test_too_slow_on_every_smaller_scene_is_not_run(large):
 def test_the_sparse_forms_time_may_grow_no_faster_than_the_size(form, limit, late):
     m = next(m for m in plan() if m.scene == "6112/0600" and m.form == form)
     assert bool(predicted_timeout(m, 6112, [row("4386/0107", 4386, limit=limit, form=form)])) == late
+
+
+def test_what_is_left_far_behind_on_two_scenes_is_not_run_on_a_third_of_the_size(large):
+    behind = replace(large, stop="10 × scs")
+    one, two, fast = (
+        row(f"6112/{k}", 6112, status, limit=12.0, stop="10 × daqp")
+        for k, status in enumerate((*OUT_OF_TIME, "solved"))
+    )
+    assert predicted_timeout(behind, 6112, [one, two]) == "6112/0, 6112/1"
+    assert not predicted_timeout(behind, 6112, [one])
+    assert not predicted_timeout(behind, 6112, [one, two, fast])
+    assert not predicted_timeout(behind, 6112, [one, two | {"stop": None}])
+    assert not predicted_timeout(large, 6112, [one, two])
+    assert not predicted_timeout(behind, 6112, [each | {"n": 4386} for each in (one, two)])
 
 
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
