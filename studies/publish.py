@@ -29,15 +29,24 @@ from harness.results.provenance import ROOT, commit
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.results.schema import VERDICTS
 from harness.terminal.exit_codes import INTERRUPTED
+from report.results.reader import read
+from report.sections.roads import how_fast_table, in_series, ours_and_others
 from studies.paper.__main__ import write as write_study
 
 PUBLISHED = ROOT / "results" / "published"
 STAGED = ROOT / "results" / "publishing"
 #: Made by the command `series`, not by a suite.
-SERIES = {"gaps": ("4386/1074", "--cases", "1000", "--sd", "0.2", "--correlation-length", "150")}
+SERIES = {
+    name: (scene, "--cases", cases, "--sd", "0.2", "--correlation-length", "150")
+    for name, scene, cases in (
+        ("gaps", "4386/1074", "1000"),
+        ("gaps-6112", "6112/1500", "256"),
+        ("gaps-11308", "11308/2800", "128"),
+    )
+}
 #: In the order of measurement; the other suites are for a user's own runs and for the CI.
 NAMES = (
-    *("default", "speed", "libraries", "series", "gaps", "methods", "uncondensed", "scaling"),
+    *("default", "speed", "libraries", "series", *SERIES, "methods", "uncondensed", "scaling"),
     *("hard", "hard-full", "drawn", "outside", "paper", "accuracy"),
 )
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
@@ -167,8 +176,24 @@ def write_index(folder: Path) -> Path:
     )
     table = pd.DataFrame(lines).rename(columns=lambda name: name.replace("_", " "))
     path = folder / "index.md"
-    path.write_text(text + table.to_markdown(index=False) + "\n", "utf-8")
+    path.write_text(text + table.to_markdown(index=False) + "\n" + _how_fast(folder), "utf-8")
     return path
+
+
+def _how_fast(folder: Path) -> str:
+    """The table that README and the documents quote: of `speed`, and of series with proofs."""
+    tables = [ours_and_others(read(folder / "speed"))] if rows_of(folder / "speed") else []
+    if rows_of(folder / "series"):
+        rows = read(folder / "series").rows
+        proven = {SERIES[name][0]: _seconds(folder / name) for name in SERIES if rows_of(folder / name)}
+        tables.append(in_series(rows[rows["threads"] == rows["threads"].max()], proven))
+    table = pd.concat([pd.DataFrame(), *tables])
+    return "" if table.empty else f"\n## How fast is it?\n\n{how_fast_table(table).markdown}\n"
+
+
+def _seconds(series: Path) -> pd.Series[float]:
+    """Of each case, the proof of its error included."""
+    return pd.DataFrame(rows_of(series)).reindex(columns=["setup_s", "solve_s", "form_s"]).sum(axis=1)
 
 
 def _title(directory: Path) -> str:

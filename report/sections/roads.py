@@ -13,16 +13,19 @@ from matplotlib.patches import Patch
 
 from harness.results.schema import OWNERS
 from report.analysis.roads import LOAD_CASES, STAGES, roads
-from report.analysis.standings import best_tolerances, seconds_text
+from report.analysis.standings import best_tolerances, of_fastest, seconds_text
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.escape import short
-from report.document.numbers import counted, significant, whole
+from report.document.numbers import MISSING, counted, significant, whole
 from report.figures import style
 from report.results.reader import Results
 from report.results.rows import in_order
 
+from .series import compared
+
 FROM_SCENE = "a load case, from the scene on"
 ONE_MORE = "one more load case on a known assembly"
+IN_SERIES = "one of many load cases, ours with its proof"
 MADE = ("model_s", "K_s", "factors_s", "Q_s")  # before the solver's own preparation
 #: Of each stage its name, colour and hatch.
 LOOKS = {
@@ -42,8 +45,11 @@ ROW, AROUND = 0.19, 0.45  # inches: a bar; the title and the axis of a panel
 def how_fast(results: Results) -> Section | None:
     """For every solver in every form: against libraries, against textbook methods, in seconds."""
     table = ours_and_others(results)
-    if table.empty:
-        return None
+    return None if table.empty else Section("How fast is it?", [how_fast_table(table)])
+
+
+def how_fast_table(table: pd.DataFrame) -> Table:
+    """Of lines as `ours_and_others` and `in_series` make them."""
     columns = [
         word("question", "question"),
         number("n", "n", whole),
@@ -57,12 +63,14 @@ def how_fast(results: Results) -> Section | None:
         "needs them. How many times as long as the fastest of ours: the median over the scenes (the least). "
         "A scene on which none of them is within the limit counts as more than all others."
     )
-    return Section("How fast is it?", [Table("how-fast", caption, table, columns, keys=2)])
+    return Table("how-fast", caption, table, columns, keys=2)
 
 
 def _times(owner: str) -> Callable[[Mapping[str, Any]], str]:
     def text(line: Mapping[str, Any]) -> str:
         median, least = line[owner], line[f"{owner}_least"]
+        if np.isnan(median):
+            return MISSING
         return f"{'more' if median == float('inf') else significant(median, 2)} × ({significant(least, 2)})"
 
     return text
@@ -91,6 +99,24 @@ def ours_and_others(results: Results) -> pd.DataFrame:
         fastest = ways.groupby(["n", "scene", "owner"])[seconds].min().unstack("owner")
         known = fastest.reindex(columns=list(OWNERS)).dropna(subset="ours")
         lines += [{"question": question, "n": n} | _line(of_size) for n, of_size in known.groupby("n")]
+    return pd.DataFrame(lines)
+
+
+def in_series(rows: pd.DataFrame, proven: Mapping[str, pd.Series[float]]) -> pd.DataFrame:
+    """The same of many load cases: the seconds of one, of a later one if the solver has an update or a
+    warm start.
+
+    rows : of suite `series`. proven : by scene, the seconds of each case of ours, the proof of its error
+    included; `seconds_most` is the slowest case. Libraries and textbook methods prove nothing.
+    """
+    lines = []
+    for scene, seconds in proven.items():
+        of_scene = compared(rows[(rows["scene"] == scene) & rows["case"].notna()])
+        fastest = {owner: of_fastest(owner, of_scene, "later_s", "cold_s").min() for owner in OWNERS[1:]}
+        line = {"question": IN_SERIES, "n": of_scene["n"].min()}
+        lines.append(line | _line(pd.DataFrame([{"ours": seconds.mean()} | fastest])))
+        lines[-1] |= {"seconds_most": seconds.max()}
+        lines[-1] |= dict.fromkeys({*OWNERS[1:]} - {*of_scene["owner"]}, np.nan)
     return pd.DataFrame(lines)
 
 

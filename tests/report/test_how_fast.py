@@ -10,7 +10,7 @@ from synthetic_results import row, write_rows
 
 from report.results.reader import Results, read
 from report.sections import roads
-from report.sections.roads import FROM_SCENE, ONE_MORE, ours_and_others
+from report.sections.roads import FROM_SCENE, ONE_MORE, in_series, ours_and_others
 
 #: solver, form, owner, seconds to solve on scenes 0 and 1; None: outside the limit.
 LINES: list[tuple[str, str, str, tuple[float | None, float | None]]] = [
@@ -71,3 +71,23 @@ def test_what_no_library_solves_counts_as_more(tmp_path: Path) -> None:
 @pytest.mark.parametrize("missing", ["library", "textbook"])
 def test_without_an_opponent_there_is_no_figure(tmp_path: Path, missing: str) -> None:
     assert table(tmp_path, [r for r in rows() if r["owner"] != missing]).empty
+
+
+def test_a_case_of_a_series_with_its_proof_is_compared_with_later_cases(tmp_path: Path) -> None:
+    """A library's first case does not count where it has an update; a textbook method has none."""
+    made = []
+    for solver, owner, seconds in (("a", "library", (9.0, 4.0, 2.0)), ("b", "textbook", (1.0, 1.5, 1.5))):
+        for case, taken in enumerate(seconds):
+            times = {"setup_s": 0.0, "solve_s": taken, "form_s": 0.0, "warm": owner == "library" and case > 0}
+            made.append(row("4386/1074", solver, "dual", owner=owner, case=case, **times))
+    rows, proven = results(tmp_path, made).rows, {"4386/1074": pd.Series([0.1, 0.2])}
+    (line,) = in_series(rows, proven).to_dict("records")
+    assert (line["n"], line["scenes"], line["seconds"], line["seconds_most"]) == (
+        4386,
+        1,
+        pytest.approx(0.15),
+        0.2,
+    )
+    assert (line["library"], line["textbook"]) == (pytest.approx(20.0), pytest.approx(10.0))
+    without = in_series(rows[rows["owner"] == "library"], proven)
+    assert " – |" in roads.how_fast_table(without).markdown
