@@ -27,6 +27,8 @@ from .balanced import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
 from .proof import Proof, Proven
 
+#: What forces come from, and λ (m,) in N.
+Candidate = tuple[str, Vector]
 STOPPED = "no further method was tried"
 UNPROVEN = "could not be proven"
 ESTIMATED = 0.5  # of an estimate of λmin that is no smaller
@@ -42,7 +44,7 @@ def reference_of(
     prepared: Prepared,
     load: LoadCase,
     limit_s: float | None = None,
-    given: Sequence[Vector] = (),
+    given: Sequence[Candidate] = (),
 ) -> Reference:
     """The reference of a scene: the answer that it was made from, if any, else that of its load case."""
     made = scene.made if isinstance(scene, ManufacturedScene) else None
@@ -52,7 +54,7 @@ def reference_of(
 
 
 def reference(
-    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Vector] = ()
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Candidate] = ()
 ) -> Reference:
     """The reference of a load case, from the cache if it was proven before for these matrices."""
     if prepared.key is None:
@@ -71,15 +73,14 @@ def reference(
 
 
 def best_of_candidates(
-    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Vector] = ()
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Candidate] = ()
 ) -> Reference:
-    """given : λ (m,) N, tried first. limit_s : after it no further candidate is tried."""
+    """given : tried first. limit_s : after it no further candidate is tried."""
     limit_s = default_limit_s(prepared.assembly.m) if limit_s is None else limit_s
     proof, end = proof_of(prepared), time.monotonic() + limit_s
     best: Proven | None = None
     route = stopped = ""
-    mine = (("given, refined", lam) for lam in given)
-    for name, lam in chain(mine, candidates(prepared, load)):
+    for name, lam in chain(given, candidates(prepared, load)):
         (found,) = proof.proven([load], [lam])
         if best is None or found.bound_mm < best.bound_mm:
             best, route = found, name
