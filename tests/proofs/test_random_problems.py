@@ -1,4 +1,4 @@
-"""Every solver on random small problems whose answer is exact: rational, chosen, or proven.
+"""Every solver on random small problems whose answer is known in rational numbers.
 
 RIVETBENCH_LONG=1 takes thousands of them instead of a few hundred.
 """
@@ -55,15 +55,6 @@ def test_every_solver_finds_the_rational_answer(seed: int, pairs: int, tools: in
     lam = np.zeros(prepared.assembly.m)
     lam[active] = forces
     check(prepared, case, np.array(x, dtype=float), lam)
-
-
-@examples(10, 1000)
-@given(seed=SEEDS, pairs=st.integers(9, 30), tools=st.integers(0, 10))
-def test_every_solver_finds_the_proven_answer(seed: int, pairs: int, tools: int) -> None:
-    prepared, case = problem(seed, pairs, tools)
-    found = best_of_candidates(prepared, case)
-    assert found.bound_mm < 1e-12
-    check(prepared, case, found.x, found.lam)
 
 
 def check(prepared: Prepared, case: LoadCase, x: Vector, lam: Vector) -> None:
