@@ -171,7 +171,7 @@ def _check_solver(
 
 
 def _check_interface(log: Log, made: ExactProblem, random: np.random.Generator) -> None:
-    """As a user's own matrices, once as they are and once with a contact twice; Q and p by themselves."""
+    """As a user's own matrices, once as they are and once with a contact twice."""
     assembly, each = made.assembly, made.loads[0]
     K = sp.block_diag(assembly.K.matrices)
     try:

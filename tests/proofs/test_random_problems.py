@@ -1,6 +1,6 @@
-"""Every solver on random small problems whose answer is exact: rational, chosen, or proven.
+"""Every solver on random small problems whose answer is known in rational numbers.
 
-RIVETBENCH_LONG=1 takes thousands of them instead of a few hundred.
+All but ours are tried on every third. RIVETBENCH_LONG=1 takes thousands of them, and tries all on each.
 """
 
 import numpy as np
@@ -15,12 +15,6 @@ from harness.verification.reference import best_of_candidates
 from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.stiffness.operator import Stiffness
-
-SEEDS = st.integers(0, 2**32 - 1)
-
-
-def examples(few: int, many: int) -> settings:
-    return settings(max_examples=many if LONG else few, deadline=None, database=None, derandomize=not LONG)
 
 
 def rounded(values: Vector, steps: int) -> Vector:
@@ -47,27 +41,15 @@ def problem(seed: int, pairs: int, tools: int) -> tuple[Prepared, LoadCase]:
 
 
 @example(seed=504, pairs=0, tools=1)
-@examples(80, 7000)
-@given(seed=SEEDS, pairs=st.integers(0, 5), tools=st.integers(0, 3))
+@settings(max_examples=7000 if LONG else 80, deadline=None, database=None, derandomize=not LONG)
+@given(seed=st.integers(0, 2**32 - 1), pairs=st.integers(0, 5), tools=st.integers(0, 3))
 def test_every_solver_finds_the_rational_answer(seed: int, pairs: int, tools: int) -> None:
     prepared, case = problem(seed, pairs, tools if pairs else tools + 1)
-    x, active, forces = exact_optimum(prepared.assembly, case, best_of_candidates(prepared, case).active)
+    exact, active, forces = exact_optimum(prepared.assembly, case, best_of_candidates(prepared, case).active)
+    x = np.array(exact, dtype=float)
     lam = np.zeros(prepared.assembly.m)
     lam[active] = forces
-    check(prepared, case, np.array(x, dtype=float), lam)
-
-
-@examples(10, 1000)
-@given(seed=SEEDS, pairs=st.integers(9, 30), tools=st.integers(0, 10))
-def test_every_solver_finds_the_proven_answer(seed: int, pairs: int, tools: int) -> None:
-    prepared, case = problem(seed, pairs, tools)
-    found = best_of_candidates(prepared, case)
-    assert found.bound_mm < 1e-12
-    check(prepared, case, found.x, found.lam)
-
-
-def check(prepared: Prepared, case: LoadCase, x: Vector, lam: Vector) -> None:
-    for name, form in CASES:
+    for name, form in CASES if LONG or seed % 3 == 0 else IN_HOUSE:
         answer, found = solve(name, form, prepared, case)
         assert answer.status == "solved" or (name, form) not in IN_HOUSE
         if answer.status == "solved":

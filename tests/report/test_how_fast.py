@@ -1,14 +1,12 @@
 """How fast is it? Ratios of the fastest answers of each owner, scene by scene."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
-from synthetic_results import row, write_rows
+from synthetic_results import results, row
 
-from report.results.reader import Results, read
 from report.sections import roads
 from report.sections.roads import FROM_SCENE, ONE_MORE, in_series, ours_and_others
 
@@ -37,14 +35,8 @@ def rows() -> list[dict[str, Any]]:
     return made
 
 
-def results(folder: Path, made: list[dict[str, Any]]) -> Results:
-    write_rows(folder, made)
-    (folder / "problems.jsonl").write_text("".join(json.dumps(line) + "\n" for line in PROBLEMS))
-    return read(folder)
-
-
 def table(folder: Path, made: list[dict[str, Any]]) -> pd.DataFrame:
-    found = ours_and_others(results(folder, made))
+    found = ours_and_others(results(folder, made, *PROBLEMS))
     return found.set_index("question") if len(found) else found
 
 
@@ -62,7 +54,7 @@ def test_the_fastest_of_each_owner_scene_by_scene(tmp_path: Path) -> None:
 
 def test_what_no_library_solves_counts_as_more(tmp_path: Path) -> None:
     made = [r | ({"verdict": "outside"} if r["owner"] == "library" else {}) for r in rows()]
-    section = roads.how_fast(results(tmp_path, made))
+    section = roads.how_fast(results(tmp_path, made, *PROBLEMS))
     assert section is not None
     (text,) = (block.markdown for block in section.blocks)
     assert "more × (–)" in text
@@ -80,7 +72,7 @@ def test_a_case_of_a_series_with_its_proof_is_compared_with_later_cases(tmp_path
         for case, taken in enumerate(seconds):
             times = {"setup_s": 0.0, "solve_s": taken, "form_s": 0.0, "warm": owner == "library" and case > 0}
             made.append(row("4386/1074", solver, "dual", owner=owner, case=case, **times))
-    rows, proven = results(tmp_path, made).rows, {"4386/1074": pd.Series([0.1, 0.2])}
+    rows, proven = results(tmp_path, made, *PROBLEMS).rows, {"4386/1074": pd.Series([0.1, 0.2])}
     (line,) = in_series(rows, proven).to_dict("records")
     assert (line["n"], line["scenes"], line["seconds"], line["seconds_most"]) == (
         4386,

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from synthetic_results import no_answer, results, row, table, write_rows
 
-from report.analysis.standings import pareto, shown, standings
+from report.analysis.standings import shown, standings
 from report.document.numbers import significant
 from report.results.reader import Results, read
 from report.sections.speed import contacts
@@ -147,11 +147,6 @@ def test_a_line_is_broken_where_a_run_did_not_finish(tmp_path: Path) -> None:
     (axes,) = section.blocks[0].drawing.axes[:1]  # type: ignore[union-attr]
     seconds = axes.lines[0].get_ydata()
     assert [math.isnan(s) for s in seconds] == [False, False, True, False]
-
-
-def test_pareto_front() -> None:
-    points = pd.DataFrame({"error": [1e-9, 1e-8, 1e-7, 1e-8], "load_case_s": [5.0, 2.0, 3.0, 9.0]})
-    assert pareto(points).index.tolist() == [0, 1]
 
 
 def test_significant_figures() -> None:

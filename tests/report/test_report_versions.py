@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from synthetic_results import no_answer, row, write_rows
+from synthetic_results import no_answer, results, row, shown
 
 from report.analysis.checks import warnings
-from report.document.blocks import Section, Table, Text
+from report.document.blocks import Section, Text
 from report.results.reader import read
 from report.sections import versions
 
@@ -15,17 +15,13 @@ LOW, HIGH = "4386/0052", "4386/1074"
 
 
 def told(directory: Path, rows: list[dict[str, Any]]) -> Section | None:
-    return versions.section(read(write_rows(directory, rows)))
+    return versions.section(results(directory, rows))
 
 
 def of(version: str, scene: str = LOW, solver: str = "piqp", **more: Any) -> dict[str, Any]:
     """A row measured with --with."""
     named = {"variant": version, "solver_version": version}
     return row(scene, solver, **named | {"setup_s": 0.0, "form_s": 0.0} | more)
-
-
-def lines_of(table: Table) -> list[list[str]]:
-    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.markdown.splitlines()[2:]]
 
 
 def test_what_became_worse_from_version_to_version(tmp_path: Path) -> None:
@@ -38,7 +34,7 @@ def test_what_became_worse_from_version_to_version(tmp_path: Path) -> None:
         *(row(LOW, "clarabel"), of("3.0", HIGH, "clarabel")),  # on no scene two versions
     ]
     _, osqp, piqp, reasons = told(tmp_path, rows).blocks
-    assert lines_of(piqp) == [
+    assert shown(piqp)[1:] == [
         [LOW, "dual", "0.8.0", "failed", "–", "–", "no answer", "–"],
         [LOW, "dual", "0.9.0", "1.00", "20", "1.0e-9", "within", "no answer → within"],
         [LOW, "dual", "0.10.0", "0.500", "20", "1.0e-9", "within", "2.00 times as fast"],
@@ -50,7 +46,7 @@ def test_what_became_worse_from_version_to_version(tmp_path: Path) -> None:
     )
     assert isinstance(reasons, Text)
     assert reasons.markdown == "- piqp 0.8.0: raised TypeError: setup()"
-    assert lines_of(osqp)[-1][-1] == "worse: 1.3 digits lost"
+    assert shown(osqp)[-1][-1] == "worse: 1.3 digits lost"
     assert not any("several versions" in warning for warning in warnings(read(tmp_path)))
 
 
@@ -60,7 +56,7 @@ def test_a_slowdown_counts_from_ten_percent_beyond_the_spread(
 ) -> None:
     rows = [of(v, repeat=k, solve_s=s) for v, s in (("1", 1.0), ("2", seconds)) for k in range(3)]
     _, table = told(tmp_path, rows).blocks
-    assert lines_of(table)[-1][-1] == said
+    assert shown(table)[-1][-1] == said
 
 
 def test_variants_tolerances_and_the_installed_version_are_told_apart(tmp_path: Path) -> None:
@@ -69,11 +65,11 @@ def test_variants_tolerances_and_the_installed_version_are_told_apart(tmp_path: 
         named = {"variant": f"{base}proxsuite==0.7.2", "solver_version": "proxsuite==0.7.2"}
         rows += [row(LOW, "proxqp", tolerance=tol, **named) for tol in (1e-9, 1e-6)]
     _, table = told(tmp_path, rows).blocks
-    assert [line[1:3] for line in lines_of(table)] == [
+    assert [line[1:3] for line in shown(table)[1:]] == [
         *(["dual 1e-9", "proxsuite==0.7.2"], ["dual 1e-9", "0.8.0"]),
         *(["dual sparse 1e-9", "proxsuite==0.7.2"], ["dual sparse 1e-9", "0.8.0"]),
     ]
     searched = [of("1", searched=True, tolerance=1e-6), of("2", searched=True, tolerance=1e-8)]
     _, table = told(tmp_path / "searched", searched).blocks
-    assert [line[1:3] for line in lines_of(table)] == [["dual", "1"], ["dual", "2"]]
+    assert [line[1:3] for line in shown(table)[1:]] == [["dual", "1"], ["dual", "2"]]
     assert told(tmp_path / "one", [of("1.0"), of("1.0", HIGH), of("2.0", solver="osqp")]) is None

@@ -11,10 +11,9 @@ import pytest
 from matplotlib.image import imread
 from synthetic_results import everything, no_answer, results, row, write_rows
 
-from report.document.blocks import WIDEST, Section, Table, number
-from report.results.reader import Results, read
+from report.document.blocks import WIDEST, Table, number
+from report.results.reader import read
 from report.sections import SECTIONS, accuracy, drawn, methods, roads, speed, summary
-from report.writers import markdown
 from report.writers.markdown import contents, write
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -93,15 +92,6 @@ def test_a_whole_report_has_every_section_its_pictures_and_links_that_lead_somew
     rules = re.findall(r"^\|[:|-]+\|$", page, re.MULTILINE)
     assert len(rules) > 5
     assert max(rule.count("|") - 1 for rule in rules) <= WIDEST
-
-
-def test_a_section_is_a_function_in_the_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def greeting(results: Results) -> Section:
-        return Section(f"Hello to {len(results.rows)} row", [])
-
-    monkeypatch.setattr(markdown, "SECTIONS", [("scenes", greeting), *SECTIONS])
-    text = write(write_rows(tmp_path / "out", [row(LOW, "a")])).read_text("utf-8")
-    assert re.findall("^## (.*)", text, re.M)[:2] == ["Hello to 1 row", "Summary"]
 
 
 def test_equal_titles_lead_to_a_heading_each() -> None:

@@ -12,13 +12,14 @@ from solving import TESTED
 
 from harness.conformance.check import run
 from harness.solving.session import SolverSession
+from problems.forms.assembly import LoadCase
+from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.adapter import answer, dense, upper_triangle
-from solvers.base import DENSE_FORMS, FORMS, Form
+from solvers.base import DENSE_FORMS, FORMS, Answer, Form
 from solvers.libraries.clarabel import STATUS as CLARABEL_STATUS
-from solvers.libraries.osqp import Osqp
 from solvers.libraries.proxqp import ProxQp
-from solvers.libraries.qpsolvers import TOLERANCE, QpSolvers
+from solvers.libraries.qpsolvers import TOLERANCE
 from solvers.registry import make_solver
 
 LIBRARIES = ("osqp", "clarabel", "proxqp", "piqp")
@@ -35,6 +36,20 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
 @pytest.mark.parametrize(("name", "options"), VARIANTS, ids=str)
 def test_conformance(name: str, options: dict[str, Any]) -> None:
     assert [str(finding) for finding in run(lambda: make_solver(name, options))] == []
+
+
+def solved(
+    name: str,
+    options: dict[str, Any],
+    prepared: Prepared,
+    load: LoadCase,
+    tolerance: float,
+    form: Form = "dual",
+) -> Answer:
+    """As the library gives it: in the units of the problem, without a session."""
+    solver = make_solver(name, options)
+    ready = solver.setup(solver.convert(in_form(prepared, form)), load, tolerance)
+    return solver.solve(ready, load, tolerance)
 
 
 # Tolerances and settings that really reach the library.
@@ -94,23 +109,30 @@ def test_proxqp_takes_bounds_as_a_box_and_the_backend_that_is_chosen(form: Form)
     assert library.which_dense_backend().name == "PrimalLDLT"
 
 
-@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", [*LIBRARIES, "scs"])
-def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy(name: str, form: Form) -> None:
+def test_a_tighter_tolerance_costs_iterations_and_buys_accuracy(name: str) -> None:
     prepared = make_strips(40)
     case, load = make_load(11, prepared)
-    expected_x, _ = solve_by_nnls(prepared, case)
-    errors, iterations = [], []
-    for tolerance in (1e-1, 1e-9):
-        solver = make_solver(name, {})
-        session = SolverSession(solver, in_form(prepared, form), tolerance)
-        session.open()
-        got = session.cold(load)
-        x = got.x if form != "dual" else prepared.recover(got.lam, case)
-        errors.append(np.abs(x - expected_x).max())
-        iterations.append(got.iterations)
-    assert iterations[0] < iterations[1]
+    x, _ = solve_by_nnls(prepared, case)
+    rough, fine = (solved(name, {}, prepared, load, tolerance) for tolerance in (1e-1, 1e-9))
+    assert rough.iterations < fine.iterations
+    errors = [np.abs(prepared.recover(got.lam, case) - x).max() for got in (rough, fine)]
     assert errors[1] < 0.1 * errors[0]
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", ["osqp", "proxqp"])
+def test_a_warm_start_is_taken(name: str, form: Form) -> None:
+    """From its own answer a case takes fewer iterations than from the answer of another."""
+    prepared, taken = make_prepared(4, 30, 5), []
+    loads = [make_load(seed, prepared)[1] for seed in (5, 6)]
+    for near in loads:
+        session = SolverSession(make_solver(name, {}), in_form(prepared, form), 1e-9)
+        session.open()
+        session.next(near, None)
+        answer = session.next(loads[0], session.nearest(loads[0]))
+        taken.append(answer.inner_iterations or answer.iterations)
+    assert taken[0] < taken[1]
 
 
 @pytest.mark.parametrize("name", sorted(set(TOLERANCE) & set(TESTED)))
@@ -125,18 +147,15 @@ def test_tolerance_reaches_qpsolvers(name: str, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(qpsolvers, "solve_problem", spy)
     prepared = make_prepared(12, 4)
     _, load = make_load(13, prepared)
-    solver = QpSolvers(name)
-    got = solver.solve(solver.setup(solver.convert(in_form(prepared, "dual")), load, 3e-7), load, 3e-7)
+    got = solved(name, {}, prepared, load, 3e-7)
     assert 3e-7 in seen.values()
     assert "tolerance" not in got.details
 
 
 def test_a_solver_that_takes_no_tolerance_says_so() -> None:
     prepared = make_prepared(12, 4)
-    _, load = make_load(13, prepared)
-    solver = QpSolvers("quadprog")
-    ready = solver.setup(solver.convert(in_form(prepared, "primal")), load, 1e-9)
-    assert solver.solve(ready, load, 1e-9).details["tolerance"] == "not taken"
+    answer = solved("quadprog", {}, prepared, make_load(13, prepared)[1], 1e-9, "primal")
+    assert answer.details["tolerance"] == "not taken"
 
 
 def test_highs_accepts_the_settings_it_is_given() -> None:
@@ -183,9 +202,7 @@ def test_a_stopped_solver_does_not_say_solved(name: str) -> None:
     """A tolerance below rounding cannot be met: whatever the library does, it is not called solved."""
     prepared = make_strips(40)
     _, load = make_load(15, prepared)
-    solver = make_solver(name, {})
-    got = solver.solve(solver.setup(solver.convert(in_form(prepared, "primal")), load, 1e-300), load, 1e-300)
-    assert got.status != "solved"
+    assert solved(name, {}, prepared, load, 1e-300, "primal").status != "solved"
 
 
 def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
@@ -193,16 +210,11 @@ def test_polish_accepted_outside_the_tolerance_is_not_solved() -> None:
     prepared = make_strips(40)
     case, load = make_load(3, prepared)
     expected_x, _ = solve_by_nnls(prepared, case)
-    answers = {}
-    for polishing in (False, True):
-        solver = Osqp(polishing=polishing)
-        ready = solver.setup(solver.convert(in_form(prepared, "dual")), load, 1e-9)
-        answers[polishing] = solver.solve(ready, load, 1e-9)
-    polished = answers[True]
+    plain, polished = (solved("osqp", {"polishing": on}, prepared, load, 1e-9) for on in (False, True))
     assert polished.details == {"status": "solved", "polish": "accepted"}
     assert np.abs(prepared.recover(polished.lam, case) - expected_x).max() > 1e-7
     assert polished.status == "inaccurate"
-    assert answers[False].status == "solved"
+    assert plain.status == "solved"
 
 
 @pytest.mark.parametrize(
@@ -220,10 +232,6 @@ def test_a_librarys_own_settings_are_handed_on(name: str, options: dict[str, Any
     """They change the iterates, not the answer."""
     prepared = make_prepared(2, 20, 5)
     _, load = make_load(3, prepared)
-    answers = []
-    for given in ({}, options):
-        solver = make_solver(name, given)
-        ready = solver.setup(solver.convert(in_form(prepared, "dual")), load, 1e-9)
-        answers.append(solver.solve(ready, load, 1e-9))
-    assert (answers[0].lam != answers[1].lam).any()
-    np.testing.assert_allclose(answers[1].lam, answers[0].lam, rtol=1e-5, atol=1e-5)
+    usual, own = (solved(name, given, prepared, load, 1e-9) for given in ({}, options))
+    assert (usual.lam != own.lam).any()
+    np.testing.assert_allclose(own.lam, usual.lam, rtol=1e-5, atol=1e-5)

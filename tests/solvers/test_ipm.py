@@ -36,6 +36,11 @@ def solved(Q: np.ndarray, p: np.ndarray, tolerance: float = 1e-14, **options: An
     return solver.solve(ready, LoadCase(np.zeros(0), np.zeros(0), p), tolerance)
 
 
+def drawn(size: int, seed: int, condition: float = 1e4) -> tuple[np.ndarray, np.ndarray]:
+    """Q and p."""
+    return definite(size, seed, condition), np.random.default_rng(seed).standard_normal(size)
+
+
 def newton(Q: np.ndarray, p: np.ndarray) -> tuple[NewtonSteps, Point]:
     system = SYSTEMS["direct"](Q)
     system.begin()
@@ -47,8 +52,7 @@ def newton(Q: np.ndarray, p: np.ndarray) -> tuple[NewtonSteps, Point]:
 @pytest.mark.parametrize("seed", range(6))
 def test_the_method_solves_and_keeps_its_own_stopping_rule(seed: int) -> None:
     """A looser tolerance takes fewer iterations, and vouches for less."""
-    Q, iterations = definite(25, seed, condition=1e3), []
-    p = np.random.default_rng(seed).standard_normal(25)
+    (Q, p), iterations = drawn(25, seed, condition=1e3), []
     for tolerance in (1e-2, 1e-6, 1e-10, 1e-14):
         answer = solved(Q, p, tolerance)
         assert answer.status == "solved"
@@ -83,8 +87,7 @@ def test_every_start_scheme_and_system_leads_to_the_same_answer(start: str, sche
 
 @pytest.mark.parametrize("scheme", [algorithm_3, mehrotra])
 def test_a_feasible_iteration_stays_feasible_to_rounding(scheme: Any) -> None:
-    Q = definite(40, 1)
-    p = np.random.default_rng(1).standard_normal(40)
+    Q, p = drawn(40, 1)
     state, point = newton(Q, p)
     for _ in range(12):
         point = scheme(state, point)
@@ -99,8 +102,7 @@ def test_a_direction_solves_the_printed_system() -> None:
 
     There the unknowns are (λ, w, y) with −λ + w = 0 as the constraint rows.
     """
-    Q, sigma = definite(6, 2), 0.3
-    p = np.random.default_rng(2).standard_normal(6)
+    (Q, p), sigma = drawn(6, 2), 0.3
     state, point = newton(Q, p)
     lam, y, eye, zero = point.lam, point.y, np.eye(6), np.zeros((6, 6))
     full = np.block([[Q, zero, -eye], [-eye, eye, zero], [zero, np.diag(y), np.diag(lam)]])
@@ -116,9 +118,7 @@ def test_a_direction_solves_the_printed_system() -> None:
 
 
 def test_algorithm_3_takes_two_newton_steps() -> None:
-    Q = definite(10, 4)
-    p = np.random.default_rng(4).standard_normal(10)
-    state, point = newton(Q, p)
+    state, point = newton(*drawn(10, 4))
 
     def step(point: Point, sigma: float) -> Point:
         return state.moved(
@@ -134,9 +134,7 @@ def test_algorithm_3_takes_two_newton_steps() -> None:
 
 def test_the_textbook_corrector_meets_the_second_order_products() -> None:
     """With full steps its new products would be σμ up to the third-order part of the corrector."""
-    Q = definite(10, 4)
-    p = np.random.default_rng(4).standard_normal(10)
-    state, point = newton(Q, p)
+    state, point = newton(*drawn(10, 4))
     dlam, dy = state.direction(point, -point.lam * point.y, "predictor")
     np.testing.assert_allclose(point.lam * dy + point.y * dlam, -point.lam * point.y, rtol=1e-8)
     found = mehrotra(state, point)
@@ -179,8 +177,8 @@ def test_the_tolerance_is_an_energy_in_the_units_of_the_session() -> None:
 
 def test_no_feasibility_is_asked_for_below_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.methods.ipm.FEASIBILITY", 1e-10)
-    Q = definite(20, 6, condition=1e3)
-    p = 1e12 * np.random.default_rng(6).standard_normal(20)
+    Q, p = drawn(20, 6, condition=1e3)
+    p = 1e12 * p
     answer = solved(Q, p, tolerance=1.0)
     assert answer.status == "solved"
     size = abs(p).max() + abs(Q).max() * answer.lam.sum()

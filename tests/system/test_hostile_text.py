@@ -14,11 +14,11 @@ from matplotlib.text import Text
 from rich.table import Table
 from rich.text import Text as Lines
 from synthetic_results import no_answer, row, write_rows
+from test_series_report import made as series_of
 from typer import Typer
 from typer.testing import CliRunner
 
 from harness.cli.options import error_reporting
-from harness.results import series_file
 from harness.results.records import to_line
 from harness.terminal.console import PlainConsole
 from report.document import escape
@@ -73,23 +73,13 @@ def solution(folder: Path, name: str) -> Path:
     return folder
 
 
-def series_of(folder: Path, name: str) -> Path:
+def series(folder: Path, name: str) -> Path:
     """A series with one text for every name."""
-    identity = {"solver": "newton", "form": "dual", "tolerance": 1e-11}
-    facts = {"scene": name, "title": name, "cases": 4, "threads": 1, "machine": name, "identity": identity}
-    series_file.create(folder)
-    series_file.write_fact(folder, "series", json.dumps(facts))
-    numbers = {"setup_s": 0.1, "solve_s": 0.1, "form_s": 0.1, "max_gap_mm": 0.5, "mean_gap_mm": 0.1}
-    rows = [{"case": k, "verdict": "within", "bound_mm": 1e-9, **numbers} for k in range(4)]
-    rows[1]["verdict"] = "outside"
-    series_file.append(folder, [(row, np.ones(6, np.float32)) for row in rows])
-    nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 20.0)])
-    arrays = {"m": np.array(6), "contact_nodes": nodes, "fasteners": nodes[:2]}
-    series_file.write_contacts(folder, arrays)
+    series_of(folder, name=name)
     return folder
 
 
-MADE: list[Any] = [(results, write), (solution, write_solution), (series_of, write_series)]
+MADE: list[Any] = [(results, write), (solution, write_solution), (series, write_series)]
 
 
 @pytest.mark.parametrize(("made", "written"), MADE)

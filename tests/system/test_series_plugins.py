@@ -2,10 +2,14 @@
 
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
+from commands import harness
+from runs import all_end
 from strip import write_strip
-from test_hostile_plugins import command, harness, interrupt, write
+from test_hostile_plugins import command, interrupt, write
+from test_hostile_plugins import harness as outside
 
 from harness.results import series_file
 
@@ -13,6 +17,15 @@ pytestmark = pytest.mark.slow
 
 COUNTED = "self.count = getattr(self, 'count', 0) + 1\n        if self.count == 3: "
 MORE_MEMORY = "held = bytearray(2**30); held[::4096] = bytes(2**18); time.sleep(60)"
+
+
+@pytest.fixture(autouse=True)
+def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A cache that marks the processes of a test, which are to end; no report, whose pictures take long."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("report.writers.series.write", lambda directory: directory)
+    yield
+    assert all_end(tmp_path / "cache")
 
 
 def series(folder: Path, at_import: str = "", in_solve: str = "pass") -> list[object]:
@@ -36,35 +49,35 @@ def test_the_case_that_ends_the_process_is_a_row_and_the_others_are_solved(
 ) -> None:
     limits = ("--time-limit", 20, "--memory-limit", 700)
     going = [*series(tmp_path, in_solve=COUNTED + fault), *limits]
-    done = harness(tmp_path, *going)
-    assert done.returncode == 1
-    assert f"case 2: {status}, no_answer" in done.stdout
-    assert said in done.stdout
-    assert status == "failed" or "Not solved: 2. Run the same command again." in done.stdout
+    done = harness(*going)
+    assert done.exit_code == 1
+    assert f"case 2: {status}, no_answer" in done.output
+    assert said in done.output
+    assert status == "failed" or "Not solved: 2. Run the same command again." in done.output
     kept = list(series_file.rows(tmp_path / "out"))
     assert [row["verdict"] for row in kept] == ["within", "within", "no_answer"]
     if status != "crashed":
         return
-    done = harness(tmp_path, *going)
-    assert done.returncode == 1  # for the one without an answer
+    done = harness(*going)
+    assert done.exit_code == 1  # for the one without an answer
     rows = list(series_file.rows(tmp_path / "out"))
     assert rows[:3] == kept
     assert [(row["case"], row["verdict"]) for row in rows[3:]] == [(3, "within"), (4, "within")]
-    assert "4 within, 1 no answer" in done.stdout
+    assert "4 within, 1 no answer" in done.output
 
 
 def test_a_preparation_that_hangs_ends(tmp_path: Path) -> None:
     going = series(tmp_path)
     plugin = tmp_path / "mine.py"
     plugin.write_text(plugin.read_text() + "\n    def prepare(self, given):\n        time.sleep(60)\n")
-    done = harness(tmp_path, *going, "--time-limit", 1)
-    assert done.returncode == 1
-    assert "case 0: time_limit, no_answer: solve took more than 1 s" in done.stdout
+    done = harness(*going, "--time-limit", 1)
+    assert done.exit_code == 1
+    assert "case 0: time_limit, no_answer: solve took more than 1 s" in done.output
 
 
 def test_on_workers_too(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    done = harness(tmp_path, *series(tmp_path, in_solve="os._exit(7)"), "--scheduler", "local:1")
+    done = outside(tmp_path, *series(tmp_path, in_solve="os._exit(7)"), "--scheduler", "local:1")
     assert done.returncode == 3
     assert "ended with exit code 7" in done.stdout
     assert "5 no answer" in done.stdout
