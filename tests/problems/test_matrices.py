@@ -119,13 +119,6 @@ def test_blocks_of_different_sizes(bodies: list[int], blocks: list[int]) -> None
     assert (whole != K).nnz == 0
 
 
-def test_rounding_in_the_symmetry_of_K_is_taken_out(tmp_path: Path) -> None:
-    K = DATA["K"].copy()
-    K[0, 1] += 1e-13
-    made, _ = opened(write_npz(tmp_path, K=K))
-    np.testing.assert_array_equal(made.assembly.K.matrices[0], made.assembly.K.matrices[0].T)
-
-
 @pytest.mark.parametrize("key", ["K", "A", "f", "g"])
 def test_a_changed_entry_makes_another_problem(tmp_path: Path, key: str) -> None:
     before = read_scene(str(write_npz(tmp_path))).key
