@@ -69,12 +69,6 @@ def check_same(scene: JointScene) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=2e-9 * abs(expected).max(initial=0.0))
 
 
-@pytest.mark.parametrize("name", GALLERY)
-def test_a_scene_of_the_gallery(name: str) -> None:
-    scene = read_scene(name)
-    check_same(scene)
-
-
 @pytest.mark.parametrize("kind", sorted(TABLES))
 def test_every_effect(kind: str, tmp_path: Path) -> None:
     scene = read_scene(str(scene_of(tmp_path, *{kind, "supports"} if kind == "support_shift" else {kind})))
