@@ -57,7 +57,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def finished(folder: Path) -> Path:
     """A directory with the rows of a run; tests take a `copy`."""
-    code, text = said_by(run, read_suite(str(tiny.write_suite(folder, TWO))), folder / "finished")
+    code, text = said_by(
+        run, read_suite(str(tiny.write_suite(folder, TWO, yardstick=True))), folder / "finished"
+    )
     assert code == 0
     assert "4 measurements, 0 of them already" in text
     return folder / "finished"
@@ -73,7 +75,9 @@ def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
     assert all(row["displacement_error_mm"] < 1e-12 and row["contact_mismatch"] == 0 for row in judged)
     (unsupported,) = [row for row in rows if row["form"] == "primal"]
     assert (unsupported["status"], unsupported["verdict"]) == ("unsupported", "no_answer")
+    assert unsupported["message"] == "takes dual only"
     for row in judged:
+        assert all(0 < row[name] < 10 for name in ("cholesky_s", "product_s"))  # the yardstick
         with np.load(finished / row["answer"]) as saved:
             assert (saved["x"].shape, saved["lam"].shape) == ((20,), (10,))
     (problem,) = records.read(finished / "problems.jsonl")
@@ -262,15 +266,6 @@ def test_an_interrupted_run_keeps_its_rows_and_goes_on(folder: Path) -> None:
     assert "2 measurements, 1 of them already" in text
     assert rows.read_bytes().startswith(before)
     assert [row["status"] for row in rows_of(here / "out")] == ["iteration_limit", "time_limit"]
-
-
-def test_the_yardstick_stands_beside_each_solve_where_it_is_asked_for(folder: Path, finished: Path) -> None:
-    suite = read_suite(str(tiny.write_suite(folder / "yardstick", yardstick=True)))
-    assert said_by(run, suite, folder / "yardstick" / "out")[0] == 0
-    (row,) = rows_of(folder / "yardstick" / "out")
-    for name in ("cholesky_s", "product_s"):
-        assert rows_of(finished)[0][name] is None
-        assert 0 < row[name] < 10
 
 
 def test_the_row_is_measured_again_and_compared(copy: Path, tmp_path: Path) -> None:
