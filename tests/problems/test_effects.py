@@ -53,16 +53,15 @@ def test_fastener_on_a_tool_has_no_counterpart() -> None:
     assert f.tolist() == [10.0] + 44 * [0.0]
 
 
+def patterned(**pattern: float) -> Fasteners:
+    return Fasteners.model_validate({"kind": "fasteners", "preload": 1.0, "pattern": pattern})
+
+
 def test_pattern_spreads_evenly_up_to_the_edge() -> None:
-    made = Fasteners.model_validate(
-        {"kind": "fasteners", "preload": 1.0, "pattern": {"columns": 4, "rows": 3, "edge": 20.0}}
-    )
+    made = patterned(columns=4, rows=3, edge=20.0)
     expected = [(x, y) for y in (20.0, 60.0, 100.0) for x in (20.0, 140.0, 260.0, 380.0)]
     np.testing.assert_allclose(made.marks(JOINT), expected)
-    single = Fasteners.model_validate(
-        {"kind": "fasteners", "preload": 1.0, "pattern": {"columns": 1, "rows": 1, "edge": 20.0}}
-    )
-    np.testing.assert_allclose(single.marks(JOINT), [(200.0, 60.0)])
+    np.testing.assert_allclose(patterned(columns=1, rows=1, edge=20.0).marks(JOINT), [(200.0, 60.0)])
 
 
 @pytest.mark.parametrize(
@@ -72,9 +71,7 @@ def test_the_edge_of_a_pattern_is_bounded_along_its_rows_and_columns(
     rows: int, edge: float, most: str | None
 ) -> None:
     """On 400 × 120 mm: a single row stands in the middle, whatever the edge."""
-    pattern = {"columns": 4, "rows": rows, "edge": edge}
-    made = Fasteners.model_validate({"kind": "fasteners", "preload": 1.0, "pattern": pattern})
-    said = [allowed for _, _, allowed in made.faults(JOINT)]
+    said = [allowed for _, _, allowed in patterned(columns=4, rows=rows, edge=edge).faults(JOINT)]
     assert said == ([f"at most half the junction, {most}"] if most else [])
 
 
