@@ -12,18 +12,18 @@ TIMEOUT_S = 10.0  # for children that keep forking
 
 
 def end_children(pid: int) -> None:
-    """Kill the children of a stopped process until none is left.
+    """Kill the children of a stopped process until all that it has were dead before they were listed.
 
-    Their orphans become its children too, since it is a subreaper.
+    Their orphans become its children too, since it is a subreaper: so one that forks and dies before it is
+    killed adds its orphan to the next list. The dead stay in the list, since nobody waits for them.
     """
     deadline = time.monotonic() + TIMEOUT_S
-    alive = True
-    while alive and time.monotonic() < deadline:
-        children = _children(pid)
+    ended: set[int] = set()
+    while (children := [c for c in _children(pid) if c not in ended]) and time.monotonic() < deadline:
         for child in reversed(children):  # the youngest first, before its parent forks another
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(child, signal.SIGKILL)
-        alive = any(map(_is_alive, children))
+        ended.update(child for child in children if not _is_alive(child))
 
 
 def _children(pid: int) -> list[int]:

@@ -1,14 +1,29 @@
-"""Rows on disk: whole lines, torn lines, a full disk, two writers."""
+"""Rows on disk: whole lines, torn lines, a full disk, two writers; their fields; on the terminal."""
 
 import json
 import os
+from dataclasses import fields
+from io import StringIO
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
+from rich.console import Console
+from synthetic_results import no_answer, row
 
-from harness.results import records
+from harness.results import records, schema
+from harness.terminal.progress import Display
+from harness.verification.judge import Judgement
+from problems.drawn import EXAMPLES
 from problems.errors import InputError
+from problems.ladders import LADDERS
+from solvers.base import Status
+
+PUBLISHED = Path(__file__).parents[2] / "results" / "published"
+RESULTS = sorted(path.parent.name for path in PUBLISHED.glob("*/measurements.jsonl"))
+TYPES = {"number": (int, float), "text": str, "flag": bool, "object": dict}
+FORMERLY = {"together": "batched"}
 
 
 @pytest.fixture
@@ -80,3 +95,47 @@ def test_an_unwritable_directory_is_named(tmp_path: Path, monkeypatch: pytest.Mo
     Path("file").touch()
     with pytest.raises(InputError, match=r"file/out'.*cannot be written"):
         records.locked(Path("file/out")).__enter__()
+
+
+# --- the names of a row's fields, in one place for the harness and the report ---------------------------
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_field_of_the_published_rows_is_in_the_schema_with_its_kind(name: str) -> None:
+    for line in (PUBLISHED / name / "measurements.jsonl").read_text("utf-8").splitlines():
+        row = json.loads(line)
+        assert row["status"] in schema.STATUSES
+        assert row["verdict"] in schema.VERDICTS
+        for field, value in row.items():
+            kind = schema.FIELDS[FORMERLY.get(field, field)]
+            assert value is None or isinstance(value, TYPES[kind]), field
+            assert kind == "flag" or not isinstance(value, bool), field
+
+
+def test_the_vocabulary_is_that_of_solvers_judge_and_ladders() -> None:
+    assert set(get_args(Status)) == set(schema.STATUSES[:4])
+    assert {field.name for field in fields(Judgement)} == set(schema.JUDGED)
+    assert schema.LADDERS == LADDERS
+    assert all(name.startswith(schema.DRAWN) for name in EXAMPLES)
+    assert schema.ANSWERED == ("within", "outside", "cannot_be_judged")
+
+
+def test_a_field_has_one_kind() -> None:
+    groups = (schema.ASKED, schema.PROBLEM, schema.MEASURED, schema.MEASURED_OF_CASES, schema.JUDGED)
+    assert sum(map(len, (*groups, schema.ORIGIN))) == len(schema.FIELDS)
+    assert sorted(name for kind in TYPES for name in schema.of_kind(kind)) == sorted(schema.FIELDS)
+
+
+def test_a_line_says_the_outcome_and_why() -> None:
+    times = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "solve_s", "form_s"), 0.25)
+    solved = row(solver="gi", iterations=7, displacement_error_mm=2e-11, **times)
+    crashed = solved | no_answer("crashed") | {"setup_s": 0.25, "message": "killed by SIGSEGV\nmore"}
+    shown = StringIO()
+    with Display(Console(file=shown, width=60), 2, 0) as display:
+        display.finished(solved)
+        display.finished(crashed)
+    heading, first, second, why = filter(str.strip, shown.getvalue().splitlines())
+    assert heading.split()[:2] == ["scene", "solver"]
+    assert " ".join(first.split()) == "4386/0052 gi dual 1e-09 2 solved 7 0.50 0.75 2.0e-11 within"
+    assert " ".join(second.split()) == "4386/0052 gi dual 1e-09 2 crashed – – – – no_answer"
+    assert why.strip() == "killed by SIGSEGV"

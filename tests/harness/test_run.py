@@ -1,4 +1,6 @@
-"""A run from a suite to rows, answers, report and gate, through real workers on a tiny scene."""
+"""A run from a suite to rows, answers, report and gate, through real workers on a tiny scene; and a row of it
+measured again, `run DIR --key KEY`.
+"""
 
 import json
 import os
@@ -17,6 +19,7 @@ from commands import harness
 from runs import moved, rows_of, said_by, wait_for
 
 from harness.measurement.run import run
+from harness.planning.plan import expand, of_key
 from harness.planning.suite import read_suite
 from harness.results import records
 from harness.results.answer_files import pack
@@ -43,6 +46,8 @@ forms = ["dual"]
 tolerances = [1e-6, 1e-8]
 """
 
+KEY = "tiny exact dual tol=1e-06 threads=1 repeat=0"
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -52,7 +57,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def finished(folder: Path) -> Path:
     """A directory with the rows of a run; tests take a `copy`."""
-    code, text = said_by(run, read_suite(str(tiny.write_suite(folder, TWO))), folder / "finished")
+    code, text = said_by(
+        run, read_suite(str(tiny.write_suite(folder, TWO, yardstick=True))), folder / "finished"
+    )
     assert code == 0
     assert "4 measurements, 0 of them already" in text
     return folder / "finished"
@@ -68,7 +75,9 @@ def test_a_run_writes_what_the_contract_names(finished: Path) -> None:
     assert all(row["displacement_error_mm"] < 1e-12 and row["contact_mismatch"] == 0 for row in judged)
     (unsupported,) = [row for row in rows if row["form"] == "primal"]
     assert (unsupported["status"], unsupported["verdict"]) == ("unsupported", "no_answer")
+    assert unsupported["message"] == "takes dual only"
     for row in judged:
+        assert all(0 < row[name] < 10 for name in ("cholesky_s", "product_s"))  # the yardstick
         with np.load(finished / row["answer"]) as saved:
             assert (saved["x"].shape, saved["lam"].shape) == ((20,), (10,))
     (problem,) = records.read(finished / "problems.jsonl")
@@ -93,20 +102,18 @@ def test_running_again_measures_nothing_twice(copy: Path, folder: Path) -> None:
     assert json.loads(again[3])["key"] == json.loads(lines[3])["key"]
 
 
-@pytest.mark.parametrize("name", ["scene_key", "solver_version", "solver_code"])
-def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path, name: str) -> None:
-    suite = read_suite(str(folder / "small.toml"))
-    solver = suite.solver[1].model_copy(update={"tolerances": [1e-6]})
-    suite = suite.model_copy(update={"solver": [solver]})
-    rows = rows_of(copy)
-    for row in rows:
-        row[name] = "an older one" if row["tolerance"] == 1e-6 else row[name]
+def test_rows_of_another_scene_or_solver_are_set_aside(copy: Path, folder: Path) -> None:
+    rows, names = rows_of(copy), ("scene_key", "solver_version", "solver_code")
+    answered = [row for row in rows if row["answer"]]
+    for row, name in zip(answered, names, strict=True):
+        row[name] = "an older one"
     records.rewrite(copy / records.MEASUREMENTS, rows)
-    code, text = said_by(run, suite, copy)
+    code, text = said_by(run, read_suite(str(folder / "small.toml")), copy)
     assert code == 0
-    assert "1 rows are set aside" in text
-    (aside,) = records.read(copy / records.OUTDATED)
-    assert (aside[name], aside["answer"]) == ("an older one", None)
+    assert "3 rows are set aside" in text
+    aside = records.read(copy / records.OUTDATED)
+    assert [row[name] for row, name in zip(aside, names, strict=True)] == ["an older one"] * 3
+    assert {row["answer"] for row in aside} == {None}
     assert len(rows_of(copy)) == 4
 
 
@@ -261,10 +268,34 @@ def test_an_interrupted_run_keeps_its_rows_and_goes_on(folder: Path) -> None:
     assert [row["status"] for row in rows_of(here / "out")] == ["iteration_limit", "time_limit"]
 
 
-def test_the_yardstick_stands_beside_each_solve_where_it_is_asked_for(folder: Path, finished: Path) -> None:
-    suite = read_suite(str(tiny.write_suite(folder / "yardstick", yardstick=True)))
-    assert said_by(run, suite, folder / "yardstick" / "out")[0] == 0
-    (row,) = rows_of(folder / "yardstick" / "out")
-    for name in ("cholesky_s", "product_s"):
-        assert rows_of(finished)[0][name] is None
-        assert 0 < row[name] < 10
+def test_the_row_is_measured_again_and_compared(copy: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again"
+    done = harness("run", copy, "--key", KEY, "--out", again)
+    assert done.exit_code == 0, done.output
+    (then,) = (row for row in rows_of(copy) if row["key"] == KEY)
+    (now,) = rows_of(again)
+    same = ("key", "suite", "scene_key", "verdict", "displacement_error_mm", "iterations", "solver_code")
+    assert {name: now[name] for name in same} == {name: then[name] for name in same}
+    assert harness("compare", copy, again, "--max-slowdown", 1000).exit_code == 1  # the other row is missing
+    assert harness("compare", copy, again, "--key", KEY, "--max-slowdown", 1000).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "key", ["tiny exact", "tiny gi dual tol=1e-06 threads=1 repeat=0", "", KEY + " case=1"]
+)
+def test_a_key_that_is_not_planned_is_bad_input(copy: Path, tmp_path: Path, key: str) -> None:
+    done = harness("run", copy, "--key", key, "--out", tmp_path / "again")
+    assert done.exit_code == 2
+    assert "--key" in done.stderr
+    assert not (tmp_path / "again").exists()
+
+
+def test_a_case_of_a_series_comes_after_those_before_it() -> None:
+    """In whole batches; other processes are left out."""
+    plan = expand(read_suite("series"))
+    batched = next(m for m in plan if m.batched and m.case == m.batched + 1)
+    found = of_key(plan, batched.key)
+    assert [m.case for m in found] == list(range(2 * (batched.batched or 0)))
+    assert {m.process for m in found} == {batched.process}
+    single = next(m for m in plan if not m.batched and m.case == 3)
+    assert [m.case for m in of_key(plan, single.key)] == [0, 1, 2, 3]

@@ -200,12 +200,6 @@ def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         *("answer.md", "contacts.csv", "index.html", "nodes.csv", "solution.json", "solution.npz")
     }
-    # One closed contact: x₀ − x₂ = 0.1 with K x = f − A λ, solved by hand: λ = 2 (x₀ − 0.1), 13 x₀ = 21.2.
-    x = arrays(tmp_path)["x"]
-    force = arrays(tmp_path)["lam"][0]
-    assert x[0] - x[2] == pytest.approx(0.1)
-    assert force == pytest.approx(2 * x[2])
-    np.testing.assert_allclose(K @ x, [5.0 - force, 1.0, force], atol=1e-12)
     said = harness("validate", tmp_path / "mine.npz").output
     assert "n = 3, m = 2, blocks of 3" in said
     assert "seem to have 1 digits" in said

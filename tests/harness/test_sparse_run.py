@@ -51,6 +51,7 @@ def test_both_forms_are_within_and_say_so_in_the_same_terms(finished: Path) -> N
         assert row["displacement_error_mm"] < 1e-9
         assert row["reference_bound_mm"] < 1e-9
         assert row["contact_mismatch"] == 0
+        assert row["cholesky_s"] is row["product_s"] is None  # no yardstick was asked for
     assert rows["dual"]["active"] == rows["sparse"]["active"] > 0
     assert rows["dual"]["scene_key"] == rows["sparse"]["scene_key"]
     with (

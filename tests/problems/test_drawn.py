@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 import problems.drawn
-from harness import solve
 from harness.cli.listing import listing
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import expand
@@ -126,10 +125,3 @@ def test_the_list_of_scenes_says_in_a_line_that_they_exist() -> None:
     table = listing("scenes")
     assert not any(name.startswith(DRAWN) for name in scene_names())
     assert str(table.caption).startswith("Not listed: scenes drawn at random, drawn/<n>/<k>")
-
-
-@pytest.mark.slow
-def test_a_drawn_scene_is_solved_in_the_sparse_form() -> None:
-    answer = solve("drawn/4386/7", "newton", form="sparse", tolerance=1e-10)
-    assert (answer.status, answer.judgement.verdict) == ("solved", "within")
-    assert 0 < (answer.lam > 0).sum() < 2193

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joints import make_joint, make_scene
+from joints import make_joint
 from pydantic import ValidationError
 
-from problems.build import load_case, prepared
 from problems.effects.clamps import Clamps
 from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import SHIFT, InitialGap
@@ -48,30 +47,21 @@ def test_fastener_acts_on_the_nearest_node(points: list[tuple[float, float]]) ->
         assert nearest <= np.hypot(25.0, 15.0)
 
 
-def test_fastener_closes_the_gap() -> None:
-    """The sign: without contact the parts come closer, x_a − x_b > 0."""
-    scene = make_scene(JOINT, Fasteners(kind="fasteners", preload=10.0, points=((200.0, 60.0),)))
-    made = prepared(scene)
-    approach = made.assembly.A.T @ made.assembly.K.solve(load_case(scene).f)
-    assert (approach > 0).all()
-
-
 def test_fastener_on_a_tool_has_no_counterpart() -> None:
     joint = make_joint(PART, contacts=[["a", "tool"]], nodes=(9, 5))
     f = Fasteners(kind="fasteners", preload=10.0, points=((0.0, 0.0),)).force(joint)
     assert f.tolist() == [10.0] + 44 * [0.0]
 
 
+def patterned(**pattern: float) -> Fasteners:
+    return Fasteners.model_validate({"kind": "fasteners", "preload": 1.0, "pattern": pattern})
+
+
 def test_pattern_spreads_evenly_up_to_the_edge() -> None:
-    made = Fasteners.model_validate(
-        {"kind": "fasteners", "preload": 1.0, "pattern": {"columns": 4, "rows": 3, "edge": 20.0}}
-    )
+    made = patterned(columns=4, rows=3, edge=20.0)
     expected = [(x, y) for y in (20.0, 60.0, 100.0) for x in (20.0, 140.0, 260.0, 380.0)]
     np.testing.assert_allclose(made.marks(JOINT), expected)
-    single = Fasteners.model_validate(
-        {"kind": "fasteners", "preload": 1.0, "pattern": {"columns": 1, "rows": 1, "edge": 20.0}}
-    )
-    np.testing.assert_allclose(single.marks(JOINT), [(200.0, 60.0)])
+    np.testing.assert_allclose(patterned(columns=1, rows=1, edge=20.0).marks(JOINT), [(200.0, 60.0)])
 
 
 @pytest.mark.parametrize(
@@ -81,9 +71,7 @@ def test_the_edge_of_a_pattern_is_bounded_along_its_rows_and_columns(
     rows: int, edge: float, most: str | None
 ) -> None:
     """On 400 × 120 mm: a single row stands in the middle, whatever the edge."""
-    pattern = {"columns": 4, "rows": rows, "edge": edge}
-    made = Fasteners.model_validate({"kind": "fasteners", "preload": 1.0, "pattern": pattern})
-    said = [allowed for _, _, allowed in made.faults(JOINT)]
+    said = [allowed for _, _, allowed in patterned(columns=4, rows=rows, edge=edge).faults(JOINT)]
     assert said == ([f"at most half the junction, {most}"] if most else [])
 
 

@@ -1,9 +1,12 @@
-"""The ladders: their answers are exact, what cannot be taken is refused, and the in-house solvers hold."""
+"""The ladders: their answers are exact, what cannot be taken is refused, and the in-house solvers hold. At
+full size: as exact, made when needed only, and all in the suite.
+"""
 
 from functools import cache
 
 import numpy as np
 import pytest
+import scipy.linalg as sla
 from exact_answer import is_exact
 from long import tried
 
@@ -17,8 +20,8 @@ from problems.build import prepared
 from problems.errors import InputError
 from problems.forms.assembly import LoadCase
 from problems.forms.problem import in_form
-from problems.ladders import make_rung, rung_names
-from problems.ladders.manufactured import spectrum
+from problems.ladders import ladders, make_rung, rung_names
+from problems.ladders.manufactured import contacts, exact_assembly, spectrum, two_parts
 from problems.model.scene import ManufacturedProblem, ManufacturedScene
 from problems.scene import read_scene, scene_names
 from solvers.base import Answer, Form
@@ -40,6 +43,7 @@ IN_HOUSE: list[tuple[str, Form, float]] = [
     ("ipm-fast", "dual", 1e-10),
     ("mprgp", "dual", 1e-10),
 ]
+GATED = {("newton", "dual"), ("ipm-fast", "dual"), ("ipm", "dual"), ("gi", "dual"), ("gi", "primal")}
 #: Where the paper's interior-point method, which starts from forces of 1 N, may say that it finds no answer.
 MAY_GIVE_UP = [("ipm", name) for name in TAKEN if name.endswith("/chain-32")]
 
@@ -73,21 +77,14 @@ def test_the_share_of_contacts_without_a_force_is_as_named(percent: int) -> None
     assert weak == round(percent / 100 * made.assembly.m)
 
 
-@pytest.mark.parametrize("condition", [1e6, 1e10])
-def test_the_spectrum_is_as_named(condition: float) -> None:
-    d = spectrum(64, condition)
-    assert d[-1] / d[0] == condition
-    for K in made_of(f"hard/conditioning/{condition:.0e}").assembly.K.matrices:
-        values = np.linalg.eigvalsh(K)
-        np.testing.assert_allclose(values, 64 * d, atol=1e-15 * 64 * values[-1])
-
-
 def test_cond_grows_along_the_ladders_that_say_so() -> None:
     for ladder in ("conditioning", "coincident", "thickness", "refinement", "together"):
         names = [name for name in TAKEN if f"/{ladder}/" in name]
         conditions = [opened(name).prepared.facts["cond_K"] for name in names]
         assert conditions == sorted(conditions)  # type: ignore[type-var]
         assert len(names) >= 4
+        if ladder == "conditioning":
+            assert conditions == pytest.approx([float(name.rpartition("/")[2]) for name in names], rel=0.05)
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -171,3 +168,72 @@ def test_all_contacts_of_a_vertex_touch_and_a_third_have_a_force(n: int) -> None
     assert made.assembly.A.shape == (n, n)
     assert not (made.load.g - made.assembly.A.T @ made.x).any()
     assert np.count_nonzero(made.lam) == round(n / 3)
+
+
+# --- at full size ---------------------------------------------------------------------------------------
+
+FULL = rung_names("hard-full/")
+OF_BOTH_SIZES = ["degeneracy", "duplicates", "supports", "thickness"]
+N = 300  # unknowns per part: 256 + 32 + 8 + 4
+SMALL = {
+    **{
+        f"{percent} % weak": two_parts(N, 1e6, seed=2, closed=min(0.4, 1 - percent / 100), weak=percent / 100)
+        for percent in (25, 50, 75, 100)
+    },
+    **{f"cond {cond:g}": two_parts(N, cond, seed=2) for cond in (1e10, 1e12)},
+    **{f"2^-{bits} apart": two_parts(N, 1e4, seed=3, A=contacts(N, 128, 2.0**-bits)) for bits in (4, 12, 16)},
+}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_an_answer_as_of_the_full_size_is_exact(name: str) -> None:
+    assert is_exact(SMALL[name], 2**60)
+
+
+def test_the_spectrum_is_exact_for_every_size_and_that_of_hadamard_for_a_power_of_two() -> None:
+    for n in (1, 22, 64):
+        d = spectrum(n, 1e4)
+        K, _ = exact_assembly(d, d).K.matrices
+        np.testing.assert_allclose(np.linalg.eigvalsh(K), 64 * np.sort(d), rtol=1e-9)
+    H = sla.hadamard(64, dtype=float)
+    np.testing.assert_array_equal(K, (H * d) @ H)  # 64 = the stiffness of the grid's smallest eigenvalue
+
+
+def test_a_rung_is_named_by_its_size_and_has_it() -> None:
+    assert list(ladders("hard-full/")) == ["conditioning", *OF_BOTH_SIZES]
+    for name in FULL:
+        size = int(name.split("/")[2].split("-")[0])
+        assert (read_scene(name).expected_size or ())[0] == size
+        assert read_scene(name).on_ladder
+    for ladder in OF_BOTH_SIZES:
+        assert any(name.startswith(f"hard-full/{ladder}/11308-") for name in FULL)
+
+
+def test_nothing_is_made_before_it_is_needed_and_one_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+
+    def make(name: str) -> ManufacturedProblem:
+        made.append(name)
+        return SMALL["25 % weak"]
+
+    for name in FULL:
+        scene = make_rung(name)
+        if isinstance(scene, ManufacturedScene):
+            monkeypatch.setitem(vars(scene), "make", lambda name=name: make(name))
+    expand(read_suite("hard-full"))
+    assert not made
+    first, second = read_scene("hard-full/degeneracy/4386-025"), read_scene("hard-full/degeneracy/4386-050")
+    for scene in (first, first, second, second, first):
+        _ = scene.made  # type: ignore[attr-defined]
+    assert made == [first.name, second.name, first.name]
+
+
+def test_the_suite_at_full_size_measures_every_rung_with_every_solver_of_ours() -> None:
+    suite = read_suite("hard-full")
+    plan = expand(suite)
+    assert {m.scene for m in plan} == set(FULL)
+    for name in FULL:
+        ours = {(m.solver, m.form) for m in plan if m.scene == name and m.gated}
+        assert ours == GATED - ({("gi", "primal")} if "/11308-" in name else set())
+    assert len({m.solver for m in plan if not m.gated}) <= 2
+    assert not any(scene.startswith("hard-full/") for scene in read_suite("hard").scenes)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.optimize
 import scipy.sparse as sp
+from long import ASKED
 from synthetic_results import row, write_rows
 
 from harness.planning.form_choice import chosen_form
@@ -23,7 +23,11 @@ from report.results.reader import read
 from report.sections import outside
 from solvers.registry import make_solver
 
-PRINTED = [name for name in rung_names("outside/") if not name.rpartition("/")[2].isdigit()]
+PRINTED = [
+    name
+    for name in rung_names("outside/")
+    if not name.rpartition("/")[2].isdigit() and (ASKED or read_scene(name).expected_size[0] < 5000)
+]
 LARGE = "outside/torsion/80"
 
 
@@ -67,17 +71,6 @@ def test_the_membrane_over_a_hemisphere_converges_to_its_closed_form() -> None:
 def test_torsion_stays_above_the_lower_bound_that_is_not_stated() -> None:
     known, _ = solved("outside/torsion/40")
     assert known.x.min() > 0
-
-
-def test_the_free_boundary_is_found_by_another_code() -> None:
-    """SciPy's bounded least squares: with K = LLᵀ the problem is min ‖Lᵀx − L⁻¹f‖ with bounds on x."""
-    scene = read_scene("outside/obstacle/20")
-    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
-    K = data.assembly.K.matrix.toarray()
-    L = np.linalg.cholesky(K)
-    found = scipy.optimize.lsq_linear(L.T, np.linalg.solve(L, load.f), (-load.g, np.inf), tol=1e-14)
-    known, _ = solved("outside/obstacle/20")
-    assert abs(found.x - known.x).max() < 1e-6
 
 
 def test_a_large_one_is_solved_in_the_sparse_form_by_choice() -> None:

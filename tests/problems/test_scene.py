@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.scene import ASSEMBLIES, read_scene
 
@@ -167,12 +166,6 @@ def test_supports_on_a_line_let_a_part_float(path: Path, points: str) -> None:
     (fault,) = faults(path, swapped(('clamped = ["north"]', "")) + supports)
     assert fault.key == "part.a"
     assert "off a line" in fault.allowed
-
-
-def test_supports_at_three_corners_hold_a_part(path: Path) -> None:
-    supports = '\n[[effect]]\nkind = "supports"\npart = "a"\npoints = [[0, 0], [100, 0], [0, 50]]\n'
-    path.write_text(swapped(('clamped = ["north"]', "")) + supports)
-    assert float(str(prepared(read_scene(str(path))).facts["lambda_min"])) > 1
 
 
 def test_a_closed_chain_of_contacts(path: Path) -> None:

@@ -1,7 +1,9 @@
-"""Entries of K⁻¹ and Q, all or near the diagonal, by the factor of a sparse K, against a dense inverse; and
-the coarser model of a joint for them: the same junction, nearly the same compliance, no softer.
+"""Entries of K⁻¹ and Q, all or near the diagonal, by the factor of a sparse K, against a dense inverse; the
+coarser model of a joint for them: the same junction, nearly the same compliance, no softer; and when K⁻¹ is
+refined.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,10 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from joints import make_joint, make_scene
 from long import seeds
+from small import make_load, make_prepared
 from sparse_matrices import band_matrix, graph_matrix, renumbered
 
-from problems.forms.assembly import Assembly
+from problems.forms.assembly import Assembly, LoadCase, Matrix
 from problems.forms.prepared import Prepared
 from problems.model.effect import Effect, effect_class
 from problems.model.joint_model import JointModel
@@ -189,3 +192,35 @@ def test_the_junction_and_the_clamped_edges_are_kept(scene: Any) -> None:
             given.plate.y[line] for line in given.clamped
         }
         assert (made.plate.y[[0, -1]] == given.plate.y[[0, -1]]).all()
+
+
+# --- K⁻¹ by a factor, refined where the residual asks for it --------------------------------------------
+
+
+class Counted(Stiffness):
+    solves = 0
+
+    def solve(self, b: Matrix) -> Matrix:
+        self.solves += 1
+        return super().solve(b)
+
+
+@pytest.mark.parametrize(("error", "solves"), [(0.0, 1), (1e-7, 2)])
+@pytest.mark.parametrize("columns", [1, 2])
+def test_a_second_pass_only_where_the_first_leaves_a_residual(
+    error: float, solves: int, columns: int
+) -> None:
+    made = make_prepared(4, 20)
+    case, _ = make_load(4, made)
+    lam: Any = np.random.default_rng(5).random(made.assembly.m)
+    K = sp.block_diag(made.assembly.K.matrices).toarray()
+    wanted = np.linalg.solve(K, case.f - made.assembly.A @ lam)
+    if columns > 1:
+        wanted, f, lam = (np.column_stack([v] * columns) for v in (wanted, case.f, lam))
+        case = LoadCase(f, case.g)
+    counted = Counted.of(*made.assembly.K.matrices)
+    for block, U in zip(counted.blocks, made.assembly.K.factors, strict=True):
+        block.U = U * (1 + error)  # type: ignore[attr-defined]
+    found = Prepared(replace(made.assembly, K=counted)).recover(lam, case)
+    np.testing.assert_allclose(found, wanted, rtol=1e-10, atol=1e-12 * abs(wanted).max())
+    assert counted.solves == solves

@@ -1,4 +1,6 @@
-"""The uncondensed model against the condensed one, whose code for K, loads and springs is another."""
+"""The uncondensed model against the condensed one, whose code for K, loads and springs is another; both made
+once.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,14 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from commands import harness
 from joints import make_joint, make_scene
 from scipy.sparse.linalg import splu
 from test_only_what_is_called_for import TABLES, scene_of
 
-from problems.build import load_case, prepared
+from problems import scene as reading
+from problems.build import load_case, model_of, prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
+from problems.effects.supports import Supports
+from problems.errors import InputError
 from problems.forms.assembly import Assembly, Matrix
+from problems.model.condense import NotPositiveDefinite, condense
 from problems.model.effect import effect_class
 from problems.model.joint_model import JointModel
 from problems.model.scene import JointScene
@@ -60,12 +67,6 @@ def check_same(scene: JointScene) -> None:
         (whole.compliance @ lam, dense.Q @ lam),
     ):
         np.testing.assert_allclose(found, expected, rtol=0, atol=2e-9 * abs(expected).max(initial=0.0))
-
-
-@pytest.mark.parametrize("name", GALLERY)
-def test_a_scene_of_the_gallery(name: str) -> None:
-    scene = read_scene(name)
-    check_same(scene)
 
 
 @pytest.mark.parametrize("kind", sorted(TABLES))
@@ -154,3 +155,55 @@ def test_parts_of_any_shape(part: dict[str, Any]) -> None:
         for kind, table in tables.items()
     ]
     check_same(make_scene(make_joint(part, contacts=[("a", "tool")]), *effects))
+
+
+def test_a_motion_without_energy_is_refused() -> None:
+    spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    K = sp.csr_array(sp.block_diag([spring, np.eye(2)]))
+    with pytest.raises(NotPositiveDefinite):
+        condense(K, [np.array([0, 1]), np.array([2, 3])], np.array([False, False, False, True]))
+
+
+@pytest.mark.parametrize("points", [(), ((30.0, 20.0), (130.0, 40.0), (330.0, 80.0))])  # on one line
+def test_a_part_that_floats_is_refused(points: tuple[tuple[float, float], ...]) -> None:
+    joint = make_joint({"south": LONG}, contacts=[["a", "tool"]])
+    effects = [Supports(kind="supports", part="a", points=points)] if points else []
+    with pytest.raises(InputError, match="held against every rigid motion"):
+        _ = prepared(make_scene(joint, *effects)).assembly.K.factors
+
+
+@pytest.mark.parametrize("form", ["dual", "primal", "sparse"])
+def test_one_solve_makes_one_model_and_reads_its_scene_once(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, read = [], []
+    of, toml = JointModel.of.__func__, reading.read_toml  # type: ignore[attr-defined]
+
+    def counted(cls: Any, scene: Any) -> Any:
+        made.append(scene)
+        return of(cls, scene)
+
+    def counted_read(path: Path) -> Any:
+        read.append(path)
+        return toml(path)
+
+    monkeypatch.setattr(JointModel, "of", classmethod(counted))
+    monkeypatch.setattr(reading, "read_toml", counted_read)
+    monkeypatch.setattr("report.writers.solution.answer_figures", lambda *_: {})
+    path = scene_of(tmp_path, "initial_gap", "pressure", "self_weight")
+    done = harness("solve", path, "--form", form, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert (len(made), read) == (1, [path])
+
+
+def test_load_cases_of_some_effects_add_up_to_that_of_all() -> None:
+    weight = SelfWeight(kind="self_weight", part="a")
+    tie = InstalledFasteners(kind="installed_fasteners", points=((200.0, 40.0),), approach=0.5)
+    scene = make_scene(make_joint(HELD, HELD | {"name": "b"}), weight, tie)
+    for form in ("dual", "sparse"):
+        whole = load_case(scene, form)
+        alone = [load_case(scene, form, [effect]) for effect in (weight, tie)]
+        assert abs(whole.f).max() > 0
+        assert abs(whole.f - sum(each.f for each in alone)).max() <= 1e-12 * abs(whole.f).max()
+    assert model_of(scene) is model_of(scene)
+    assert prepared(scene).assembly.parts == prepared(scene, form="sparse").assembly.parts == ("a + b",)

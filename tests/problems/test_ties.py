@@ -5,7 +5,7 @@ import pytest
 import scipy.linalg as sla
 from joints import make_joint, make_scene, untied
 
-from problems.build import load_case, prepared
+from problems.build import prepared
 from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.pressure import Pressure
 from problems.effects.supports import Supports
@@ -17,27 +17,6 @@ FOUR = make_joint(*(PART | {"name": name, "thickness": 4.0 + k} for k, name in e
 
 def fastener(*points: tuple[float, float], **more: object) -> InstalledFasteners:
     return InstalledFasteners.model_validate({"kind": "installed_fasteners", "points": points} | more)
-
-
-@pytest.mark.parametrize("stiffness", [1e2, 1e5, 1e7])
-def test_one_fastener_draws_two_equal_parts_together(stiffness: float) -> None:
-    """Each part has the compliance c at the node: x_a = −x_b = c k d / (1 + 2 c k)."""
-    scene = make_scene(TWO, fastener((200.0, 40.0), stiffness=stiffness, approach=0.6))
-    made = prepared(scene)
-    x = made.assembly.K.solve(load_case(scene).f)
-    node = 7  # (200, 40) on the 5 × 4 grid
-    c = np.linalg.inv(prepared(untied(scene)).assembly.K.matrices[0])[node, node]
-    u = c * stiffness * 0.6 / (1 + 2 * c * stiffness)
-    assert x[node] == pytest.approx(u, rel=1e-9)
-    np.testing.assert_allclose(x[:20], -x[20:], atol=1e-12)
-
-
-def test_fasteners_without_approach_let_equal_parts_move_as_one() -> None:
-    """The same load on both: no spring is stretched, and the parts do what they do without them."""
-    loads = [Pressure(kind="pressure", part=name, value=1e-3) for name in "ab"]
-    bare, tied = make_scene(TWO, *loads), make_scene(TWO, *loads, fastener((100.0, 0.0), (300.0, 80.0)))
-    x = [made.assembly.K.solve(load_case(s).f) for s in (bare, tied) for made in [prepared(s)]]
-    np.testing.assert_allclose(x[0], x[1], rtol=1e-8)
 
 
 def test_blocks_are_those_of_the_dense_sum() -> None:

@@ -1,5 +1,9 @@
-"""A user's own sparse K from its files to the answer: nothing dense, and one message for what is wrong."""
+"""A sparse K, a user's own or a scene's, from its files to the answer: nothing dense, few arrays however many
+bodies there are, and one message for what is wrong.
+"""
 
+import os
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -8,23 +12,43 @@ import pytest
 import scipy.io
 import scipy.sparse as sp
 from commands import harness
+from joints import two_parts
 from scipy.sparse.linalg import spsolve
 from sparse_matrices import band_matrix, renumbered
 
+from harness import load_scene, own_matrices, solve
 from harness.planning import form_choice
 from problems import formats
 from problems.build import load_case, prepared
 from problems.formats.nastran import pyyeti
 from problems.forms.assembly import Vector
+from problems.forms.names import FORMS
 from problems.forms.prepared import Prepared
 from problems.input import matrix_files
+from problems.model.joint_model import JointModel
 from problems.scene import read_scene
 from problems.stiffness.dense import DenseBlock
+from problems.storage import cache
 
 N, M = 3000, 40
+NODES = (200, 8)
+SCENE = f"""
+{two_parts(3000.0, 105.0, NODES, "south")}
+[[effect]]
+kind = "initial_gap"
+mean = 0.3
+random = {{ sd = 0.1, correlation_length = 200.0, seed = 7 }}
+[[effect]]
+kind = "pressure"
+part = "a"
+value = 0.02
+[[effect]]
+kind = "self_weight"
+part = "b"
+"""
 
 
-def dense(self: Any) -> None:
+def dense(*_: Any) -> None:
     raise AssertionError("a dense matrix was asked for")
 
 
@@ -32,6 +56,7 @@ def dense(self: Any) -> None:
 def _nothing_dense(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DenseBlock, "U", property(dense))
     monkeypatch.setattr(Prepared, "Q", property(dense))
+    monkeypatch.setattr(JointModel, "dense", dense)  # condensation
     monkeypatch.setattr(form_choice, "physical_memory_mib", lambda: 200)  # holds the sparse form alone
 
 
@@ -59,7 +84,6 @@ def files(folder: Path, K: sp.csc_array | None = None, scipy_npz: bool = False) 
 
 def run(*words: str) -> tuple[int, str]:
     done = harness(*words)
-    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done.exit_code, " ".join(done.output.split())
 
 
@@ -94,6 +118,55 @@ def test_import_validate_and_solve_make_nothing_dense(scipy_npz: bool, tmp_path:
     assert gap.min() >= -1e-11
     assert 0 < np.count_nonzero(lam) < M
     assert abs(lam * gap).max() < 1e-10
+
+
+@pytest.mark.slow
+def test_of_a_scene_no_matrix_of_order_m_or_n_is_made(tmp_path: Path) -> None:
+    """All arrays are smaller than two of order m, or one of order n."""
+    path, nodes = tmp_path / "strip.toml", NODES[0] * NODES[1]
+    path.write_text(SCENE)
+    for solver in (None, "newton"):
+        tracemalloc.start()
+        try:
+            found = solve(load_scene(str(path)), solver, form="sparse")
+            _, peak = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        assert found.judgement.verdict == "within"
+        assert (len(found.x), len(found.lam)) == (2 * nodes, nodes)
+        assert found.error_bound_mm <= 1e-9
+        assert 100 < (found.lam > 0).sum() < nodes
+        assert peak < 2 * 8 * nodes**2
+
+
+def test_ten_thousand_bodies_take_a_fixed_number_of_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As LISWET1 of Maros and Mészáros: K = I, and rows of second differences."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+    n = 10_002
+    A = -sp.diags_array([1.0, -2.0, 1.0], offsets=[0, -1, -2], shape=(n, n - 2), format="csc")
+    f = np.sqrt(np.linspace(0, 1, n))
+    given = {"K": sp.eye_array(n, format="csc"), "A": A, "f": f, "g": np.zeros(n - 2)}
+    matrix_files.write(tmp_path / "liswet.npz", given)
+    scene = read_scene(str(tmp_path / "liswet.npz"))
+    assert form_choice.chosen_form(scene, FORMS, None).form == "sparse"
+    data, load = prepared(scene, form="sparse"), load_case(scene, "sparse")
+    assert len(data.assembly.K.blocks) == 1
+    assert data.assembly.K.numbers == n  # half-bandwidth 0
+    np.testing.assert_array_equal(data.recover(np.zeros(n - 2), load), f)
+    assert max(len(names) for _, _, names in os.walk(cache.root())) < 16
+
+
+def test_a_hundred_thousand_separate_unknowns_are_solved() -> None:
+    """Half of them against stops at 1 mm: x = min(f, 1) there."""
+    n, m = 100_000, 50_000
+    f = np.linspace(0, 3, n)
+    K, A = (sp.eye_array(n, columns, format="csc") for columns in (n, m))
+    found = solve(own_matrices(K, A, f, np.ones(m)))
+    assert found.judgement.verdict == "within"
+    exact = np.where(np.arange(n) < m, np.minimum(f, 1), f)
+    assert abs(found.x - exact).max() <= found.error_bound_mm <= 1e-12
 
 
 def test_a_nearly_singular_sparse_K_is_refused_with_its_condition(tmp_path: Path) -> None:
