@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from harness.terminal.exit_codes import DONE, GAP_EXCEEDED, NOTHING_JUDGED
+from harness.terminal import DONE, GAP_EXCEEDED, NOTHING_JUDGED
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 

@@ -17,8 +17,19 @@ from report.analysis.standings import (
     pareto,
     swept,
 )
-from report.document.blocks import Column, Figure, Section, Table, number, word
-from report.document.numbers import MISSING, power, significant, tidy_power, whole
+from report.document.blocks import (
+    MISSING,
+    Column,
+    Figure,
+    Section,
+    Table,
+    number,
+    power,
+    significant,
+    tidy_power,
+    whole,
+    word,
+)
 from report.figures import style
 from report.figures.lines import styles_of
 from report.results.reader import Results

@@ -5,7 +5,7 @@ from typing import Any
 
 from rich.console import Console
 
-from harness.terminal.progress import Display
+from harness.terminal.console import Display
 
 
 def row(**changes: Any) -> dict[str, Any]:

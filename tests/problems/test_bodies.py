@@ -9,11 +9,11 @@ import scipy.sparse as sp
 
 from harness.api import own_matrices, solve
 from harness.planning.form_choice import chosen_form
+from problems import storage
 from problems.build import load_case, prepared
-from problems.forms.names import FORMS
+from problems.forms import FORMS
 from problems.input import matrix_files
 from problems.scene import read_scene
-from problems.storage import cache
 
 
 def liswet(n: int) -> dict[str, sp.csc_array | np.ndarray]:
@@ -42,7 +42,7 @@ def test_ten_thousand_bodies_take_a_fixed_number_of_files(scene_file: str) -> No
     assert len(data.assembly.K.blocks) == 1
     assert data.assembly.K.numbers == 10_002  # half-bandwidth 0
     np.testing.assert_array_equal(data.recover(np.zeros(10_000), load), load.f)
-    files = [len(names) for _, _, names in os.walk(cache.root())]
+    files = [len(names) for _, _, names in os.walk(storage.root())]
     assert max(files) < 16
 
 

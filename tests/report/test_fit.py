@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from report.analysis.fit import exponent
+from report.analysis.roads import exponent
 
 
 def test_exponents_of_known_powers() -> None:

@@ -5,13 +5,13 @@ from typing import Any
 
 from synthetic_results import no_answer, results, row, shown, table
 
-from report.sections import methods
+from report.sections import speed
 
 LOW, HIGH = "4386/0052", "4386/1074"
 
 
 def told(directory: Path, rows: list[dict[str, Any]]) -> list[list[str]]:
-    return shown(table(methods.section(results(directory, rows))))
+    return shown(table(speed.methods(results(directory, rows))))
 
 
 def measured(scene: str, solver: str, seconds: float, products: int | None, **more: Any) -> dict[str, Any]:
