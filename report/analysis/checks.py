@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 import pandas as pd
 
 from harness.results.provenance import commit
-from report.document.blocks import counted, listed
+from report.document.numbers import counted, listed
 from report.results.reader import Results
 
 DIGITS = 10  # of a commit, in sentences

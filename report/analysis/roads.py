@@ -21,7 +21,8 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import BUILDING, DENSE_FORMS
-from report.document.blocks import as_number, records
+from report.document.blocks import records
+from report.document.numbers import as_number
 from report.results.reader import Results
 from report.results.rows import cells_of
 

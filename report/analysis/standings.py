@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import ANSWERED
-from report.document.blocks import MISSING, significant
+from report.document.numbers import MISSING, significant
 from report.results.reader import Results
 from report.results.rows import CELL, in_order
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
 
-from .blocks import as_number
+from .numbers import as_number
 
 LONGEST = 1000  # characters of a text; what is longer ends in a fingerprint, so that it stays distinct
 LONGEST_NAME = 50  # characters of a file name

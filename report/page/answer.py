@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.document.blocks import listed, significant
+from report.document.numbers import listed, significant
 from report.page.write import Data, banner
 from report.results.answers import Answer, fasteners, pair_name
 from report.results.series import Array

@@ -18,7 +18,8 @@ import pandas as pd
 from harness.results.schema import LADDERS
 from report.analysis.checks import warnings
 from report.analysis.roads import STAGES, roads
-from report.document.blocks import listed, records
+from report.document.blocks import records
+from report.document.numbers import listed
 from report.figures.style import line_styles
 from report.page.write import Data, banner, column
 from report.results.reader import Results

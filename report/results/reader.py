@@ -18,8 +18,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.results.schema import CRC, DRAWN, LADDERS
-from report.document.blocks import tidy_power
 from report.document.escape import plain, quoted
+from report.document.numbers import tidy_power
 from report.results.rows import cells_of
 
 from .rows import frame

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from harness.results.schema import ANSWERED, FORMS, OWNERS, STEPS, VERDICTS, of_kind
-from report.document.blocks import counted, tidy_power
 from report.document.escape import quoted
+from report.document.numbers import counted, tidy_power
 
 NUMBERS, TEXTS, FLAGS = of_kind("number"), of_kind("text"), of_kind("flag")
 #: What distinguishes the measurements of a run, apart from repeats and the cases of a series.

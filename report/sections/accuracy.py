@@ -17,19 +17,8 @@ from report.analysis.standings import (
     pareto,
     swept,
 )
-from report.document.blocks import (
-    MISSING,
-    Column,
-    Figure,
-    Section,
-    Table,
-    number,
-    power,
-    significant,
-    tidy_power,
-    whole,
-    word,
-)
+from report.document.blocks import Column, Figure, Section, Table, number, word
+from report.document.numbers import MISSING, power, significant, tidy_power, whole
 from report.figures import style
 from report.figures.lines import styles_of
 from report.results.reader import Results

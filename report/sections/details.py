@@ -12,24 +12,9 @@ import pandas as pd
 
 from harness.results.schema import VERDICTS
 from report.analysis.checks import commits_text
-from report.document.blocks import (
-    MISSING,
-    Block,
-    Column,
-    Section,
-    Table,
-    Text,
-    as_number,
-    listed,
-    number,
-    power,
-    records,
-    significant,
-    tidy_power,
-    whole,
-    word,
-)
+from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import file_name, plain
+from report.document.numbers import MISSING, as_number, listed, power, significant, tidy_power, whole
 from report.results.reader import Results
 from report.results.rows import in_order
 

@@ -7,7 +7,8 @@ from typing import Any
 import pandas as pd
 
 from harness.results.schema import ANSWERED
-from report.document.blocks import Block, Column, Figure, Section, Table, number, power, whole, word
+from report.document.blocks import Block, Column, Figure, Section, Table, number, word
+from report.document.numbers import power, whole
 from report.figures import style
 from report.figures.lines import against_contacts, entries, styles_of
 from report.results.reader import Results

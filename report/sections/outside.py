@@ -6,18 +6,8 @@ import numpy as np
 import pandas as pd
 
 from report.analysis.standings import seconds_text
-from report.document.blocks import (
-    MISSING,
-    Column,
-    Section,
-    Table,
-    number,
-    power,
-    records,
-    significant,
-    whole,
-    word,
-)
+from report.document.blocks import Column, Section, Table, number, records, word
+from report.document.numbers import MISSING, power, significant, whole
 from report.results.reader import Results
 
 PREFIX = "outside/"

@@ -14,21 +14,9 @@ from matplotlib.patches import Patch
 from harness.results.schema import OWNERS
 from report.analysis.roads import LOAD_CASES, STAGES, roads
 from report.analysis.standings import best_tolerances, of_fastest, seconds_text
-from report.document.blocks import (
-    MISSING,
-    Block,
-    Column,
-    Figure,
-    Section,
-    Table,
-    counted,
-    number,
-    records,
-    significant,
-    whole,
-    word,
-)
+from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.escape import short
+from report.document.numbers import MISSING, counted, significant, whole
 from report.figures import style
 from report.results.reader import Results
 from report.results.rows import in_order

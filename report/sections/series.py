@@ -6,7 +6,8 @@ import pandas as pd
 
 from harness.results.schema import ANSWERED
 from report.analysis.standings import ROUND, of_fastest, spreads
-from report.document.blocks import Column, Section, Table, number, power, spread, whole, word
+from report.document.blocks import Column, Section, Table, number, word
+from report.document.numbers import power, spread, whole
 from report.results.reader import Results
 from report.results.rows import CELL, named_by
 

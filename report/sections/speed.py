@@ -10,7 +10,8 @@ from matplotlib.figure import Figure as Drawing
 
 from report.analysis.roads import exponent
 from report.analysis.standings import best_tolerances, seconds_text, shown, spreads
-from report.document.blocks import Column, Figure, Section, Table, number, records, spread, whole, word
+from report.document.blocks import Column, Figure, Section, Table, number, records, word
+from report.document.numbers import spread, whole
 from report.figures import style
 from report.figures.lines import MARKS, against_contacts, entries, styles_of, yardstick
 from report.results.reader import Results

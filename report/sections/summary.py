@@ -12,22 +12,8 @@ from matplotlib.figure import Figure as Drawing
 
 from report.analysis.roads import roads
 from report.analysis.standings import ACCURACIES, best_tolerances, recommended, shown, standings, swept
-from report.document.blocks import (
-    MISSING,
-    Block,
-    Column,
-    Figure,
-    Section,
-    Table,
-    listed,
-    number,
-    power,
-    records,
-    significant,
-    tidy_power,
-    whole,
-    word,
-)
+from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
+from report.document.numbers import MISSING, listed, power, significant, tidy_power, whole
 from report.figures.lines import Cell, Group, grid
 from report.results.reader import Results
 

@@ -9,21 +9,9 @@ import pandas as pd
 from report.analysis.checks import asked_for
 from report.analysis.comparison import MISSING, WORSE, compared
 from report.analysis.standings import seconds_text
-from report.document.blocks import (
-    Block,
-    Column,
-    Section,
-    Table,
-    Text,
-    counted,
-    number,
-    power,
-    records,
-    tidy_power,
-    whole,
-    word,
-)
+from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import QUOTED, file_name, short
+from report.document.numbers import counted, power, tidy_power, whole
 from report.results.reader import Results
 from report.results.rows import cells_of, form_place
 

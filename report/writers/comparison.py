@@ -11,24 +11,9 @@ import pandas as pd
 
 from report.analysis.checks import commits_text
 from report.analysis.comparison import BETTER, CHANGED, GROUPS, WORSE, by_solver
-from report.document.blocks import (
-    MISSING,
-    Block,
-    Column,
-    Section,
-    Table,
-    Text,
-    as_number,
-    counted,
-    listed,
-    number,
-    power,
-    records,
-    significant,
-    whole,
-    word,
-)
+from report.document.blocks import Block, Column, Section, Table, Text, number, records, word
 from report.document.escape import csv_frame, file_name
+from report.document.numbers import MISSING, as_number, counted, listed, power, significant, whole
 from report.page.write import Data, banner
 from report.page.write import write as write_page
 from report.writers.pages import written

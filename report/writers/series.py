@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.checks import code_warnings
-from report.document.blocks import Figure, Section, Table, counted, number, significant, tidy_power, word
+from report.document.blocks import Figure, Section, Table, number, word
 from report.document.escape import file_name
+from report.document.numbers import counted, significant, tidy_power
 from report.figures import style
 from report.figures.maps import Map, drawn, rooted
 from report.page.maps import series_maps

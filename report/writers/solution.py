@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, significant, word
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.escape import csv_frame
+from report.document.numbers import significant
 from report.figures.answer import answer_figures
 from report.figures.maps import grid_of
 from report.page.answer import answer_data, facts, headline

@@ -9,19 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from report.document.blocks import (
-    Block,
-    Column,
-    Figure,
-    Section,
-    Table,
-    Text,
-    number,
-    significant,
-    whole,
-    word,
-)
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.escape import csv_frame
+from report.document.numbers import significant, whole
 from report.figures.answer import gap_maps
 from report.page.answer import two_answers_data
 from report.page.write import write as write_page

@@ -12,7 +12,8 @@ from typing import Any
 import pandas as pd
 
 from report.analysis.standings import TIE, seconds_text, timed
-from report.document.blocks import Column, Table, as_number, significant
+from report.document.blocks import Column, Table
+from report.document.numbers import as_number, significant
 from report.results.reader import read
 
 Row = dict[str, Any]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from report.document.blocks import power, span
+from report.document.numbers import power, span
 
 from .rows import SYSTEMS, ByScene, Evidence, Study, against, clearly_faster, counts, merged, pairs
 from .tables import RIVALS, STARTS, iterations, loads

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from report.analysis.roads import Exponent, exponent
-from report.document.blocks import MISSING, Figure, Section
+from report.document.blocks import Figure, Section
+from report.document.numbers import MISSING
 from report.figures import style
 
 from .rows import METHODS, Row, Study, table

@@ -7,7 +7,8 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from report.document.blocks import MISSING, Figure, Section, significant, tidy_power, whole
+from report.document.blocks import Figure, Section
+from report.document.numbers import MISSING, significant, tidy_power, whole
 from report.figures import style
 
 from .printed import TABLE_1, TABLE_2, TABLE_4

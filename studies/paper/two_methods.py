@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from report.analysis.roads import Exponent
-from report.document.blocks import power, significant, whole
+from report.document.numbers import power, significant, whole
 
 from . import table3
 from .rows import BETTER, FORMS, METHODS, Evidence, Row, Study, against, clearly_faster, merged, pairs

@@ -12,7 +12,7 @@ import pytest
 from synthetic_results import no_answer, results, row, table, write_rows
 
 from report.analysis.standings import pareto, shown, standings
-from report.document.blocks import significant
+from report.document.numbers import significant
 from report.results.reader import Results, read
 from report.sections.speed import contacts
 from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard

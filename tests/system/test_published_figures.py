@@ -8,7 +8,8 @@ import pytest
 
 from harness.results.schema import DENSE_FORMS
 from report.analysis.roads import roads
-from report.document.blocks import Table, listed, power, significant
+from report.document.blocks import Table
+from report.document.numbers import listed, power, significant
 from report.results.reader import Results, read
 from report.sections import speed
 from report.sections.series import compared

@@ -1,0 +1,82 @@
+"""Numbers as text: three significant digits, '–' if there is none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+MISSING = "–"
+
+
+def significant(value: object, digits: int = 3) -> str:
+    """0.0912, 12.3, 1230; with a power of ten (4.1e-9) below 0.001 and from 100 000."""
+    number = as_number(value)
+    if number is None:
+        return MISSING
+    if number == 0:
+        return "0"
+    rounded = float(f"{number:.{digits - 1}e}")
+    exponent = math.floor(math.log10(abs(rounded)))
+    if not -3 <= exponent < 5:
+        return power(number, digits)
+    return f"{rounded:.{max(0, digits - 1 - exponent)}f}"
+
+
+def power(value: object, digits: int = 3) -> str:
+    """4.10e-9: always with a power of ten, without leading zeros in it."""
+    number = as_number(value)
+    if number is None:
+        return MISSING
+    if number == 0:
+        return "0"
+    mantissa, exponent = f"{number:.{digits - 1}e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def tidy_power(value: object) -> str:
+    """1e-7, 2.5e-7: with a power of ten and no more digits than needed."""
+    mantissa, _, exponent = power(value).partition("e")
+    return f"{float(mantissa):g}e{exponent}" if exponent else mantissa
+
+
+def whole(value: object) -> str:
+    number = as_number(value)
+    return MISSING if number is None else f"{number:.0f}"
+
+
+def as_number(value: object) -> float | None:
+    """The value as a float; None if it is missing, not finite or not a number."""
+    if isinstance(value, bool) or value is None:
+        return None
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return None
+    return number if math.isfinite(number) else None
+
+
+def listed(words: list[str]) -> str:
+    """'a', 'a and b', 'a, b and c'."""
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+
+
+def span(least: str, most: str) -> str:
+    """'3 to 8', or '3' if both are the same."""
+    return least if least == most else f"{least} to {most}"
+
+
+def spread(name: str) -> Callable[[Mapping[str, Any]], str]:
+    """For a row, '0.12 (0.1 to 0.2)': its value of that name, and those with the endings _least and _most."""
+
+    def text(row: Mapping[str, Any]) -> str:
+        middle = significant(row[name])
+        least, most = (significant(row[f"{name}_{end}"], 2) for end in ("least", "most"))
+        return middle if middle == MISSING else f"{middle} ({span(least, most)})"
+
+    return text
+
+
+def counted(number: int, word: str) -> str:
+    """'1 scene', '2 scenes'."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
