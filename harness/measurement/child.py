@@ -21,6 +21,8 @@ from harness.results.records import to_line
 from harness.solving.answers import InvalidAnswer, error_text
 from problems.errors import InputError
 
+TIMEOUT_S = 10.0  # for children that keep forking
+
 
 class Events:
     """What goes back to the driver, from this process alone: a fork that returns here ends."""
@@ -72,13 +74,6 @@ def die_with_driver() -> None:
         prctl(set_child_subreaper, 1)
 
 
-if __name__ == "__main__":
-    main()
-
-
-TIMEOUT_S = 10.0  # for children that keep forking
-
-
 def end_children(pid: int) -> None:
     """Kill the children of a stopped process until none is left.
 
@@ -107,3 +102,7 @@ def _is_alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
     except OSError:
         return False
+
+
+if __name__ == "__main__":
+    main()

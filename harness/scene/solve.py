@@ -40,6 +40,8 @@ from .atomic_output import atomic_output, write_record
 from .solution import Solution
 from .validate import digits_sentence
 
+PRELOADS = ("preload", "clamping_force")  # keys of the effects that press at points
+
 
 def solve(
     source: str,
@@ -174,9 +176,6 @@ def _show(record: dict[str, Any], console: Console) -> None:
             f"{record['status']}, {error:.1e} mm from the answer {known}: {record['verdict']} {LIMIT_MM:g} mm"
         )
     console.print(f"{record['method']}: {text}.", style="green" if record["verdict"] == "within" else "red")
-
-
-PRELOADS = ("preload", "clamping_force")  # keys of the effects that press at points
 
 
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:

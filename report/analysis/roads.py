@@ -30,6 +30,7 @@ LOAD_CASES = (1, 10, 1000)
 #: The stages in their order, the last two per load case.
 STAGES = ("model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery_s")
 PER_LOAD_CASE = 2
+FEWEST = 5  # sizes that a fit should have
 
 
 @lru_cache(maxsize=4)  # several sections ask for the same
@@ -77,9 +78,6 @@ def _known(part: object) -> dict[str, float]:
     return {name: value for name, value in found.items() if value is not None}
 
 
-FEWEST = 5  # sizes that a fit should have
-
-
 @dataclass(frozen=True)
 class Exponent:
     """y ≈ c·n^slope over `points` sizes; `error`: the standard error of the slope."""
@@ -87,7 +85,6 @@ class Exponent:
     slope: float
     error: float
     points: int
-    constant: float
 
     def __str__(self) -> str:
         few = "" if self.points >= FEWEST else f" ({self.points} sizes only)"
@@ -106,7 +103,6 @@ def exponent(n: Sequence[float], y: Sequence[float]) -> Exponent | None:
     centred = x - x.mean()
     spread = float(centred @ centred)
     slope = float(centred @ z) / spread
-    offset = float(z.mean() - slope * x.mean())
-    rest = z - offset - slope * x
+    rest = z - z.mean() - slope * centred
     error = math.sqrt(float(rest @ rest) / (len(x) - 2) / spread)
-    return Exponent(slope, error, len(x), math.exp(offset))
+    return Exponent(slope, error, len(x))

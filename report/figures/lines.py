@@ -41,6 +41,12 @@ MARKS = (
     "Crosses on a line: outside {limit}. Open triangles: stopped at the time limit; crosses at the upper "
     "edge: no answer for another reason."
 )
+GAP = 0.4  # between groups, in columns
+FEWEST = 7.0  # columns, the least width of a strip: few cells stay small
+ROOM = 446.0  # points for all columns
+LETTER, LARGEST = 0.62, 9.0  # width of a letter over its size; the largest size of the type, points
+SMALLEST = 6.5  # points: names of columns that would be smaller stand upright
+GREY = "#555555"
 
 
 def styles_of(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
@@ -102,14 +108,6 @@ def yardstick(axes: Axes, heights: pd.Series[float], what: str) -> None:
     """A grey line, by its place along the axis, with its name at its end."""
     axes.plot(heights.index, heights, **YARDSTICK)
     axes.annotate(what, (heights.index[-1], heights.iloc[-1]), (8, 0), **BESIDE)
-
-
-GAP = 0.4  # between groups, in columns
-FEWEST = 7.0  # columns, the least width of a strip: few cells stay small
-ROOM = 446.0  # points for all columns
-LETTER, LARGEST = 0.62, 9.0  # width of a letter over its size; the largest size of the type, points
-SMALLEST = 6.5  # points: names of columns that would be smaller stand upright
-GREY = "#555555"
 
 
 @dataclass(frozen=True)
