@@ -93,7 +93,7 @@ def rows_of(
         "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     cases = zip(task.batch, answers, result.reports, strict=True)
-    return [_row(*case, problem, result.elapsed_s) | shared for case in cases]
+    return [_row(*case, problem, result.elapsed_s, task.solver.owner) | shared for case in cases]
 
 
 def _why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | None:
@@ -103,12 +103,18 @@ def _why_not_judged(judgement: Judgement, problem: ReferenceProblem) -> str | No
     return f"reference error bound {known.bound_mm:.0e} mm: {known.route}"
 
 
-def _row(m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, elapsed_s: float) -> Row:
-    """The fields of one measurement."""
+def _row(
+    m: Measurement, answer: Path, report: Row, problem: ReferenceProblem, elapsed_s: float, owner: str
+) -> Row:
+    """The fields of one measurement. owner : of the solver; an answer of ours may be a reference's first
+    candidate.
+    """
     if "cannot_save" in report:
         raise OSError(report["cannot_save"])
     series = m.series.model_dump() if m.series else None
     problem = problem.of_case(series, m.case)
+    if report.get("answer") and report["status"] == "solved" and owner == "ours":
+        problem.give(m.solver, answer)
     limit_mm, judgement = problem.limit_mm(m.limit_mm), Judgement("no_answer", problem.reference.bound_mm)
     if report.get("answer"):
         judgement = problem.judge_file(answer, limit_mm)

@@ -22,11 +22,12 @@ from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import Display, waiting
 from harness.verification.reference_problem import (
     ReferenceProblem,
+    measurable,
     record,
     record_refusal,
-    reference_problem,
 )
 from problems.forms import form_family
+from problems.forms.problem import in_form
 from problems.scene import read_scene
 
 from .describe import Description, Solvers, describe, resumed
@@ -113,7 +114,7 @@ def measure_remaining(
     console: Console,
 ) -> list[Row]:
     """Make the measurements and append their rows. `rows` are those of DIRECTORY so far."""
-    rows = list(rows)
+    rows, recorded = list(rows), set[tuple[str, str]]()
     with Display(console, len(remaining), done) as display:
         for (task, problem), outcome in outcomes(pending_tasks(remaining, rows, directory, solvers, display)):
             batch = task.batch
@@ -125,6 +126,10 @@ def measure_remaining(
             if outcome.machine and outcome.code:
                 of_worker = {"machine": record_machine(directory, outcome.machine), **outcome.code}
             new = rows_of(task, outcome, problem, directory, of_worker)
+            name = problem.scene.name, form_family(problem.form)
+            if name not in recorded:
+                record(problem, directory)
+                recorded.add(name)
             records.append(directory / records.MEASUREMENTS, *new)
             rows += new
             for row in new:
@@ -137,19 +142,22 @@ def pending_tasks(
 ) -> Iterator[tuple[Pending, Task]]:
     """One task after another; a scene is opened before its first of a family. `rows` grow meanwhile."""
     opened: dict[str, ReferenceProblem] = {}  # of the current scene: condensed, or sparse
+    made = set[str]()  # the forms whose matrices are
     for batch in batches(remaining):
         m = due(batch[0], rows)
         if m is None:
             display.passed_over(len(batch))
             continue
         if any(problem.scene.name != m.scene for problem in opened.values()):
-            opened = {}
+            opened, made = {}, set()
         family = form_family(m.form)
         if family not in opened:
             building = partial(display.building, m.scene)
-            opened[family] = reference_problem(m.source, building, m.reference_limit_s, m.form)
-            record(opened[family], directory)
+            opened[family] = measurable(m.source, building, m.reference_limit_s, m.form)
         problem = opened[family]
+        if m.form not in made:
+            _ = in_form(problem.prepared, m.form).arrays  # before the clock starts
+            made.add(m.form)
         display.doing(f"{m.scene}: {m.solver} {m.form}")
         limit_s, stop = stopped_at(m, rows)
         batch = [replace(each, time_limit_s=limit_s, stop=stop) for each in (m, *batch[1:])]

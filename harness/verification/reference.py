@@ -1,14 +1,15 @@
 """The reference that answers are compared with: forces from anywhere, refined, with a proven bound.
 
-Nothing is searched for here. Candidates are the problem's exact answer, if it was made from one, and the
-answers of the in-house methods in turn; each is refined and its error bounded from K, A, f and g alone (see
-`proof`), until a bound is at most a tenth of the limit. The bound does not depend on where the forces came
-from; the best one is kept.
+Nothing is searched for here. Candidates are the problem's exact answer, if it was made from one, forces that
+the caller has, and the answers of the in-house methods in turn; each is refined and its error bounded from K,
+A, f and g alone (see `proof`), until a bound is at most a tenth of the limit. The bound does not depend on
+where the forces came from; the best one is kept.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from harness.solving.session import candidates
 from problems import storage
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import ManufacturedScene, Scene
 from problems.storage import fingerprint
@@ -26,6 +27,8 @@ from .balanced import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
 from .proof import Proof, Proven
 
+#: What forces come from, and λ (m,) in N.
+Candidate = tuple[str, Vector]
 STOPPED = "no further method was tried"
 UNPROVEN = "could not be proven"
 ESTIMATED = 0.5  # of an estimate of λmin that is no smaller
@@ -36,38 +39,48 @@ def default_limit_s(m: int) -> float:
     return 0.06 * max(m, 1000)
 
 
-def reference_of(scene: Scene, prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
+def reference_of(
+    scene: Scene,
+    prepared: Prepared,
+    load: LoadCase,
+    limit_s: float | None = None,
+    given: Sequence[Candidate] = (),
+) -> Reference:
     """The reference of a scene: the answer that it was made from, if any, else that of its load case."""
     made = scene.made if isinstance(scene, ManufacturedScene) else None
     if made is not None and made.x is not None and made.lam is not None:
         return Reference(made.x, made.lam, made.lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm)
-    return reference(prepared, load, limit_s)
+    return reference(prepared, load, limit_s, given)
 
 
-def reference(prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
+def reference(
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Candidate] = ()
+) -> Reference:
     """The reference of a load case, from the cache if it was proven before for these matrices."""
     if prepared.key is None:
-        return best_of_candidates(prepared, load, limit_s)
+        return best_of_candidates(prepared, load, limit_s, given)
     key = storage.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
     stored = storage.load(key)
     if stored is not None:
         arrays, facts = stored
         x, lam = (np.array(arrays[name]) for name in ("x", "lam"))
         return Reference(x, lam, lam > 0, facts["bound_mm"], facts["route"])
-    found = best_of_candidates(prepared, load, limit_s)
+    found = best_of_candidates(prepared, load, limit_s, given)
     if found.bound_mm <= REFERENCE_SHARE * LIMIT_MM:  # else another candidate may prove more
         made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam}
         storage.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
     return found
 
 
-def best_of_candidates(prepared: Prepared, load: LoadCase, limit_s: float | None = None) -> Reference:
-    """limit_s : after it no further candidate is tried."""
+def best_of_candidates(
+    prepared: Prepared, load: LoadCase, limit_s: float | None = None, given: Sequence[Candidate] = ()
+) -> Reference:
+    """given : tried first. limit_s : after it no further candidate is tried."""
     limit_s = default_limit_s(prepared.assembly.m) if limit_s is None else limit_s
     proof, end = proof_of(prepared), time.monotonic() + limit_s
     best: Proven | None = None
     route = stopped = ""
-    for name, lam in candidates(prepared, load):
+    for name, lam in chain(given, candidates(prepared, load)):
         (found,) = proof.proven([load], [lam])
         if best is None or found.bound_mm < best.bound_mm:
             best, route = found, name

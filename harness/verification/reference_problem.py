@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 
 from .judge import Judgement, Reference, conditioned_limit, judge
-from .reference import default_limit_s, reference, reference_of
+from .reference import Candidate, default_limit_s, proven_lambda_min, reference, reference_of
 
 PROBLEMS = "problems.jsonl"
 
@@ -34,7 +34,7 @@ class ReferenceProblem:
     """A scene whose answers can be measured and judged; its reference is proven when it is first asked for.
 
     limit_s : after it no further candidate for the reference is tried. case : of a series, whose own load is
-    `load`; None for the scene's.
+    `load`; None for the scene's. given : the first candidates.
     """
 
     scene: Scene
@@ -43,6 +43,7 @@ class ReferenceProblem:
     form: Form
     limit_s: float | None = None
     case: int | None = None
+    given: list[Candidate] = field(default_factory=list)
 
     @cached_property
     def reference(self) -> Reference:
@@ -57,10 +58,17 @@ class ReferenceProblem:
     def _proven(self) -> tuple[Reference, float]:
         start = time.perf_counter()
         if self.case is None:
-            found = reference_of(self.scene, self.prepared, self.load, self.limit_s)
+            found = reference_of(self.scene, self.prepared, self.load, self.limit_s, self.given)
         else:
-            found = reference(self.prepared, self.load, self.limit_s)
+            found = reference(self.prepared, self.load, self.limit_s, self.given)
         return found, time.perf_counter() - start
+
+    def give(self, name: str, path: Path) -> None:
+        """Let the forces of a saved answer be a candidate of that name, if they can be read."""
+        with suppress(OSError, ValueError, KeyError):
+            lam = read_answer(path)["lam"]
+            if lam.dtype.kind == "f" and lam.shape == self.load.g.shape and np.isfinite(lam).all():
+                self.given.append((f"{name}, refined", lam))
 
     def limit_mm(self, asked: float) -> float:
         """The limit on an answer: as asked for; on a rung of a ladder, no less than conditioning allows."""
@@ -75,7 +83,7 @@ class ReferenceProblem:
         if series is None or case is None:
             return self
         load = random_gaps(self.scene, **series, form=self.form).load(case)
-        return replace(self, load=load, case=case)
+        return replace(self, load=load, case=case, given=[])
 
     def judged(self, x: Vector, lam: Vector, limit_mm: float) -> Judgement:
         """x of all unknowns of the form, mm; lam (m,) N, NaN if there are none."""
@@ -108,17 +116,32 @@ def opened(
     return ReferenceProblem(scene, data, load_case(scene, form), form, limit_s)
 
 
+def measurable(
+    source: str,
+    progress: Progress = lambda text, fraction: None,
+    limit_s: float | None = None,
+    form: Form = "dual",
+) -> ReferenceProblem:
+    """Open or build a scene, by name or path, that a solver can be measured on. Raises InputError, also if K
+    is not positive definite.
+    """
+    problem = opened(read_scene(source), form, progress, limit_s)
+    if problem.prepared.assembly.m == 0:
+        allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
+        raise InputError.one(source, "contacts", 0, allowed)
+    progress("bound on the least eigenvalue of K", 0.0)
+    _ = proven_lambda_min(problem.prepared)
+    return problem
+
+
 def reference_problem(
     source: str,
     progress: Progress = lambda text, fraction: None,
     limit_s: float | None = None,
     form: Form = "dual",
 ) -> ReferenceProblem:
-    """Open or build a scene, by name or path, and prove its reference. Raises InputError."""
-    problem = opened(read_scene(source), form, progress, limit_s)
-    if problem.prepared.assembly.m == 0:
-        allowed = "at least one, else there is no quadratic program to measure: `solve` answers the scene"
-        raise InputError.one(source, "contacts", 0, allowed)
+    """The same, with its reference proven."""
+    problem = measurable(source, progress, limit_s, form)
     progress(f"reference, at most {problem.limit_s:g} s", 0.0)
     _ = problem.reference
     return problem

@@ -13,7 +13,7 @@ from harness.measurement.run import run
 from harness.planning.suite import read_suite
 from harness.results import records
 from harness.verification.gate import gate
-from harness.verification.reference_problem import record, reference_problem
+from harness.verification.reference_problem import measurable, record, reference_problem
 from problems.forms import Form
 
 pytestmark = pytest.mark.slow
@@ -73,6 +73,22 @@ def test_a_scene_has_one_row_with_the_facts_of_both_roads(finished: Path) -> Non
     assert sparse["reference_route"] == "newton, refined"
     with np.load(finished / "scenes" / "strip.npz") as arrays:
         assert arrays["x"].shape == arrays["lam"].shape == (45,)
+
+
+@pytest.mark.parametrize("named", ["mine", "newton"])
+def test_a_reference_is_proven_from_the_first_answer_that_is_one(
+    named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not from one that is cut off, nor from one with NaN."""
+    monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
+    path = str(write_strip(tmp_path))
+    lam = reference_problem(path).reference.lam
+    problem = measurable(path, form="sparse")
+    for bad in (lam[:-1], np.where(lam > 0, np.nan, lam), *([lam] if named == "mine" else [])):
+        np.savez(tmp_path / "answer.npz", x=np.zeros(216), lam=bad)
+        problem.give(named, tmp_path / "answer.npz")
+    assert (problem.reference.route, len(problem.given)) == (f"{named}, refined", named == "mine")
+    assert problem.reference.bound_mm < 1e-9
 
 
 @pytest.mark.parametrize("order", [("sparse", "dual", "dual"), ("sparse", "sparse")])
