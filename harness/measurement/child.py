@@ -80,13 +80,12 @@ def end_children(pid: int) -> None:
     Their orphans become its children too, since it is a subreaper.
     """
     deadline = time.monotonic() + TIMEOUT_S
-    alive = True
-    while alive and time.monotonic() < deadline:
-        children = _children(pid)
-        for child in reversed(children):  # the youngest first, before its parent forks another
+    ended: set[int] = set()  # the process does not reap them, so none of their numbers is given again
+    while (left := [child for child in _children(pid) if child not in ended]) and time.monotonic() < deadline:
+        for child in reversed(left):  # the youngest first, before its parent forks another
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(child, signal.SIGKILL)
-        alive = any(map(_is_alive, children))
+        ended |= {child for child in left if not _is_alive(child)}  # whose orphans the next list has
 
 
 def _children(pid: int) -> list[int]:
