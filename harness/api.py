@@ -33,8 +33,8 @@ from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import opened
 from problems.build import prepared
 from problems.errors import InputError
+from problems.forms import FORMS, Form
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.names import FORMS, Form
 from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
 from problems.input.user_matrices import SMALL, SYMMETRY, checked

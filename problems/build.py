@@ -13,15 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from problems.errors import InputError
+from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase
-from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared
 from problems.model.effect import Effect
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
-from problems.storage.cache import digest
-from problems.storage.fingerprint import fingerprint
+from problems.storage import digest, fingerprint
 
 if TYPE_CHECKING:
     from problems.model.joint_model import JointModel

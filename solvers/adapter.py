@@ -17,8 +17,7 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
 
-from .base import FORMS, Answer, Form, Problem, Solver, Status, WarmStart
-from .settings import chosen, one_of, require
+from .base import FORMS, Answer, Form, Problem, Solver, Status, WarmStart, chosen, one_of, require
 
 GAP_ROUNDING = 1e-13  # PIQP comes down to 3e-14 on some scenes, and waits for 1.5e-14 in vain on others
 

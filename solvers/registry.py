@@ -21,9 +21,8 @@ from problems import __version__
 from problems.errors import InputError
 from problems.input.bounded import unknown
 
-from .base import Solver
+from .base import Solver, require
 from .plugin import load_plugin, own_files, solver_class
-from .settings import require
 
 #: Who stands behind a solver.
 Owner = Literal["ours", "textbook", "library"]

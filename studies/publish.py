@@ -28,7 +28,7 @@ from harness.results.answer_files import pack
 from harness.results.provenance import ROOT, commit
 from harness.results.schema import SERIES as SERIES_FILE
 from harness.results.schema import VERDICTS
-from harness.terminal.exit_codes import INTERRUPTED
+from harness.terminal import INTERRUPTED
 from report.results.reader import read
 from report.sections.roads import how_fast_table, in_series, ours_and_others
 from studies.paper.__main__ import write as write_study

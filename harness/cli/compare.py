@@ -47,7 +47,7 @@ def compare(
     """
     with error_reporting() as console:
         from harness.results.sides import read_side
-        from harness.terminal.exit_codes import DONE, FAILED
+        from harness.terminal import DONE, FAILED
         from report.writers.comparison import write
 
         before = read_side(old, key)

@@ -67,7 +67,7 @@ def import_(
     Exit codes: 0 read and written, 2 wrong usage or bad input.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
-        from harness.scene.matrix_import import import_ as import_files
+        from harness.scene.export import import_ as import_files
 
         import_files(files, out, console)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.terminal.exit_codes import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
+from harness.terminal import INTERRUPTED, NOT_COMPARABLE, WRONG_USAGE
 
 if TYPE_CHECKING:
     from rich.console import Console

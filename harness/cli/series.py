@@ -101,8 +101,8 @@ def series(
         from harness.scene.allowed_gap import refuse_unusable, show_series
         from harness.series.run import run
         from harness.series.session import Job
+        from harness.terminal import DONE
         from harness.terminal.console import waiting
-        from harness.terminal.exit_codes import DONE
         from problems.errors import Fault, InputError
         from problems.load_cases.measured_gaps import measured_gaps
         from problems.load_cases.random_gaps import random_gaps

@@ -11,8 +11,8 @@ from rich.console import Console
 from harness.measurement.child import Events
 from harness.measurement.describe import IMPORT_S, refuse_unimportable
 from harness.measurement.monitored import Monitored
+from harness.terminal import DONE, FAILED
 from harness.terminal.console import waiting
-from harness.terminal.exit_codes import DONE, FAILED
 from problems.errors import InputError
 from solvers.base import Solver
 from solvers.registry import make_solver

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from problems.forms import Form
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.stiffness.operator import Stiffness

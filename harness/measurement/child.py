@@ -1,22 +1,27 @@
-"""The child's side of a monitored call (monitored.py): its job, its events and its end.
+"""A child process: its side of a monitored call (monitored.py), and how what it has started is ended.
 
 The call comes pickled through stdin; events go back as JSON lines on the file descriptor that it names.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import faulthandler
 import os
 import pickle
 import signal
 import sys
+import time
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from harness.results.records import to_line
 from harness.solving.answers import InvalidAnswer, error_text
 from problems.errors import InputError
+
+TIMEOUT_S = 10.0  # for children that keep forking
 
 
 class Events:
@@ -67,6 +72,35 @@ def die_with_driver() -> None:
         prctl = ctypes.CDLL(None).prctl
         prctl(set_death_signal, signal.SIGKILL)
         prctl(set_child_subreaper, 1)
+
+
+def end_children(pid: int) -> None:
+    """Kill the children of a stopped process until none is left.
+
+    Their orphans become its children too, since it is a subreaper.
+    """
+    deadline = time.monotonic() + TIMEOUT_S
+    ended: set[int] = set()  # the process does not reap them, so none of their numbers is given again
+    while (left := [child for child in _children(pid) if child not in ended]) and time.monotonic() < deadline:
+        for child in reversed(left):  # the youngest first, before its parent forks another
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(child, signal.SIGKILL)
+        ended |= {child for child in left if not _is_alive(child)}  # whose orphans the next list has
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        lists = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
+    except OSError:  # it has ended
+        return []
+    return [int(child) for text in lists for child in text.split()]
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
 
 
 if __name__ == "__main__":

@@ -18,8 +18,8 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import distribution
 from pathlib import Path
 
+from problems import storage
 from problems.errors import InputError
-from problems.storage import cache
 
 #: Read after the .pth files of packages, whose folders come before those it adds.
 PARENT = "zzz-parent.pth"
@@ -38,10 +38,10 @@ def interpreter(requirements: Sequence[str], doing: Callable[[str], None] = lamb
     """
     if not requirements:
         return sys.executable
-    key = f"{requirements[0]}-{cache.digest(list(requirements), sys.version, _packages())}"
-    folder = cache.root() / key
+    key = f"{requirements[0]}-{storage.digest(list(requirements), sys.version, _packages())}"
+    folder = storage.root() / key
     python = folder / "bin" / "python"
-    with cache.lock(key):
+    with storage.lock(key):
         if not ((folder / COMPLETE).is_file() and python.exists()):  # else one was cut off, or its base moved
             shutil.rmtree(folder, ignore_errors=True)
             _make(folder, python, requirements, doing)

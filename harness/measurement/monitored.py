@@ -24,7 +24,7 @@ import psutil
 
 from harness.results.records import Row
 
-from .process_tree import end_children
+from .child import end_children
 
 ROOT = Path(__file__).parents[2]
 POLL_S = 0.05

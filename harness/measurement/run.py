@@ -18,21 +18,19 @@ from harness.planning.suite import Suite, to_toml
 from harness.results import records
 from harness.results.provenance import machine, provenance
 from harness.results.records import Row
-from harness.terminal.console import waiting
-from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
-from harness.terminal.progress import Display
+from harness.terminal import DONE, FAILED, NOTHING_JUDGED
+from harness.terminal.console import Display, waiting
 from harness.verification.reference_problem import (
     ReferenceProblem,
     measurable,
     record,
     record_refusal,
 )
-from problems.forms.names import form_family
+from problems.forms import form_family
 from problems.forms.problem import in_form
 from problems.scene import read_scene
 
-from .describe import Description, Solvers, describe
-from .resume import resumed
+from .describe import Description, Solvers, describe, resumed
 from .row import Task, TaskResult, rows_of, run_task, run_task_on_worker
 from .scheduler import done_as_completed, workers
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from harness.results.provenance import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
-from problems.storage.fingerprint import ROOT, fingerprint
+from problems.storage import ROOT, fingerprint
 
 S = TypeVar("S")
 T = TypeVar("T")

@@ -20,7 +20,7 @@ from scipy.linalg import lapack
 from harness.planning.plan import Measurement
 from harness.results.provenance import blas_kernels, resident_mib
 from harness.results.records import Row
-from harness.solving.answers import InvalidAnswer, figures, save
+from harness.solving.answers import InvalidAnswer, StoredFiles, figures, save
 from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
 from problems.forms.assembly import LoadCase, Matrix, Vector
@@ -33,7 +33,6 @@ from solvers.registry import make_solver
 from .child import Events
 from .environments import interpreter
 from .monitored import Monitored
-from .stored_files import StoredFiles
 
 START_S = 300.0  # for the imports and opening the data
 SAVE_S = 60.0  # for saving the answer

@@ -14,7 +14,7 @@ from math import inf
 
 from harness.results.records import Row
 from harness.results.schema import STEPS
-from problems.forms.names import DENSE_FORMS
+from problems.forms import DENSE_FORMS
 from problems.scene import read_scene
 
 from .plan import DECADES, MOST_REPEATS, Measurement

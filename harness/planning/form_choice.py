@@ -17,7 +17,7 @@ from math import log2
 from harness.results.provenance import physical_memory_mib
 from problems.build import model_of
 from problems.errors import InputError
-from problems.forms.names import DENSE_FORMS, Form, default_form
+from problems.forms import DENSE_FORMS, Form, default_form
 from problems.input.user_matrices import SMALL, holds_sparse, stored_matrices
 from problems.model.effect import SpringEffect
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene

@@ -107,10 +107,9 @@ PROBLEM_FIELDS: dict[str, Kind] = {
     **_fields("object", "build_s stored_mib sparse"),
 }
 
-#: The steps of `build_s` by the stage that they make in the dense forms, and the one of the sparse form.
+#: The steps of `build_s` by the stage that they make in the dense forms; the sparse form has one, `model`.
 #: (`condition`, the spectrum of K, is for the report alone.)
 BUILDING = {"K": ("condensation", "ties"), "factors": ("cholesky",), "Q": ("Q",)}
-MODEL = "model"
 
 
 def of_kind(kind: Kind) -> list[str]:

@@ -12,13 +12,13 @@ from rich.console import Console
 from rich.table import Table
 
 from harness.results.sides import Incomparable
-from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
-from harness.terminal.progress import STYLES
+from harness.terminal import DONE, FAILED, NOTHING_JUDGED
+from harness.terminal.console import STYLES
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
 from problems.errors import InputError
+from problems.forms import Form
 from problems.forms.assembly import Vector
-from problems.forms.names import Form
 from problems.input.bounded import regular_file
 
 MIB = 1024

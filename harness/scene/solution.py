@@ -19,8 +19,8 @@ from harness.solving.session import answer_of, form_of
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import ReferenceProblem, opened
 from problems.errors import InputError
+from problems.forms import FORMS, Form
 from problems.forms.assembly import Vector
-from problems.forms.names import FORMS, Form
 from problems.forms.problem import Progress
 from problems.model.scene import Scene
 from problems.scene import read_scene, scene_of

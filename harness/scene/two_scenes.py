@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from harness.results.sides import Incomparable
-from harness.terminal.exit_codes import FAILED
+from harness.terminal import FAILED
 from problems.build import prepared
 from problems.model.scene import JointScene
 from problems.scene import read_scene

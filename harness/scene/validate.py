@@ -13,9 +13,9 @@ from harness.results.provenance import physical_memory_mib
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
 from problems.build import model_of, prepared
+from problems.forms import FORMS
 from problems.forms.assembly import Assembly
-from problems.forms.names import FORMS
-from problems.input.digits import DOUBLE, apparent_digits, expected_error
+from problems.input.matrix_files import DOUBLE, apparent_digits, expected_error
 from problems.model.effect import SpringEffect
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene

@@ -18,10 +18,10 @@ from rich.console import Console
 from harness.measurement.child import Events
 from harness.measurement.monitored import Monitored
 from harness.measurement.scheduler import done_as_completed, workers
-from harness.measurement.stored_files import StoredFiles
 from harness.measurement.worker import START_S
 from harness.results.provenance import provenance
 from harness.results.records import Row
+from harness.solving.answers import StoredFiles
 from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError

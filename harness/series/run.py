@@ -20,7 +20,7 @@ from harness.results import records, series_file
 from harness.results.provenance import installed_version, machine
 from harness.results.records import Row, to_line
 from harness.results.schema import SERIES, VERDICTS
-from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
+from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.verification.reference import UNPROVEN
 from problems.build import prepared
 from problems.errors import Fault, InputError

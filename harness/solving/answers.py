@@ -1,9 +1,9 @@
-"""A solver's answer: whether it is valid, its figures for the row, and its file."""
+"""A solver's answer: whether it is valid, its figures for the row, its file; and what it may not change."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import inf
 from numbers import Integral, Real
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any, get_args
 import numpy as np
 
 from harness.results.records import Row, replace_arrays, to_line
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Matrix, Vector
 from problems.forms.problem import Problem
 from solvers.base import Answer, Status
 
@@ -176,3 +176,29 @@ def figures(answer: Answer) -> Row:
 def save(path: Path, x: Vector, lam: Vector | None, m: int) -> None:
     """x (n,) in mm and lam (m,) in N, NaN if the solver gives none; written atomically."""
     replace_arrays(path, {"x": x, "lam": np.full(m, np.nan) if lam is None else lam})
+
+
+class StoredFiles:
+    """The files of the cache entries that memory-mapped arrays come from, as they are now."""
+
+    def __init__(self, arrays: Iterable[Matrix]) -> None:
+        names = [array.filename for array in arrays if isinstance(array, np.memmap) and array.filename]
+        self.folders = sorted({Path(name).parent for name in names})
+        self.before = {folder: _state(folder) for folder in self.folders}
+
+    def check(self) -> None:
+        """Raises InvalidAnswer if a file was written, replaced or deleted since."""
+        changed = [str(folder) for folder, before in self.before.items() if _state(folder) != before]
+        if changed:
+            raise InvalidAnswer(f"the solver wrote into the cache: delete {', '.join(changed)}")
+
+
+def _state(folder: Path) -> dict[str, tuple[int, ...]]:
+    """Of each file what a write changes. ctime : no program can set it back."""
+    try:
+        found = {path.name: path.stat() for path in folder.iterdir()}
+    except OSError:
+        return {}
+    return {
+        name: (stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns) for name, stat in found.items()
+    }

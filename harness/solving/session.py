@@ -13,8 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.errors import InputError
+from problems.forms import Form, default_form
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.names import Form, default_form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Problem, in_form
 from problems.forms.units import Units

@@ -1,4 +1,6 @@
-"""A console on which text from outside is only text, and a line that says what is being done."""
+"""A console on which text from outside is only text; a line that says what is being done; and the output of a
+run: each row as it is finished, above a progress bar.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,19 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.segment import Segment
 from rich.text import Text
+
+from harness.results.records import Row
 
 #: Control characters except the line break, those that reverse the direction of text, and lone surrogates,
 #: as in file names that are not UTF-8.
@@ -57,3 +70,92 @@ def waiting(console: Console) -> Iterator[Callable[[str], None]]:
         yield show
     finally:
         status.stop()
+
+
+STYLES = {"within": "green", "outside": "red", "cannot_be_judged": "yellow", "no_answer": "red"}
+
+#: Heading, width (negative: left-aligned), content.
+COLUMNS = [
+    ("scene", -23, lambda row: row["scene"]),
+    ("solver", -16, lambda row: f"{row['solver']} {row['variant']}".strip()),
+    ("form", -6, lambda row: row["form"]),
+    ("tol", 6, lambda row: f"{row['tolerance']:.0e}"),
+    ("thr", 3, lambda row: str(row["threads_asked"])),
+    ("status", -15, lambda row: row["status"]),
+    ("iter", 6, lambda row: _figure(row["iterations"], "d")),
+    ("prepare s", 9, lambda row: _figure(_sum(row, "convert_s", "prepare_s"), ".2f")),
+    ("solve s", 8, lambda row: _solve_time(row)),
+    ("error mm", 8, lambda row: _figure(row["displacement_error_mm"], ".1e")),
+    ("verdict", -16, lambda row: row["verdict"]),
+]
+
+
+def _figure(value: float | None, spec: str) -> str:
+    return "–" if value is None else format(value, spec)
+
+
+def _sum(row: Row, *names: str) -> float | None:
+    known = [row[name] for name in names if row[name] is not None]
+    return sum(known) if known else None
+
+
+def _solve_time(row: Row) -> str:
+    if row["solve_s"] is None:
+        return f"> {row['time_limit_s']:g}" if row["status"] == "time_limit" else "–"
+    return _figure(_sum(row, "setup_s", "solve_s", "form_s"), ".2f")
+
+
+def _line(cells: list[str]) -> str:
+    widths = [width for _, width, _ in COLUMNS]
+    aligned = (c.ljust(-w) if w < 0 else c.rjust(w) for c, w in zip(cells, widths, strict=True))
+    return "  ".join(aligned).rstrip()
+
+
+def row_text(row: Row) -> Text:
+    """One line of the table; below it the reason, if there is no answer."""
+    text = Text(_line([cell(row) for *_, cell in COLUMNS]), style=STYLES[row["verdict"]])
+    if row["message"] and row["verdict"] == "no_answer":
+        text.append(f"\n    {row['message'].splitlines()[0][:150]}", style="dim")
+    return text
+
+
+class Display:
+    """Rows scroll above a progress bar; without a terminal only the rows are printed."""
+
+    def __init__(self, console: Console, left: int, done: int) -> None:
+        self.console = console
+        self.progress = Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=console,
+            disable=not console.is_terminal,
+        )
+        self.task: TaskID = self.progress.add_task("", total=left + done, completed=done)
+
+    def __enter__(self) -> Display:
+        self.console.print(_line([heading for heading, *_ in COLUMNS]), style="bold", soft_wrap=True)
+        self.progress.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.progress.stop()
+
+    def doing(self, text: str) -> None:
+        """Show the current activity beside the bar."""
+        self.progress.update(self.task, description=text)
+
+    def building(self, scene: str, step: str, fraction: float) -> None:
+        """Show the progress of a step of building a scene."""
+        self.doing(f"{scene}: {step} {fraction:.0%}" if fraction else f"{scene}: {step}")
+
+    def finished(self, row: Row) -> None:
+        """Print the row of a measurement that is done."""
+        self.console.print(row_text(row), soft_wrap=True)
+        self.passed_over(1)
+
+    def passed_over(self, count: int) -> None:
+        """Note that so many measurements need not be made any more."""
+        self.progress.update(self.task, advance=count)

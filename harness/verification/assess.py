@@ -23,7 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Vector, stacked
-from problems.stiffness.rounding import SAFE, U, gamma
+from problems.stiffness import SAFE, U, gamma
 
 from .enclosure import ETA
 from .proof import Proof

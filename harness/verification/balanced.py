@@ -24,9 +24,9 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector, stacked
 from problems.forms.prepared import Prepared
+from problems.stiffness import gamma
 from problems.stiffness.block import Block, NotPositiveDefinite
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.rounding import gamma
 
 from .enclosure import SAFE, DoubleDouble, Enclosure, Panel, Residual, exponent, length, row_panels
 

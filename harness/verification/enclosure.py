@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from problems.forms.assembly import Matrix, Vector
-from problems.stiffness.rounding import SAFE, U, gamma
+from problems.stiffness import SAFE, U, gamma
 
 ETA = 2.0**-1074  # the smallest positive number
 TERMS = 5  # of a row of a residual, or fewer: two exact ones of each product, and one

@@ -18,10 +18,10 @@ from harness.results import records
 from harness.results.answer_files import is_kept
 from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
-from harness.terminal.exit_codes import DONE, FAILED, NOTHING_JUDGED
-from harness.terminal.progress import STYLES
+from harness.terminal import DONE, FAILED, NOTHING_JUDGED
+from harness.terminal.console import STYLES
 from problems.errors import Fault, InputError
-from problems.forms.names import form_family
+from problems.forms import form_family
 from problems.input.bounded import validation_faults
 
 from .findings import MARGIN, Baseline, Finding, read_baseline, write_json, write_junit

@@ -33,7 +33,7 @@ import numpy as np
 
 from problems.forms.assembly import LoadCase, Mask, Matrix, Vector
 from problems.forms.prepared import Prepared
-from problems.stiffness.rounding import gamma
+from problems.stiffness import gamma
 
 from .balanced import Balanced
 from .enclosure import ETA, SAFE, DoubleDouble, Enclosure, length

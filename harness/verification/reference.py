@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.solving.session import candidates
+from problems import storage
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.model.scene import ManufacturedScene, Scene
-from problems.storage import cache
-from problems.storage.fingerprint import fingerprint
+from problems.storage import fingerprint
 
 from .balanced import smallest_eigenvalue
 from .judge import LIMIT_MM, REFERENCE_SHARE, Reference
@@ -59,8 +59,8 @@ def reference(
     """The reference of a load case, from the cache if it was proven before for these matrices."""
     if prepared.key is None:
         return best_of_candidates(prepared, load, limit_s, given)
-    key = cache.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
-    stored = cache.load(key)
+    key = storage.digest("reference", prepared.key, load.f.tobytes(), load.g.tobytes(), _code())
+    stored = storage.load(key)
     if stored is not None:
         arrays, facts = stored
         x, lam = (np.array(arrays[name]) for name in ("x", "lam"))
@@ -68,7 +68,7 @@ def reference(
     found = best_of_candidates(prepared, load, limit_s, given)
     if found.bound_mm <= REFERENCE_SHARE * LIMIT_MM:  # else another candidate may prove more
         made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam}
-        cache.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
+        storage.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
     return found
 
 
@@ -114,8 +114,8 @@ def _remembered(prepared: Prepared, name: str, make: Callable[[], float]) -> flo
     """A figure of an assembly that takes a while, from the cache."""
     if prepared.key is None:
         return make()
-    _, facts = cache.load_or_make(
-        cache.digest(name, prepared.key, _code()), lambda: ({}, {"value": repr(make())})
+    _, facts = storage.load_or_make(
+        storage.digest(name, prepared.key, _code()), lambda: ({}, {"value": repr(make())})
     )
     return float(facts["value"])
 

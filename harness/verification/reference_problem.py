@@ -15,8 +15,8 @@ from harness.results import records
 from harness.results.answer_files import read_answer
 from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
-from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
 from problems.load_cases.random_gaps import random_gaps

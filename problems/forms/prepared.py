@@ -12,10 +12,16 @@ import scipy.sparse as sp
 from problems.stiffness.block import scaled
 from problems.stiffness.operator import ScaledStiffness, Stiffness
 
-from .approximate_inverse import ApproximateInverse, of_dense, of_products
+from . import Form
 from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
-from .names import Form
-from .product import Compliance, ComplianceProducts, DenseCompliance
+from .compliance import (
+    ApproximateInverse,
+    Compliance,
+    ComplianceProducts,
+    DenseCompliance,
+    of_dense,
+    of_products,
+)
 
 MIB = 2**20
 EPS = float(np.finfo(float).eps)

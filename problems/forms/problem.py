@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy.sparse as sp
 
+from . import Form
 from .assembly import Assembly, LoadCase, Matrix, Vector, stacked
-from .names import Form
 from .prepared import Prepared
 
 #: Called with what is being made, and the fraction done.

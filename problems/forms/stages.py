@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from problems import storage
 from problems.errors import InputError
 from problems.stiffness import dense, operator
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.operator import Stiffness
-from problems.storage import cache
-from problems.storage.fingerprint import fingerprint
+from problems.storage import fingerprint
 
 from .assembly import Assembly, Matrix
 from .prepared import Prepared
@@ -89,15 +89,15 @@ class DensePrepared(Prepared):
         super().__init__(replace(assembly, K=Stiffness(assembly.K.blocks, self._open_factors)))
         self.blocks, A = [b for b in assembly.K.blocks if isinstance(b, dense.DenseBlock)], assembly.A
         code = fingerprint([Path(__file__), Path(dense.__file__), Path(operator.__file__)])
-        self.factors_key = cache.digest("factors", key, code)
+        self.factors_key = storage.digest("factors", key, code)
         parts = (A.data, A.indices, A.indptr)
-        self.key = cache.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
+        self.key = storage.digest("Q", self.factors_key, [*A.shape], *(part.tobytes() for part in parts))
         self.before, self.source_of, self.progress = before, source_of, progress
 
     @property
     def built(self) -> bool:
         """Whether the factors and Q are in the cache."""
-        return None not in (cache.load(self.factors_key), cache.load(str(self.key)))
+        return None not in (storage.load(self.factors_key), storage.load(str(self.key)))
 
     @property
     def spectrum(self) -> dict[str, object]:
@@ -105,7 +105,7 @@ class DensePrepared(Prepared):
 
     @property
     def seconds(self) -> dict[str, float]:
-        Q = self._schur if "_schur" in vars(self) else cache.load(str(self.key))
+        Q = self._schur if "_schur" in vars(self) else storage.load(str(self.key))
         return self.before | self._factored[1]["seconds"] | ({"Q": Q[1]["seconds"]} if Q else {})
 
     @cached_property
@@ -117,14 +117,14 @@ class DensePrepared(Prepared):
             block.U = self._factored[0][f"U{k}"]
 
     @cached_property
-    def _factored(self) -> cache.Entry:
-        return cache.load_or_make(self.factors_key, self._make_factors)
+    def _factored(self) -> storage.Entry:
+        return storage.load_or_make(self.factors_key, self._make_factors)
 
     @cached_property
-    def _schur(self) -> cache.Entry:
-        return cache.load_or_make(str(self.key), self._make_schur)
+    def _schur(self) -> storage.Entry:
+        return storage.load_or_make(str(self.key), self._make_schur)
 
-    def _make_factors(self) -> cache.Entry:
+    def _make_factors(self) -> storage.Entry:
         self.progress("Cholesky factors of K", 0.0)
         start = time.perf_counter()
         for block, name in zip(self.blocks, self.assembly.parts, strict=True):
@@ -146,7 +146,7 @@ class DensePrepared(Prepared):
         }
         return {f"U{k}": block.U for k, block in enumerate(self.blocks)}, facts
 
-    def _make_schur(self) -> cache.Entry:
+    def _make_schur(self) -> storage.Entry:
         _ = self.assembly.K.factors
         self.progress("Q = AᵀK⁻¹A", 0.0)
         start = time.perf_counter()

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from problems.stiffness.rounding import power_of_two
+from problems.stiffness import power_of_two
 
 from .assembly import LoadCase, Vector
 from .problem import Problem, in_form, read_only

@@ -13,14 +13,14 @@ import scipy.io
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from problems import storage
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.dense import dense_blocks
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse import sparse_block
-from problems.storage import cache
-from problems.storage.fingerprint import fingerprint
+from problems.storage import fingerprint
 
 from . import matrix_files
 from .bounded import LARGEST
@@ -41,9 +41,9 @@ def stored_matrices(
     files_key : a hash of the files' content. Raises InputError.
     """
     code = fingerprint([Path(__file__)], within=("problems/input",))
-    key = cache.digest("own", files_key, sparse, code)
+    key = storage.digest("own", files_key, sparse, code)
 
-    def made() -> cache.Entry:
+    def made() -> storage.Entry:
         start = time.perf_counter()
         assembly, load = read_matrices(files, sparse)
         arrays = {f"K{k}": matrix for k, matrix in enumerate(assembly.K.matrices)}
@@ -53,7 +53,7 @@ def stored_matrices(
         facts = {"parts": assembly.parts, "notes": assembly.notes, "seconds": time.perf_counter() - start}
         return matrix_files.packed(arrays), facts
 
-    arrays, facts = cache.load_or_make(key, made)
+    arrays, facts = storage.load_or_make(key, made)
     nodes, names = arrays.get("nodes"), [f"K{k}" for k in range(len(facts["parts"]))]
     K = Stiffness.of(*(matrix_files.unpacked(arrays, k) if sparse else arrays[k] for k in names), nodes=nodes)
     A = matrix_files.unpacked(arrays, "A")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from problems.forms.assembly import LoadCase
-from problems.storage.cache import digest
+from problems.storage import digest
 
 
 class LoadCases(ABC):

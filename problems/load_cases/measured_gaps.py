@@ -11,12 +11,12 @@ import pandas as pd
 
 from problems.build import load_case
 from problems.errors import Fault, InputError
+from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.names import Form
 from problems.input.bounded import regular_file
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
-from problems.storage.cache import digest
+from problems.storage import digest
 
 from . import LoadCases
 

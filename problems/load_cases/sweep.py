@@ -10,12 +10,12 @@ from pydantic import ValidationError
 
 from problems.build import load_case
 from problems.errors import Fault, InputError
+from problems.forms import Form
 from problems.forms.assembly import LoadCase
-from problems.forms.names import Form
 from problems.input.bounded import validation_faults
 from problems.model.effect import SpringEffect, StiffnessEffect
 from problems.model.scene import JointScene, Scene
-from problems.storage.cache import digest
+from problems.storage import digest
 
 from . import LoadCases
 

@@ -16,10 +16,10 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from scipy.linalg import lapack
 
+from problems import storage
 from problems.forms.assembly import Indices, Matrix, Vector
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
-from problems.storage import cache
-from problems.storage.fingerprint import fingerprint
+from problems.storage import fingerprint
 
 from .part import PartLoadEffect, PartModel
 
@@ -85,7 +85,7 @@ def part_key(part: PartModel) -> str:
     files = [Path(inspect.getfile(module)) for module in modules if module]
     code = fingerprint([*files, Path(__file__)], within=CODE)
     data = [effect.model_dump(mode="json", exclude={"part"}) for effect in part.effects]
-    return cache.digest("part", part.geometry, data, code)
+    return storage.digest("part", part.geometry, data, code)
 
 
 def condensed_stiffness(key: str, part: PartModel, progress: Callable[[float], None]) -> tuple[Matrix, float]:
@@ -95,11 +95,11 @@ def condensed_stiffness(key: str, part: PartModel, progress: Callable[[float], N
     Raises NotPositiveDefinite if some motion of the part costs no energy.
     """
 
-    def made() -> cache.Entry:
+    def made() -> storage.Entry:
         start = time.perf_counter()
         return {"K": _condensed(part, progress)}, {"seconds": time.perf_counter() - start}
 
-    arrays, facts = cache.load_or_make(key, made)
+    arrays, facts = storage.load_or_make(key, made)
     return arrays["K"], facts["seconds"]
 
 
@@ -128,12 +128,12 @@ def condensed_load(
     interior : i and K_ii, asked for if the load is not in the cache.
     """
     code = fingerprint([Path(inspect.getfile(type(effect))), Path(__file__)], within=CODE)
-    key = cache.digest("load", part_key(part), effect.model_dump(mode="json", exclude={"part"}), code)
+    key = storage.digest("load", part_key(part), effect.model_dump(mode="json", exclude={"part"}), code)
 
-    def made() -> cache.Entry:
+    def made() -> storage.Entry:
         f, j, (i, K_ii) = effect.load(part), part.deflections, interior()
         u = K_ii.solve(f[i])
         u += K_ii.solve(f[i] - K_ii.multiply(u))
         return {"force": f[j] - part.stiffness()[j][:, i] @ u}, {}
 
-    return np.array(cache.load_or_make(key, made)[0]["force"])
+    return np.array(storage.load_or_make(key, made)[0]["force"])

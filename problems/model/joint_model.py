@@ -18,19 +18,18 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from problems import storage
 from problems.forms.assembly import Assembly, Indices, LoadCase, Matrix, Vector
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
 from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse import sparse_block
-from problems.storage import cache
-from problems.storage.fingerprint import fingerprint
+from problems.storage import fingerprint
 
 from .effect import Effect, ForceEffect, GapEffect, SpringEffect
-from .graded import graded
 from .numbering import Numbering
-from .part import PartLoadEffect, PartModel
+from .part import PartLoadEffect, PartModel, graded
 from .scene import JointScene
 
 CODE = ("problems/model", "problems/effects")
@@ -54,7 +53,7 @@ class JointModel:
         start = time.perf_counter()
         assembly, coarser = self.assembly(), self.graded()
         seconds = time.perf_counter() - start
-        key = cache.digest("sparse", self.scene.assembly_key, fingerprint([Path(__file__)], CODE))
+        key = storage.digest("sparse", self.scene.assembly_key, fingerprint([Path(__file__)], CODE))
         like = coarser.assembly if coarser.work < WORTH * self.work else None
         return SparsePrepared(assembly, key, seconds, self.scene.source_of, coarser=like)
 
@@ -65,8 +64,8 @@ class JointModel:
 
         known = [*map(part_key, self.parts)]
         if self.springs is not None:
-            known.append(self._spring_key(cache.digest(known)))
-        return None not in map(cache.load, known) and self.dense().built
+            known.append(self._spring_key(storage.digest(known)))
+        return None not in map(storage.load, known) and self.dense().built
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
@@ -210,7 +209,7 @@ class JointModel:
             except NotPositiveDefinite as error:
                 raise indefinite(source_of("K"), f"part.{part.name}", str(error)) from error
             blocks.append(K)
-        groups, key = [[k] for k in range(len(blocks))], cache.digest(keys)
+        groups, key = [[k] for k in range(len(blocks))], storage.digest(keys)
         before = {"condensation": sum(seconds.values())}
         if self.springs is not None:
             groups, key = self._ranges(), self._spring_key(key)
@@ -233,7 +232,7 @@ class JointModel:
         assert self.springs is not None
         T, k = self.springs
         code = fingerprint([Path(__file__)])
-        return cache.digest("springs", key, T.indices.tolist(), T.data.tolist(), k.tolist(), code)
+        return storage.digest("springs", key, T.indices.tolist(), T.data.tolist(), k.tolist(), code)
 
     def _with_springs(
         self, key: str, parts: list[Matrix], groups: list[list[int]], progress: Progress
@@ -242,7 +241,7 @@ class JointModel:
         assert self.springs is not None
         T, k = self.springs
 
-        def made() -> cache.Entry:
+        def made() -> storage.Entry:
             progress("springs between the parts", 0.0)
             start, count = time.perf_counter(), self.scene.joint.node_count
             added = sp.csr_array(T @ sp.diags_array(k) @ T.T)
@@ -256,5 +255,5 @@ class JointModel:
                 arrays[f"K{b}"] = K
             return arrays, {"seconds": time.perf_counter() - start}
 
-        arrays, facts = cache.load_or_make(key, made)
+        arrays, facts = storage.load_or_make(key, made)
         return [arrays[f"K{b}"] for b in range(len(groups))], facts["seconds"]

@@ -10,7 +10,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
-from problems.storage.cache import digest
+from problems.storage import digest
 
 from .effect import Effect, ForceEffect, StiffnessEffect
 from .joint import Joint, Table

@@ -9,10 +9,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import blas
 
-from . import Indices, Matrix, Vector
+from . import Indices, Matrix, U, Vector, gamma
 from .band import band_blocks, band_cholesky, band_solve, lower_band
 from .block import NotPositiveDefinite, SparseBlock, scaled
-from .rounding import U, gamma
 from .selected_inverse import BlockPart
 
 

@@ -13,10 +13,9 @@ from scipy.linalg import blas, lapack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from . import Matrix, Vector
+from . import SAFE, Matrix, Vector, gamma
+from . import U as ROUNDING
 from .block import ENTRIES_AT_A_TIME, Block, NotPositiveDefinite
-from .rounding import SAFE, gamma
-from .rounding import U as ROUNDING
 
 DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense block
 SMALL = 50  # unknowns below which eigenvalues are computed densely

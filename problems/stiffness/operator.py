@@ -11,10 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from . import Indices, Matrix, Vector
+from . import Indices, Matrix, Vector, balanced_units
 from .block import Block, NotPositiveDefinite, scaled
 from .dense import DenseBlock, dense_blocks
-from .rounding import balanced_units
 from .selected_inverse import BlockPart
 from .sparse import sparse_block
 

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
-from . import Indices, Matrix, Vector
+from . import Indices, Matrix, Vector, gamma
+from . import U as ROUNDING
 from .band import half_bandwidth
 from .banded import BandedBlock
 from .block import NotPositiveDefinite, SparseBlock, scaled
-from .rounding import U as ROUNDING
-from .rounding import gamma
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 WITH_INDICES = 1.5  # numbers of eight bytes per entry of a sparse matrix

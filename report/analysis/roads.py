@@ -1,4 +1,5 @@
-"""From the scene to the answer: the seconds of each stage on the way, in each form.
+"""From the scene to the answer: the seconds of each stage on the way, in each form; and the exponents of
+growth, the slopes of straight lines in log–log.
 
     sparse    model K̂, B, f̂                               then preparation (factors of K̂, …) and solve
     dual      condensation of the model to K, factors, Q   then preparation, solve, p and x
@@ -10,7 +11,9 @@ Matrices that came from the cache count with the seconds that it took to make th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -27,6 +30,7 @@ LOAD_CASES = (1, 10, 1000)
 #: The stages in their order, the last two per load case.
 STAGES = ("model_s", "K_s", "factors_s", "Q_s", "once_s", "solving_s", "recovery_s")
 PER_LOAD_CASE = 2
+FEWEST = 5  # sizes that a fit should have
 
 
 @lru_cache(maxsize=4)  # several sections ask for the same
@@ -72,3 +76,33 @@ def _known(part: object) -> dict[str, float]:
     """The numbers of a part of a scene's row."""
     found = {name: as_number(value) for name, value in part.items()} if isinstance(part, dict) else {}
     return {name: value for name, value in found.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Exponent:
+    """y ≈ c·n^slope over `points` sizes; `error`: the standard error of the slope."""
+
+    slope: float
+    error: float
+    points: int
+
+    def __str__(self) -> str:
+        few = "" if self.points >= FEWEST else f" ({self.points} sizes only)"
+        return f"{self.slope:.2f} ± {self.error:.2f}{few}"
+
+
+def exponent(n: Sequence[float], y: Sequence[float]) -> Exponent | None:
+    """Least squares in log–log; missing and non-positive values are ignored. None below three sizes.
+
+    The standard error is sqrt(Σr² / (k − 2) / Σ(log n − mean)²), r the residuals of k points.
+    """
+    pairs = [(math.log(a), math.log(b)) for a, b in zip(n, y, strict=True) if b is not None and b > 0]
+    if len({a for a, _ in pairs}) < 3:
+        return None
+    x, z = np.array(pairs).T
+    centred = x - x.mean()
+    spread = float(centred @ centred)
+    slope = float(centred @ z) / spread
+    rest = z - z.mean() - slope * centred
+    error = math.sqrt(float(rest @ rest) / (len(x) - 2) / spread)
+    return Exponent(slope, error, len(x))

@@ -1,14 +1,20 @@
-"""Lines of time: against the active contacts or the size, with marks for runs without an answer in the
-limit.
+"""Lines of time against the active contacts or the size, with marks for runs without an answer in the limit;
+and a picture of cells: a row per method, a column per scene, in groups of scenes with a heading.
+
+Groups that are too wide for one strip continue in a further one below.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from harness.results.schema import ANSWERED
@@ -35,6 +41,12 @@ MARKS = (
     "Crosses on a line: outside {limit}. Open triangles: stopped at the time limit; crosses at the upper "
     "edge: no answer for another reason."
 )
+GAP = 0.4  # between groups, in columns
+FEWEST = 7.0  # columns, the least width of a strip: few cells stay small
+ROOM = 446.0  # points for all columns
+LETTER, LARGEST = 0.62, 9.0  # width of a letter over its size; the largest size of the type, points
+SMALLEST = 6.5  # points: names of columns that would be smaller stand upright
+GREY = "#555555"
 
 
 def styles_of(cells: pd.DataFrame) -> dict[str, dict[str, Any]]:
@@ -96,3 +108,90 @@ def yardstick(axes: Axes, heights: pd.Series[float], what: str) -> None:
     """A grey line, by its place along the axis, with its name at its end."""
     axes.plot(heights.index, heights, **YARDSTICK)
     axes.annotate(what, (heights.index[-1], heights.iloc[-1]), (8, 0), **BESIDE)
+
+
+@dataclass(frozen=True)
+class Cell:
+    text: str
+    face: str
+    ink: str = GREY
+    hatch: str = ""
+
+
+@dataclass(frozen=True)
+class Group:
+    """`columns` : their names by scene. about : what the names are, below the title."""
+
+    title: str
+    columns: dict[str, str]
+    about: str = ""
+
+
+def grid(
+    rows: Mapping[str, str],
+    groups: Sequence[Group],
+    cells: Mapping[tuple[str, str], Cell],
+    height: float,
+    widest: float,
+) -> Figure:
+    """rows : the names of the methods, in order; those without a cell in a strip are left out of it.
+
+    cells : by method and scene. height : of a row, in inches. widest : the most columns of a strip.
+    """
+    size = min(LARGEST, LETTER * 72 * height)
+    total = sum(len(group.columns) + GAP for group in groups)
+    room = ROOM / max(FEWEST, min(total, widest))  # points for a column
+    strips: list[list[tuple[Group, float]]] = [[]]  # with the middle of each group
+    right = 0.0
+    for group in groups:
+        width = max(len(group.columns), LETTER * size * len(group.title) / room)
+        if right + width > widest and strips[-1]:
+            strips.append([])
+            right = 0.0
+        strips[-1].append((group, right + width / 2))
+        right += width + GAP
+    shown = [{scene for group, _ in strip for scene in group.columns} for strip in strips]
+    lines = [[row for row in rows if any((row, scene) in cells for scene in of)] for of in shown]
+    longest = max((len(name) for group in groups for name in group.columns.values()), default=1)
+    upright = room < LETTER * SMALLEST * longest
+    tick = min(size, room if upright else room / (LETTER * longest))
+    above = size * (1.4 + any(group.about for group in groups))
+    names = LETTER * tick * longest if upright else tick
+    heights = [height * len(of) + (above + names + 16) / 72 for of in lines]
+    drawing = style.figure(sum(heights) + 0.1)
+    panels = drawing.subplots(len(strips), 1, height_ratios=heights, squeeze=False)[:, 0]
+    width = max(FEWEST, *(middle + len(group.columns) / 2 for strip in strips for group, middle in strip))
+    for axes, strip, of_strip in zip(panels, strips, lines, strict=True):
+        ticks: dict[float, str] = {}
+        for group, middle in strip:
+            left = middle - len(group.columns) / 2 + 0.5
+            for x, (scene, name) in enumerate(group.columns.items()):
+                ticks[left + x] = name
+                for y, row in enumerate(of_strip):
+                    if (row, scene) in cells:
+                        _draw(axes, (left + x, y), cells[row, scene], min(size, LARGEST - 0.5), room)
+            _heading(axes, group, middle, size)
+        axes.set(xlim=(-0.1, width + 0.1), ylim=(len(of_strip) - 0.5, -0.5))
+        axes.set_xticks([*ticks], [*ticks.values()], fontsize=tick, rotation=90 if upright else 0)
+        axes.set_yticks(range(len(of_strip)), [rows[row] for row in of_strip], fontsize=size)
+        axes.tick_params(length=0)
+        axes.grid(visible=False)
+        axes.spines[:].set_visible(False)
+    return drawing
+
+
+def _draw(axes: Axes, at: tuple[float, float], cell: Cell, size: float, room: float) -> None:
+    x, y = at
+    look: Any = {"facecolor": cell.face, "hatch": cell.hatch, "edgecolor": "#AAAAAA"}
+    axes.add_patch(Rectangle((x - 0.47, y - 0.45), 0.94, 0.9, linewidth=0.4, **look))
+    box = {"facecolor": "white", "pad": 0.5, "linewidth": 0} if cell.hatch else None
+    size = min(size, room / (LETTER * max(len(cell.text), 1)))
+    place: Any = {"ha": "center", "va": "center_baseline", "in_layout": False}
+    axes.text(x, y, cell.text, fontsize=size, color=cell.ink, bbox=box, **place)
+
+
+def _heading(axes: Axes, group: Group, middle: float, size: float) -> None:
+    at: Any = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points"}
+    at |= {"annotation_clip": False, "ha": "center", "fontsize": size}
+    axes.annotate(group.about, (middle, 1), (0, 3), **at)
+    axes.annotate(group.title, (middle, 1), (0, 3 + size * bool(group.about)), weight="bold", **at)

@@ -1,4 +1,5 @@
-// What is said of one cell, in a few lines and in full with its command; all that was measured of one solver.
+// What is said of one cell, in a few lines and in full with its command; all that was measured of one solver;
+// what changed between two runs.
 function described(cell) {
   const limit = Number(STATE.limit), spread = cell.least_s < cell.most_s ? ` (${number(cell.least_s, 2)} to ${number(cell.most_s, 2)})` : "";
   const inner = cell.inner_iterations ? ` (${number(cell.inner_iterations)} inner)` : "";
@@ -77,4 +78,29 @@ function breaks(cells, limit) {
   const at = first.filter(([, scene]) => scene).map(([, scene]) => scene.scene.split("/").slice(1).join("/"));
   const never = first.filter(([, scene]) => !scene).map(([name]) => name);
   return el("p", {id: "breaks"}, el("b", {}, at.length ? `Breaks at ${at.join(", ")}. ` : ""), never.length ? `Correct on every rung of ${never.join(", ")}.` : "");
+}
+
+// What changed between two runs, measurement by measurement.
+function compareView(main) {
+  const columns = DATA.columns, text = value => typeof value === "number" ? number(value) : String(value ?? "–");
+  for (const pair of DATA.comparisons) {
+    const lines = pair.lines.filter(line => (!STATE.change || line.group === STATE.change)
+      && (!STATE.search || line.measurement.toLowerCase().includes(STATE.search.toLowerCase())));
+    const name = columns.find(([column]) => column === STATE.sort)?.[0];
+    if (name) lines.sort((a, b) => (STATE.down ? -1 : 1) * d3.ascending(a[name] ?? Infinity, b[name] ?? Infinity));
+    const shown = columns.map(([column, heading, right]) => {
+      const [button, more] = sorting(column, heading, {kind: right ? "number" : ""});
+      return [button, line => text(line[column]), right, more];
+    });
+    main.append(el("h2", {}, `${pair.old} → ${pair.new}`), el("p", {}, pair.summary),
+      el("div", {class: "scroll"}, tableOf(shown, lines, {row: line => ({class: `change-${line.group.split(" ")[0]}`})})),
+      el("p", {}, `${lines.length} of ${pair.lines.length} measurements. `, el("button", {type: "button", onclick: () =>
+        download("comparison.csv", [columns.map(([column]) => column), ...lines.map(line => columns.map(([column]) => line[column]))])}, "CSV of what is shown")));
+  }
+}
+
+function compareControls() {
+  const groups = [...new Set(DATA.comparisons.flatMap(pair => pair.lines.map(line => line.group)))];
+  return [options("change", "change", groups.map(name => [name, name])),
+    el("label", {}, "measurement ", el("input", {id: "search", type: "search", value: STATE.search, onchange: event => update({search: event.target.value})}))];
 }

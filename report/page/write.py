@@ -17,7 +17,7 @@ from report.document.escape import plain, quoted, script_json, short
 from report.results.series import Array
 
 HERE = Path(__file__).parent
-SCRIPTS = ("state", "judge", "matrix", "details", "plots", "maps", "compare", "page")
+SCRIPTS = ("state", "judge", "matrix", "details", "plots", "maps", "page")
 Data = dict[str, Any]
 DIGITS = 1 << 11  # what is dropped of a float32's mantissa: 3.6 decimal digits are left
 

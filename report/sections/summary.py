@@ -14,7 +14,7 @@ from report.analysis.roads import roads
 from report.analysis.standings import ACCURACIES, best_tolerances, recommended, shown, standings, swept
 from report.document.blocks import Block, Column, Figure, Section, Table, number, records, word
 from report.document.numbers import MISSING, listed, power, significant, tidy_power, whole
-from report.figures.grid import Cell, Group, grid
+from report.figures.lines import Cell, Group, grid
 from report.results.reader import Results
 
 EACH, PREPARED, FROM_SCENE = "each load case", "one, with preparation", "one, from the scene on"

@@ -13,7 +13,7 @@ import scipy.linalg as sla
 
 from problems.forms.assembly import Matrix, Vector
 from problems.forms.banded_inverse import BandedInverse
-from problems.forms.product import product
+from problems.forms.compliance import product
 
 
 @dataclass(frozen=True)

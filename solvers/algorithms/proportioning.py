@@ -29,7 +29,7 @@ from functools import partial
 import numpy as np
 
 from problems.forms.assembly import Mask, Vector
-from problems.forms.product import Compliance
+from problems.forms.compliance import Compliance
 from solvers.kkt import kkt_residual, rounding_of
 
 from .block_pivoting import TrialSolution, block_pivoting

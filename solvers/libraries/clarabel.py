@@ -17,8 +17,7 @@ import clarabel
 import numpy as np
 
 from solvers.adapter import Converted, Library, gap_tolerance, rows_for_bounds, upper_triangle
-from solvers.base import Answer, LoadCase, Problem, Status, WarmStart
-from solvers.settings import apply
+from solvers.base import Answer, LoadCase, Problem, Status, WarmStart, apply
 
 STATUS: dict[str, Status] = {
     "Solved": "solved",

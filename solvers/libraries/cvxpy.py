@@ -15,8 +15,7 @@ import cvxpy as cp
 import scipy.sparse as sp
 
 from solvers.adapter import Converted, gap_tolerance
-from solvers.base import FORMS, Answer, Form, LoadCase, Problem, Solver, Status, WarmStart
-from solvers.settings import one_of, require
+from solvers.base import FORMS, Answer, Form, LoadCase, Problem, Solver, Status, WarmStart, one_of, require
 
 STATUS: dict[str, Status] = {
     cp.OPTIMAL: "solved",

@@ -11,8 +11,7 @@ import piqp
 import scipy.sparse as sp
 
 from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
-from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
-from solvers.settings import apply
+from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart, apply
 
 STATUS: dict[Any, Status] = {
     piqp.PIQP_SOLVED: "solved",

@@ -11,8 +11,7 @@ import scipy.sparse as sp
 from proxsuite import proxqp
 
 from solvers.adapter import Converted, Library, converted, gap_tolerance, is_sparse, set_absolute
-from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart
-from solvers.settings import apply
+from solvers.base import DENSE_FORMS, Answer, LoadCase, Problem, Status, WarmStart, apply
 
 BACKENDS = {
     "automatic": proxqp.dense.DenseBackend.Automatic,

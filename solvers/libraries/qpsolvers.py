@@ -17,8 +17,7 @@ from qpsolvers.exceptions import QPError
 
 from problems.errors import InputError
 from solvers.adapter import Converted, dense, gap_tolerance, is_sparse, sorted_csc
-from solvers.base import FORMS, Answer, LoadCase, Problem, Solver
-from solvers.settings import require
+from solvers.base import FORMS, Answer, LoadCase, Problem, Solver, require
 
 #: Options that set the absolute tolerance, and that of the duality gap. Relative tolerances are 0, iteration
 #: limits too large to matter. DAQP's default dual tolerance of 1e-12 is not loosened. HiGHS takes none

@@ -25,10 +25,9 @@ from solvers.algorithms.interior_point import (
 )
 from solvers.algorithms.newton_system import NewtonSystem
 from solvers.algorithms.preconditioner import SYSTEMS, OpenLast
-from solvers.base import Answer, LoadCase, Problem, Status
+from solvers.base import Answer, LoadCase, Problem, Status, one_of, require
 from solvers.kkt import largest_rounding
 from solvers.method import Method, State
-from solvers.settings import one_of, require
 
 THETA = 0.995  # fraction of the step to the boundary
 STALLED = 10  # iterations without progress before a restart, or the end

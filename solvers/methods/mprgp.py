@@ -16,10 +16,9 @@ from problems.forms.assembly import Vector
 from problems.forms.banded_inverse import BandedInverse
 from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.proportioning import Band, Diagonal, Face, Proportioning, step_length
-from solvers.base import Answer, Form, LoadCase, Problem, failed
+from solvers.base import Answer, Form, LoadCase, Problem, failed, one_of, require
 from solvers.kkt import judged, kkt_residual, largest_rounding, with_p, with_x
 from solvers.method import Method, State, first_point
-from solvers.settings import one_of, require
 
 PRECONDITIONERS = ("band", "face", "none")
 MAX_PRODUCTS = 100_000  # with Q

@@ -16,11 +16,10 @@ import numpy as np
 from scipy.linalg import blas
 
 from problems.forms.assembly import Matrix, Vector
-from problems.forms.product import product
-from solvers.base import Answer, LoadCase
+from problems.forms.compliance import product
+from solvers.base import Answer, LoadCase, require
 from solvers.kkt import judged, kkt_residual, kkt_status, rounding_of
 from solvers.method import Method, State, first_point
-from solvers.settings import require
 
 MAX_SWEEPS = 1_000_000
 CHECKED = 10  # sweeps after which y is computed anew

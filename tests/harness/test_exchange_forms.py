@@ -15,7 +15,7 @@ from small import solve_by_nnls
 from strip import write_strip
 
 from problems.build import load_case, prepared
-from problems.forms.names import Form
+from problems.forms import Form
 from problems.forms.problem import in_form
 from problems.scene import read_scene
 

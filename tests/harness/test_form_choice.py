@@ -11,7 +11,7 @@ from harness.planning.form_choice import chosen_form, refuse_what_cannot_fit, si
 from harness.scene import validate
 from problems.build import prepared
 from problems.errors import InputError
-from problems.forms.names import Form
+from problems.forms import Form
 from problems.model.joint_model import JointModel
 from problems.scene import read_scene
 from problems.stiffness.band import half_bandwidth

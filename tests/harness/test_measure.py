@@ -10,7 +10,7 @@ import pytest
 import tiny
 from runs import all_end
 
-from harness.measurement import process_tree
+from harness.measurement import child
 from harness.measurement.worker import measure
 from harness.planning.plan import Measurement
 
@@ -156,10 +156,10 @@ def test_a_child_that_runs_on_does_not_answer_twice(folder: Path, fault: str) ->
 def test_an_orphan_that_is_in_no_list_yet_is_killed_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """A child that forks and dies before it is killed: what it forked is in the next list."""
     lists, killed = iter([[11], [11, 12], [11, 12]]), []
-    monkeypatch.setattr(process_tree, "_children", lambda pid: next(lists))
-    monkeypatch.setattr(process_tree, "_is_alive", lambda pid: False)
+    monkeypatch.setattr(child, "_children", lambda pid: next(lists))
+    monkeypatch.setattr(child, "_is_alive", lambda pid: False)
     monkeypatch.setattr(os, "kill", lambda pid, sent: killed.append(pid))
-    process_tree.end_children(1)
+    child.end_children(1)
     assert killed == [11, 12]
 
 

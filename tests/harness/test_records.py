@@ -13,7 +13,7 @@ from rich.console import Console
 from synthetic_results import no_answer, row
 
 from harness.results import records, schema
-from harness.terminal.progress import Display
+from harness.terminal.console import Display
 from harness.verification.judge import Judgement
 from problems.drawn import EXAMPLES
 from problems.errors import InputError

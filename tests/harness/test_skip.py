@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.measurement.describe import Description
-from harness.measurement.resume import outdated
+from harness.measurement.describe import Description, outdated
 from harness.measurement.row import Task, run_task
 from harness.planning.due import OUT_OF_TIME, predicted_timeout
 from harness.planning.plan import expand

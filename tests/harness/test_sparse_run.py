@@ -14,7 +14,7 @@ from harness.planning.suite import read_suite
 from harness.results import records
 from harness.verification.gate import gate
 from harness.verification.reference_problem import measurable, record, reference_problem
-from problems.forms.names import Form
+from problems.forms import Form
 
 pytestmark = pytest.mark.slow
 

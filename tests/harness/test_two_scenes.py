@@ -11,7 +11,7 @@ from joints import two_parts
 from matplotlib.image import imread
 
 from harness.cli.scene import STARTER
-from harness.scene.layout import fastener_forces
+from harness.scene.solve import fastener_forces
 from problems.build import load_case, prepared
 from problems.scene import read_scene
 

@@ -15,7 +15,7 @@ from harness.measurement.run import run as measure
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.suite import read_suite
 from harness.results import records
-from problems.storage import cache
+from problems import storage
 
 pytestmark = pytest.mark.slow
 
@@ -75,7 +75,7 @@ def by_version(out: Path) -> dict[str, dict[str, Any]]:
 
 
 def marks() -> dict[str, int]:
-    return {path.parent.name: path.stat().st_mtime_ns for path in cache.root().glob(f"*/{COMPLETE}")}
+    return {path.parent.name: path.stat().st_mtime_ns for path in storage.root().glob(f"*/{COMPLETE}")}
 
 
 def test_versions_side_by_side_and_again(folder: Path, tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_versions_side_by_side_and_again(folder: Path, tmp_path: Path) -> None:
     assert (same, marks()) == (rows, made)
 
     write_wheel(folder / "wheels", "fakelib", "2.0", LIBRARY["2.0"], "needed")
-    assert list(cache.root().glob("fakelib==2.0-*/bin/python"))  # the rest of what failed is no environment
+    assert list(storage.root().glob("fakelib==2.0-*/bin/python"))  # the rest of what failed is no environment
     text, rows = run(folder, out, *wanted)
     assert "2 measurements, 1 of them already" in text
     assert rows["1.0"] == same["1.0"]

@@ -11,8 +11,7 @@ from commands import harness
 from rich.console import Console
 from test_formats import FOLDERS, PATHS, files_of
 
-from harness.scene.export import export
-from harness.scene.matrix_import import import_
+from harness.scene.export import export, import_
 from harness.scene.solve import solve
 from problems.build import load_case, prepared
 from problems.errors import InputError

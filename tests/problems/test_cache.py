@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from joints import forbid_building, make_joint, make_scene
 
-from problems import build
+from problems import build, storage
 from problems.effects.supports import Supports
 from problems.errors import InputError
 from problems.scene import read_scene
-from problems.storage import cache, fingerprint
-from problems.storage.fingerprint import ROOT
+from problems.storage import ROOT
 
 ARRAYS = {"one": np.arange(600.0).reshape(20, 30), "two": np.array([1, 2, 3])}
 PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
@@ -31,9 +30,9 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_an_entry_comes_back_memory_mapped_and_read_only() -> None:
-    assert cache.load("key") is None
-    cache.store("key", ARRAYS, {"n": 3, "text": "é"})
-    found = cache.load("key")
+    assert storage.load("key") is None
+    storage.store("key", ARRAYS, {"n": 3, "text": "é"})
+    found = storage.load("key")
     assert found is not None
     arrays, facts = found
     assert facts == {"n": 3, "text": "é"}
@@ -45,72 +44,72 @@ def test_an_entry_comes_back_memory_mapped_and_read_only() -> None:
 
 
 def test_storing_again_replaces_the_entry(root: Path) -> None:
-    cache.store("key", ARRAYS, {})
-    cache.store("key", {"three": np.ones(3)}, {"n": 1})
-    found = cache.load("key")
+    storage.store("key", ARRAYS, {})
+    storage.store("key", {"three": np.ones(3)}, {"n": 1})
+    found = storage.load("key")
     assert list(found[0]) == ["three"]
     assert [path.name for path in root.iterdir()] == ["key"]
 
 
 @pytest.mark.parametrize("kept", [0, 100, -8, None])
 def test_a_truncated_or_missing_array_is_named_with_its_sizes(root: Path, kept: int | None) -> None:
-    cache.store("key", ARRAYS, {})
+    storage.store("key", ARRAYS, {})
     path = root / "key" / "one.npy"
     whole = path.read_bytes()
     path.unlink()
     if kept is not None:
         path.write_bytes(whole[:kept])
     with pytest.raises(InputError) as error:
-        cache.load("key")
+        storage.load("key")
     found = None if kept is None else len(whole[:kept])
     for said in (str(path), str(len(whole)), str(found), "delete"):
         assert said in str(error.value)
 
 
-@pytest.mark.parametrize("name", ["one.npy", cache.MANIFEST])
+@pytest.mark.parametrize("name", ["one.npy", storage.MANIFEST])
 def test_one_changed_bit_is_named(root: Path, name: str) -> None:
     """In the header of an array, in its numbers, in the names, the sizes and the facts of the manifest."""
-    cache.store("key", ARRAYS, {"bound_mm": 1e-17, "text": "é"})
+    storage.store("key", ARRAYS, {"bound_mm": 1e-17, "text": "é"})
     path = root / "key" / name
     whole = path.read_bytes()
     path.chmod(0o644)
     for at in range(0, len(whole), 7):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
         with suppress(InputError):  # none of a space, nor of the name of the hash
-            found = cache.load("key")
-            assert found is None or (name == cache.MANIFEST and found[1]["bound_mm"] == 1e-17)
+            found = storage.load("key")
+            assert found is None or (name == storage.MANIFEST and found[1]["bound_mm"] == 1e-17)
 
 
 def test_of_long_files_the_size_alone_is_checked(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "CHECKED", 1000)
-    cache.store("key", ARRAYS, {})
+    monkeypatch.setattr(storage, "CHECKED", 1000)
+    storage.store("key", ARRAYS, {})
     path = root / "key" / "one.npy"
     path.chmod(0o644)
     path.write_bytes(path.read_bytes()[:-1] + b"x")
-    assert cache.load("key") is not None
+    assert storage.load("key") is not None
 
 
 @pytest.mark.parametrize("content", [b"{}", b'{"files": {"one.npy": 4928}, "facts": {}}'])
 def test_an_entry_without_hashes_is_made_anew(root: Path, content: bytes) -> None:
     """One of an older version."""
-    cache.store("key", ARRAYS, {})
-    manifest = root / "key" / cache.MANIFEST
+    storage.store("key", ARRAYS, {})
+    manifest = root / "key" / storage.MANIFEST
     manifest.unlink()
     manifest.write_bytes(content)
-    assert cache.load("key") is None
-    arrays, facts = cache.load_or_make("key", lambda: ({"two": np.ones(2)}, {"n": 1}))
+    assert storage.load("key") is None
+    arrays, facts = storage.load_or_make("key", lambda: ({"two": np.ones(2)}, {"n": 1}))
     assert (list(arrays), facts) == (["two"], {"n": 1})
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b"[" * 100_000, b"\xff", None, b'{"files": [], "hash": ""}'])
 def test_a_damaged_manifest_is_named_with_what_to_do(root: Path, content: bytes | None) -> None:
-    cache.store("key", ARRAYS, {})
-    manifest = root / "key" / cache.MANIFEST
+    storage.store("key", ARRAYS, {})
+    manifest = root / "key" / storage.MANIFEST
     manifest.unlink()
     if content is not None:
         manifest.write_bytes(content)
     with pytest.raises(InputError, match=r"manifest\.json.*delete"):
-        cache.load("key")
+        storage.load("key")
 
 
 def test_a_writer_that_fails_leaves_nothing(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,9 +124,9 @@ def test_a_writer_that_fails_leaves_nothing(root: Path, monkeypatch: pytest.Monk
     with monkeypatch.context() as patch:
         patch.setattr(np, "save", disk_full)
         with pytest.raises(OSError, match="no space"):
-            cache.store("key", ARRAYS, {})
+            storage.store("key", ARRAYS, {})
     assert list(root.iterdir()) == []
-    assert cache.load("key") is None
+    assert storage.load("key") is None
 
 
 def test_what_a_killed_writer_leaves_is_not_seen(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,12 +135,12 @@ def test_what_a_killed_writer_leaves_is_not_seen(root: Path, monkeypatch: pytest
 
     def look(path: Path, array: Any) -> None:
         save(path, array)
-        seen.append(cache.load("key"))
+        seen.append(storage.load("key"))
 
     monkeypatch.setattr(np, "save", look)
-    cache.store("key", ARRAYS, {})
+    storage.store("key", ARRAYS, {})
     assert seen == [None, None]
-    assert cache.load("key") is not None
+    assert storage.load("key") is not None
 
 
 def test_the_second_opening_builds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,12 +191,12 @@ def test_a_change_of_the_code_that_builds_changes_the_key(
     scene = read_scene(str(tmp_path / "own.npz")) if module == OWN else SCENE
     edited = (ROOT / "problems" / module.replace(".", "/")).with_suffix(".py")
     key = build.prepared(scene).key
-    monkeypatch.setattr(fingerprint, "_read", fingerprint._read.__wrapped__)
+    monkeypatch.setattr(storage, "_read", storage._read.__wrapped__)
     monkeypatch.setattr(Path, "read_bytes", with_more("\n# words\n", edited))
     assert build.prepared(scene).key == key
     monkeypatch.undo()
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(fingerprint, "_read", fingerprint._read.__wrapped__)
+    monkeypatch.setattr(storage, "_read", storage._read.__wrapped__)
     monkeypatch.setattr(Path, "read_bytes", with_more("\nMORE = 1\n", edited))
     assert build.prepared(scene).key != key
 

@@ -15,15 +15,14 @@ from hypothesis import strategies as st
 from rich.console import Console
 from small import make_load, make_prepared, solve_by_nnls
 
-from harness.scene.export import export, matrices
-from harness.scene.matrix_import import import_
+from harness.scene.export import export, import_, matrices
 from harness.scene.solve import solve
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
-from problems.input.digits import apparent_digits, expected_error
+from problems.input.matrix_files import apparent_digits, expected_error
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 

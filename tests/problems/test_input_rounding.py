@@ -12,11 +12,11 @@ import pytest
 from exact_answer import exact_optimum, exactly
 
 from harness.verification.reference import best_of_candidates
+from problems import storage
 from problems.build import load_case, prepared
 from problems.forms.assembly import Assembly, LoadCase
 from problems.input.user_matrices import read_matrices
 from problems.scene import read_scene
-from problems.storage import cache
 
 EXTENDED = np.finfo(np.longdouble).nmant > 53
 N = 4
@@ -123,5 +123,5 @@ def test_the_cache_keeps_the_notes(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("RIVETBENCH_CACHE", str(tmp_path / "cache"))
     np.savez(tmp_path / "mine.npz", **by_an_ulp(0, 1e6))
     first = prepared(read_scene(str(tmp_path / "mine.npz"))).assembly.notes
-    monkeypatch.setattr(cache, "store", lambda *_: pytest.fail("read a second time"))
+    monkeypatch.setattr(storage, "store", lambda *_: pytest.fail("read a second time"))
     assert prepared(read_scene(str(tmp_path / "mine.npz"))).assembly.notes == first != ()

@@ -18,17 +18,16 @@ from sparse_matrices import band_matrix, renumbered
 
 from harness import load_scene, own_matrices, solve
 from harness.planning import form_choice
-from problems import formats
+from problems import formats, storage
 from problems.build import load_case, prepared
 from problems.formats.nastran import pyyeti
+from problems.forms import FORMS
 from problems.forms.assembly import Vector
-from problems.forms.names import FORMS
 from problems.forms.prepared import Prepared
 from problems.input import matrix_files
 from problems.model.joint_model import JointModel
 from problems.scene import read_scene
 from problems.stiffness.dense import DenseBlock
-from problems.storage import cache
 
 N, M = 3000, 40
 NODES = (200, 8)
@@ -155,7 +154,7 @@ def test_ten_thousand_bodies_take_a_fixed_number_of_files(
     assert len(data.assembly.K.blocks) == 1
     assert data.assembly.K.numbers == n  # half-bandwidth 0
     np.testing.assert_array_equal(data.recover(np.zeros(n - 2), load), f)
-    assert max(len(names) for _, _, names in os.walk(cache.root())) < 16
+    assert max(len(names) for _, _, names in os.walk(storage.root())) < 16
 
 
 def test_a_hundred_thousand_separate_unknowns_are_solved() -> None:

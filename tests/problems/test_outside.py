@@ -15,7 +15,7 @@ from harness.verification.judge import Reference, judge
 from harness.verification.reference import best_of_candidates
 from problems.build import load_case, prepared
 from problems.errors import InputError
-from problems.forms.names import FORMS
+from problems.forms import FORMS
 from problems.ladders import rung_names
 from problems.ladders.outside import FREE, alone, exact, journal_bearing
 from problems.scene import read_scene

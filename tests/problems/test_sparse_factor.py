@@ -13,8 +13,8 @@ from sparse_matrices import band_matrix, chain, graph_matrix, renumbered
 
 from problems.build import load_case, prepared
 from problems.errors import InputError
+from problems.forms import FORMS
 from problems.forms.assembly import Matrix
-from problems.forms.names import FORMS
 from problems.scene import read_scene
 from problems.stiffness import band
 from problems.stiffness.band import half_bandwidth, lower_band

@@ -178,7 +178,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "trans=1), lower=1).max()": ("trans=1), lower=1).min()",),
         "return None if info else ": ("return ",),
     },
-    "problems/stiffness/rounding.py": {
+    "problems/stiffness/__init__.py": {
         "np.sqrt(np.where(diagonal > 0, diagonal, 1.0))": ("np.where(diagonal > 0, diagonal, 1.0)",),
     },
     "problems/stiffness/operator.py": {"solve(v / D) / D": ("solve(v)",)},
@@ -213,7 +213,7 @@ TESTS = {
     "harness/verification/judge.py": ("proofs/test_terms_verdict.py", "harness/test_judge.py"),
     "problems/stiffness/dense.py": ("proofs/test_definite.py",),
     "problems/stiffness/banded.py": ("proofs/test_definite.py",),
-    "problems/stiffness/rounding.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
+    "problems/stiffness/__init__.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "problems/stiffness/operator.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "solvers/kkt.py": ("proofs/test_terms_verdict.py",),
 }

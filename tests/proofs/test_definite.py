@@ -15,10 +15,10 @@ from sparse_matrices import band_matrix, chain, graph_matrix
 from harness.verification import balanced
 from harness.verification.balanced import independence, smallest_eigenvalue
 from problems.forms.assembly import Matrix, Vector
+from problems.stiffness import U, gamma
 from problems.stiffness.block import NotPositiveDefinite
 from problems.stiffness.dense import DenseBlock
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.rounding import U, gamma
 
 KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array])
 Kind = Callable[[Any], Any]

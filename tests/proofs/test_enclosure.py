@@ -12,8 +12,8 @@ from harness.verification.balanced import Balanced
 from harness.verification.enclosure import DoubleDouble, Enclosure, Residual, length, two_sum
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
+from problems.stiffness import gamma
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.rounding import gamma
 
 ETA = 2.0**-1074
 WHOLE = slice(None)

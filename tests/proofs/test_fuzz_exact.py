@@ -23,8 +23,8 @@ from harness.verification.judge import Reference, judge
 from harness.verification.proof import Proof
 from harness.verification.reference import best_of_candidates, proof_of
 from problems.build import prepared
+from problems.forms import Form
 from problems.forms.assembly import Vector
-from problems.forms.names import Form
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from solvers.registry import make_solver, modules, owner_of

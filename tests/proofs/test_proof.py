@@ -14,11 +14,11 @@ from harness.verification.assess import assess
 from harness.verification.enclosure import DoubleDouble, Enclosure
 from harness.verification.proof import Proof
 from harness.verification.reference import proof_of
-from problems.forms.approximate_inverse import ApproximateInverse
 from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.compliance import ApproximateInverse
 from problems.forms.prepared import Prepared
+from problems.stiffness import gamma
 from problems.stiffness.operator import Stiffness
-from problems.stiffness.rounding import gamma
 
 KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array], ids=["dense", "sparse"])
 

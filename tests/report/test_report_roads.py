@@ -8,7 +8,7 @@ import pytest
 from synthetic_results import no_answer, results, row, table
 
 from harness.results import schema
-from problems.forms import names
+from problems import forms
 from report.analysis.roads import roads
 from report.results.reader import Results
 from report.sections import summary
@@ -48,8 +48,8 @@ def totals(line: pd.Series) -> list[float]:
 
 
 def test_the_reports_forms_are_those_of_the_problems() -> None:
-    assert set(schema.FORMS) == set(names.FORMS)
-    assert set(schema.DENSE_FORMS) == set(names.DENSE_FORMS)
+    assert set(schema.FORMS) == set(forms.FORMS)
+    assert set(schema.DENSE_FORMS) == set(forms.DENSE_FORMS)
 
 
 def test_each_form_pays_for_its_own_stages(tmp_path: Path) -> None:

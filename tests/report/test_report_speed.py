@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import linregress
 from synthetic_results import no_answer, results, row, shown, table
 
-from report.analysis.fit import exponent
+from report.analysis.roads import exponent
 from report.figures import style
-from report.sections import methods, speed
+from report.sections import speed
 
 LOW, HIGH = "4386/0052", "4386/1074"
 TIMES = {"setup_s": 0.0, "form_s": 0.0}
@@ -65,7 +65,7 @@ def test_exponents_of_known_powers() -> None:
 
 
 def told(directory: Path, rows: list[dict[str, Any]]) -> list[list[str]]:
-    return shown(table(methods.section(results(directory, rows))))
+    return shown(table(speed.methods(results(directory, rows))))
 
 
 def measured(scene: str, solver: str, seconds: float, products: int | None, **more: Any) -> dict[str, Any]:

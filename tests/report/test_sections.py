@@ -13,7 +13,7 @@ from synthetic_results import everything, no_answer, results, row, write_rows
 
 from report.document.blocks import WIDEST, Table, number
 from report.results.reader import read
-from report.sections import SECTIONS, accuracy, drawn, methods, roads, speed, summary
+from report.sections import SECTIONS, accuracy, drawn, roads, speed, summary
 from report.writers.markdown import contents, write
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -48,7 +48,7 @@ def test_no_section_is_made_of_nothing(tmp_path: Path, section: Any) -> None:
         *((of, SWEEP) for of in (accuracy.costs, accuracy.tolerances)),
         (speed.machine, [row(LOW, "newton")]),  # without benchmarks
         (summary.advice, [row(LOW, "a"), row(HIGH, "a")]),  # one method alone
-        (methods.section, [COUNTED, row(LOW, "piqp")]),  # one that counts is no comparison
+        (speed.methods, [COUNTED, row(LOW, "piqp")]),  # one that counts is no comparison
         (roads.section, [FORMS["dual"], FORMS["primal"]]),  # it takes dense and sparse forms,
         (roads.section, [FORMS["sparse"]]),
         (roads.section, [FORMS["dual"], FORMS["sparse"] | {"case": 3}]),  # no case of a series, which has

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small import make_load, make_strips, solve_by_nnls
 
-from problems.forms import product
+from problems.forms import compliance
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
@@ -53,13 +53,13 @@ def test_the_products_that_are_told_are_those_made(
     preconditioner: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The answer is that of NNLS; and from its own few are left."""
-    made, original = [], product.product
+    made, original = [], compliance.product
 
     def counted(Q: Any, v: Vector) -> Vector:
         made.append(1)
         return original(Q, v)
 
-    monkeypatch.setattr(product, "product", counted)
+    monkeypatch.setattr(compliance, "product", counted)
     prepared, load = strips(400)
     x, lam = solve_by_nnls(prepared, load)
     assert 0 < np.count_nonzero(lam) < len(lam)

@@ -14,7 +14,7 @@ from test_matrices import write_mtx
 from harness.solving.session import SolverSession
 from harness.verification.reference import best_of_candidates, reference
 from problems.build import load_case, prepared
-from problems.forms import approximate_inverse
+from problems.forms import compliance
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
@@ -83,7 +83,7 @@ def test_without_m_the_sets_are_solved_by_factorisations_of_k(
     monkeypatch.setattr(Stiffness, "local_compliance", lambda *_: None)
     load, _ = make_load(6, dense)
     check(session_of("newton", dense).next(load, None), dense, load)  # few: M = Q⁻¹
-    monkeypatch.setattr(approximate_inverse, "FEW", -1)
+    monkeypatch.setattr(compliance, "FEW", -1)
     data = Prepared(replace(dense.assembly, K=dense.assembly.K.as_sparse()))
     check(session_of("newton", data).next(load, None), dense, load)
 

@@ -12,12 +12,11 @@ from strip import write_strip
 from harness.conformance.known_problems import contact_rows
 from harness.solving.session import SolverSession
 from problems.build import load_case, prepared
-from problems.forms.approximate_inverse import of_dense
 from problems.forms.assembly import Assembly, LoadCase
 from problems.forms.banded_inverse import BandedInverse, Windows, banded_inverse
+from problems.forms.compliance import DenseCompliance, of_dense
 from problems.forms.prepared import Prepared, dual_alone
 from problems.forms.problem import in_form
-from problems.forms.product import DenseCompliance
 from problems.ladders import make_rung
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene

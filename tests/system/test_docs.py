@@ -12,10 +12,9 @@ from matplotlib.image import imread
 from rich.console import Console
 from typer.main import get_command
 
-from harness import api, check_solver
+from harness import api, check_solver, terminal
 from harness.cli.app import app
 from harness.scene.solve import solve
-from harness.terminal import exit_codes
 from problems import effects
 from problems.build import load_case, prepared
 from problems.errors import InputError
@@ -142,7 +141,7 @@ def test_the_folders_and_files_of_the_architecture_are_those_of_the_code() -> No
 def test_the_exit_codes_and_commands_of_the_page_are_those_of_the_code() -> None:
     text = (DOCS / "commands.md").read_text("utf-8")
     table = text[text.index("| exit code |") :].split("\n\n")[0]
-    codes = {value for name, value in vars(exit_codes).items() if name.isupper()}
+    codes = {value for name, value in vars(terminal).items() if name.isupper()}
     assert {int(code) for code in re.findall(r"^\| (\d+) \|", table, re.MULTILINE)} == codes
     for name in COMMANDS:
         assert f"| `python -m harness {name} " in text, name

@@ -12,8 +12,7 @@ from commands import harness
 from rich.console import Console
 from small import make_load, make_prepared
 
-from harness.scene.export import matrices
-from harness.scene.matrix_import import import_
+from harness.scene.export import import_, matrices
 from problems import formats
 from problems.errors import InputError
 from problems.formats.nastran import pyyeti

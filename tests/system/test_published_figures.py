@@ -11,7 +11,7 @@ from report.analysis.roads import roads
 from report.document.blocks import Table
 from report.document.numbers import listed, power, significant
 from report.results.reader import Results, read
-from report.sections import methods
+from report.sections import speed
 from report.sections.series import compared
 from solvers.registry import modules
 from studies.publish import NAMES, PUBLISHED, SERIES, minutes, rows_of, write_index
@@ -80,7 +80,7 @@ def test_the_series_of_the_page_is_the_published_one() -> None:
 
 
 def test_the_methods_of_the_page_are_those_of_the_report_without_what_was_removed() -> None:
-    section = methods.section(results("methods"))
+    section = speed.methods(results("methods"))
     assert section is not None
     (table,) = (block.markdown for block in section.blocks if isinstance(block, Table))
     lines = table.splitlines()

@@ -1,9 +1,0 @@
-"""The exit codes of the commands, as docs/commands.md and help texts state them.
-
-FAILED: the command ran, but accuracy was lost, a solver has faults, or measurements are missing.
-GAP_EXCEEDED: the answer is good, and the gap that it leaves is larger than allowed.
-NOT_COMPARABLE: each input is sound, but they do not belong together (harness/results/sides.py).
-"""
-
-DONE, FAILED, WRONG_USAGE, NOTHING_JUDGED = 0, 1, 2, 3
-GAP_EXCEEDED, NOT_COMPARABLE, INTERRUPTED = 4, 5, 130

@@ -1,1 +1,0 @@
-"""Arrays on disk under a hash of what made them."""
