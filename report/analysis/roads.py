@@ -103,6 +103,7 @@ def exponent(n: Sequence[float], y: Sequence[float]) -> Exponent | None:
     centred = x - x.mean()
     spread = float(centred @ centred)
     slope = float(centred @ z) / spread
-    rest = z - z.mean() - slope * centred
+    offset = float(z.mean() - slope * x.mean())
+    rest = z - offset - slope * x
     error = math.sqrt(float(rest @ rest) / (len(x) - 2) / spread)
     return Exponent(slope, error, len(x))
