@@ -32,11 +32,15 @@ def solve(
     ] = None,
     reference_limit: ReferenceLimit = None,
     allow_gap: AllowGap = None,
+    refine: Annotated[
+        bool, typer.Option("--refine", help="Estimate what the grid leaves out from a finer one too.")
+    ] = False,
 ) -> None:
     """Solve one scene: gaps, displacements and contact forces, as pictures and files.
 
     Without --solver the answer comes with a proven bound on its error; with --solver it is judged against
-    that answer. If the parts do not meet, this is a linear solve.
+    that answer. If the parts do not meet, this is a linear solve. How much the finite-element grid leaves out
+    of a gap is estimated from a coarser one.
 
     Two scenes with the same contacts, such as two plans of fasteners, are solved into DIR/first and
     DIR/second and compared: gaps side by side, a map of the difference, the force in each fastener.
@@ -61,7 +65,9 @@ def solve(
         taken: Any = form.value if form else None
 
         def solved(source: str, folder: Path) -> int:
-            return solve_scene(source, solver, tolerance, folder, console, reference_limit, taken, allow_gap)
+            return solve_scene(
+                source, solver, tolerance, folder, console, reference_limit, taken, allow_gap, refine
+            )
 
         if other is None:
             raise typer.Exit(solved(scene, out))

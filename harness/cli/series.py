@@ -39,6 +39,9 @@ def series(
     correlation_length: Annotated[
         float | None, option("MM", "Their correlation length.  [default: the scene's]")
     ] = None,
+    around: Annotated[
+        Path | None, option("FILE", "A scan, CSV with x, y, gap in mm, that the random gaps pass through.")
+    ] = None,
     gaps: Annotated[
         Path | None,
         option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
@@ -82,6 +85,8 @@ def series(
     Examples:
       python -m harness series 4386/1074 --cases 1000 --out results/gaps
       python -m harness series 4386/0107 --sd 0.2 --correlation-length 150 --cases 200 --out results/var
+      python -m harness series 4386/0107 --around scan.csv --sd 0.2 --correlation-length 150 \\
+                                         --allow-gap 0.05 --out results/scanned
       python -m harness series 4386/1074 --gaps measured.csv --out results/measured
       python -m harness series 4386/1074 --gaps measured.csv --allow-gap 0.05 --out results/measured
       python -m harness series 4386/0107 --sweep initial_gap.mean=0.1:1.0:10 --out results/sweep
@@ -110,7 +115,13 @@ def series(
         from problems.scene import read_scene
 
         refuse_unusable(allow_gap)
-        random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
+        random: dict[str, Any] = {
+            "--seed": seed,
+            "--mean": mean,
+            "--sd": sd,
+            "--correlation-length": correlation_length,
+        }
+        random["--around"] = around
         drawn = [name for name, value in random.items() if value is not None]
         faults = []
         if (gaps and sweep) or (drawn and (gaps or sweep)):
@@ -142,7 +153,7 @@ def series(
         elif sweep:
             chosen = swept(read, sweep, taken)
         else:
-            chosen = random_gaps(read, count, seed or SEED, mean, sd, correlation_length, taken)
+            chosen = random_gaps(read, count, seed or SEED, mean, sd, correlation_length, taken, around)
         limits = time_limit, memory_limit
         threads = threads or threads_per_worker(scheduler) or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)

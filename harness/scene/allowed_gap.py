@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from report.results.series import Series
 
+CONFIDENCE = 0.95  # of the interval of Clopper and Pearson for a share
 ROUNDING = 2.0**-24
 
 
@@ -60,12 +61,16 @@ def show(check: dict[str, Any], gap: Vector, nodes: Vector | None, console: Cons
     allowed, largest, contacts = check["allowed_mm"], check["largest_mm"], check["contacts"]
     if check["exceeded"] is None:
         return _undecided("", allowed, check["uncertainty_mm"], console)
+    near = ""
+    if (grid := check.get("closer_than_grid_mm")) is not None:
+        near = f". This is closer to the limit than the grid can tell, about {grid:.1g} mm"
     if not contacts:
-        return _passed(f"no gap is larger than {allowed:g} mm; the largest is {largest:.3g} mm", console)
+        said = f"no gap is larger than {allowed:g} mm; the largest is {largest:.3g} mm{near}"
+        return _passed(said, console)
     console.print(
         f"FAIL: the gap is larger than {allowed:g} mm at {len(contacts)} of {len(gap)} contacts, "
         f"{check['share']:.1%} of the junction, between {', '.join(check['pairs'])}; the largest is "
-        f"{largest:.3g} mm, at {_place(contacts[0], nodes)}. All of them: exceeding.csv",
+        f"{largest:.3g} mm, at {_place(contacts[0], nodes)}{near}. All of them: exceeding.csv",
         style="red",
     )
     return GAP_EXCEEDED
@@ -73,11 +78,21 @@ def show(check: dict[str, Any], gap: Vector, nodes: Vector | None, console: Cons
 
 def show_series(directory: Path, allowed_mm: float, console: Console) -> int:
     """Print the outcome for a series, write DIRECTORY/allowed-gap.csv and .png; returns the exit code."""
-    from report.results.series import read  # slow to import: not before the first row
+    from scipy.stats import binomtest  # slow to import, as is the report: not before the first row
+
+    from report.results.series import read
 
     series = read(directory)
     found = exceeding(series, allowed_mm)
     written = write(directory, series, found)
+    within = found.answered - len(found.cases) - found.undecided
+    low, high = (
+        binomtest(within, found.answered).proportion_ci(CONFIDENCE, "exact") if found.answered else (0, 1)
+    )
+    console.print(
+        f"{within} of {found.answered} cases are surely within {allowed_mm:g} mm: the share of joints is "
+        f"between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence."
+    )
     if found.undecided:
         where = f"In {found.undecided} of {found.answered} cases"
         code = _undecided(where, allowed_mm, found.uncertainty_mm, console)

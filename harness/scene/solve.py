@@ -5,7 +5,7 @@ DIR/solution.npz holds the arrays, DIR/solution.json what was done: the steps an
 skipped, and the error bound of the answer.
 
 The record also says where parts and contacts are in x and λ, what a picture marks, and the force in each
-fastener. An installed fastener is a spring of stiffness k along t = e_a − e_b, set at the approach a: it
+fastener. An installed fastener is a spring of stiffness k along t = w_a − w_b, set at the approach a: it
 pulls its parts together with k (a − tᵀx), N, and pushes them apart where that is negative.
 """
 
@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
+from itertools import product, repeat
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -32,15 +33,14 @@ from problems.forms import Form
 from problems.forms.assembly import Assembly, Vector
 from problems.model.effect import Effect, ForceEffect, SpringEffect
 from problems.model.joint import Joint
+from problems.model.positions import FORCES
 from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.scene import read_scene
 
-from . import allowed_gap, solution
+from . import allowed_gap, grid_error, solution
 from .atomic_output import atomic_output, write_record
 from .solution import Solution
 from .validate import digits_sentence
-
-PRELOADS = ("preload", "clamping_force")  # keys of the effects that press at points
 
 
 def solve(
@@ -52,17 +52,20 @@ def solve(
     reference_limit_s: float | None = None,
     form: Form | None = None,
     allow_gap_mm: float | None = None,
+    refine: bool = False,
 ) -> int:
     """Solve a scene, write DIR, show the outcome. Returns 0 if the answer is within 1e-7 mm, else 1.
 
     form : by default see `harness.planning.form_choice`. allow_gap_mm : returns 4 if a remaining
-    gap is larger, 3 if that cannot be told. Raises InputError.
+    gap is larger, 3 if that cannot be told. refine : see `grid_error`. Raises InputError.
     """
     started = time.perf_counter()
     if not 0 < tolerance < inf:
         raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
+    for sentence in scene.unusual if isinstance(scene, JointScene) else ():
+        console.print(Text(f"{sentence}.", style="yellow"))
     built: dict[str, float] = {}  # what the cache did not hold, and how far it is
     found = solution.solve(
         scene,
@@ -75,10 +78,18 @@ def solve(
         said=lambda sentence: console.print(Text(f"{sentence}.", style="yellow")),
     )
     assembly = found.problem.prepared.assembly
-    record = _record(found, list(built), solver)
+    before = time.perf_counter()
+    with console.status(Text("the same joint on another grid")):
+        grid = grid_error.estimated(found, refine)
+    if grid is not None:
+        found.seconds["grid error"] = time.perf_counter() - before
+    record = _record(found, list(built), solver) | {"grid": grid_error.recorded(grid)}
     if allow_gap_mm is not None:
         uncertainty = GapError.of(assembly)(found.problem.load.g, found.unknowns, found.error_bound_mm)
-        record["allowed_gap"] = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
+        check = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
+        if grid is not None and abs(check["largest_mm"] - allow_gap_mm) <= grid.error_mm:
+            check["closer_than_grid_mm"] = grid.error_mm
+        record["allowed_gap"] = check
     _show(record, console)
     try:
         with console.status(Text("pictures and files")), atomic_output(out, [Path(source)]) as new:
@@ -176,6 +187,7 @@ def _show(record: dict[str, Any], console: Console) -> None:
             f"{record['status']}, {error:.1e} mm from the answer {known}: {record['verdict']} {LIMIT_MM:g} mm"
         )
     console.print(f"{record['method']}: {text}.", style="green" if record["verdict"] == "within" else "red")
+    console.print(f"{record['grid']['said']}.")
 
 
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
@@ -220,23 +232,14 @@ def fastener_forces(scene: Scene, x: Vector) -> list[dict[str, Any]]:
 
 
 def _of_effect(effect: Effect, joint: Joint, x: Vector) -> Iterator[dict[str, Any]]:
+    given: Any = effect  # its kind is not imported here, so that no other is
     if isinstance(effect, SpringEffect):
         T, k = effect.springs(joint)
-        forces = k * (getattr(effect, "approach", 0.0) - T.T @ x)
-        names = [part.name for part in joint.part]
-        for column, force in enumerate(forces):
-            own = slice(T.indptr[column], T.indptr[column + 1])
-            ends = T.indices[own][np.argsort(-T.data[own])]  # e_a, then −e_b
-            tied = [names[end // joint.node_count] for end in ends]
-            yield _entry(effect, tied, joint.nodes[ends[0] % joint.node_count], force)
+        pairs, forces = effect.tied(joint), (k * (given.approach - T.T @ x)).tolist()
+    elif preloads := [getattr(effect, name) for name in FORCES if hasattr(effect, name)]:
+        pairs, forces = given.pairs(joint), repeat(*preloads)
+    else:
         return
-    given: Any = effect  # its kind is not imported here, so that no other is
-    for force in (getattr(effect, name) for name in PRELOADS if hasattr(effect, name)):
-        for pair in given.pairs(joint):
-            for node in given.nearest_nodes(joint):
-                yield _entry(effect, list(pair), joint.nodes[node], force)
-
-
-def _entry(effect: Effect, pair: list[str], place: Vector, force: float) -> dict[str, Any]:
-    x, y = place
-    return {"kind": effect.kind, "pair": pair, "x": float(x), "y": float(y), "force_N": float(force)}
+    places = product(pairs, given.marks(joint).tolist())
+    for (pair, (x, y)), force in zip(places, forces, strict=False):
+        yield {"kind": effect.kind, "pair": list(pair), "x": x, "y": y, "force_N": force}

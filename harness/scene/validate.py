@@ -7,6 +7,7 @@ import inspect
 import scipy.sparse as sp
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from harness.planning.form_choice import chosen_form, size_of
 from harness.results.provenance import physical_memory_mib
@@ -32,6 +33,8 @@ def validate(source: str, console: Console) -> None:
     assert size is not None
     form = chosen_form(scene, FORMS, None).form
     console.print(f"{scene.name}: {scene.title}. Fine.")
+    for sentence in scene.unusual:
+        console.print(Text(f"{sentence}.", style="yellow"))
     console.print(_contents(scene))
     console.print(f"n = {size.n} unknowns, m = {size.m} contacts; this machine has {physical} MiB.")
     cached = "; the assembly is in the cache" if model_of(scene).built else ""

@@ -10,20 +10,26 @@ from problems.model.effect import ContactEffect, pressing_forces
 from problems.model.joint import Joint
 from problems.model.positions import Positions
 
+_AXIS = (np.arange(16) - 7.5) / 8
+_INSIDE = np.array([(x, y) for x in _AXIS for y in _AXIS if np.hypot(x, y) <= 1])
+#: (k, 2) points that share the unit disc evenly, with its second moments, ¼.
+DISC = _INSIDE / (2 * _INSIDE.std())
+
 
 class Clamps(Positions, ContactEffect):
-    """f += force on the first part of every contact, −= on the second, shared by the nodes under the pad.
+    """f += force on the first part of every contact, −= on the second, spread evenly under the pad.
 
-    clamping_force in N per clamp, spread evenly over the junction nodes within `radius` mm of the clamp's
-    node.
+    clamping_force in N per clamp, on what lies on the junction of a disc of `radius` mm around its place: on
+    points that share it evenly, each by bilinear weights on the nodes around it.
     """
 
     clamping_force: Annotated[Positive, "N"]
     radius: Annotated[Positive, "mm"] = 20.0
 
     def force(self, joint: Joint) -> Vector:
-        nodal = np.zeros(joint.node_count)
-        for centre in joint.nodes[self.nearest_nodes(joint)]:
-            under = np.hypot(*(joint.nodes - centre).T) <= self.radius
-            nodal[under] += self.clamping_force / under.sum()
+        nodal, size = np.zeros(joint.node_count), (joint.junction.length, joint.junction.width)
+        for centre in self.marks(joint):
+            points = centre + self.radius * DISC
+            under = points[((points >= 0) & (points <= size)).all(axis=1)]
+            nodal += self.clamping_force / len(under) * joint.weights(under).sum(axis=0)
         return pressing_forces(nodal, self.pairs(joint), joint)

@@ -8,9 +8,9 @@ import numpy as np
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, Positive, Seed
 from problems.model.effect import ContactEffect, GapEffect, at_contacts, contacts_of
-from problems.model.joint import Joint, Table
+from problems.model.joint import Faults, Joint, Table
 
-#: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `_square_root`.
+#: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `square_root`.
 SHIFT = 1e-10
 
 
@@ -33,12 +33,16 @@ class InitialGap(ContactEffect, GapEffect):
     mean: Annotated[Finite, "mm"]
     random: RandomField | None = None
 
+    def unusual(self, joint: Joint) -> Faults:
+        if self.mean < 0:
+            yield "mean", self.mean, "0 mm or more: the parts would overlap"
+
     def gap(self, joint: Joint) -> Vector:
         g = at_contacts(self.mean, self.pairs(joint), joint)
         if self.random:
             rng = np.random.default_rng(self.random.seed)
             length = self.random.correlation_length
-            Lx, Ly = (_square_root(grid.tobytes(), length) for grid in (joint.x, joint.y))
+            Lx, Ly = (square_root(grid.tobytes(), length) for grid in (joint.x, joint.y))
             for pair in self.pairs(joint):
                 Z = rng.standard_normal((len(joint.y), len(joint.x)))
                 g[contacts_of(pair, joint)] += self.random.sd * (Ly @ Z @ Lx).ravel()
@@ -46,7 +50,7 @@ class InitialGap(ContactEffect, GapEffect):
 
 
 @lru_cache(maxsize=8)  # a series draws field after field on one grid
-def _square_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
+def square_root(grid_bytes: bytes, correlation_length: float) -> Matrix:
     """Symmetric square root of C = exp(−(x_i − x_j)² / 2ℓ²): unique, so that no sign depends on the machine.
 
     √w of an eigenvalue w within rounding of 0 would differ by some 1e-8 from one processor, or number of

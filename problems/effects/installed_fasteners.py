@@ -14,12 +14,12 @@ from problems.model.positions import Positions
 
 
 class InstalledFasteners(Positions, ContactEffect, SpringEffect):
-    """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = e_a − e_b.
+    """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = w_a − w_b.
 
     stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
     shank through 20 mm. approach in mm: by how much the gap was reduced when the fastener was set; 0 keeps
-    the gap as it was, the value of the initial gap keeps it closed. Each fastener acts on the nearest
-    junction node.
+    the gap as it was, the value of the initial gap keeps it closed. Each fastener acts where it is: w_a and
+    w_b are the bilinear weights of its place on the nodes of the element around it.
     """
 
     stiffness: Annotated[Positive, "N/mm"] = 1e5
@@ -27,29 +27,32 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
 
     def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
-        if joint.pairs and not self._tied(joint):
+        if joint.pairs and not self.tied(joint):
             yield "between", self.between, "a contact of two parts; a fastener cannot tie a part to the tool"
-        # A hole holds one element: no two ties, nor a tie and a preload, at one node of one contact.
-        mine = set(self.nearest_nodes(joint))
+        # A hole holds one element: no two ties, nor a tie and a preload, at one place of one contact.
+        mine = _places(self, joint)
         for other in others:
             if isinstance(other, Positions):
-                shared = mine & set(other.nearest_nodes(joint))
+                shared = mine & _places(other, joint)
                 crossed = other.pairs(joint) if isinstance(other, ContactEffect) else joint.pairs
-                if shared and set(self._tied(joint)) & set(crossed):
-                    where = [joint.nodes[node].tolist() for node in sorted(shared)]
-                    yield "points", where, f"separate nodes: {other.kind} acts at the same nodes"
+                if shared and set(self.tied(joint)) & set(crossed):
+                    allowed = f"separate places: {other.kind} acts at the same ones"
+                    yield "points", [list(place) for place in sorted(shared)], allowed
 
-    def _tied(self, joint: Joint) -> list[Pair]:
+    def tied(self, joint: Joint) -> list[Pair]:
         return [pair for pair in self.pairs(joint) if pair[1] != TOOL]
 
     def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
-        nodes, pairs = self.nearest_nodes(joint), self._tied(joint)
-        starts = np.array([[joint.unknowns(part).start for part in pair] for pair in pairs])
-        ends = (starts[:, None, :] + nodes[:, None]).ravel()
-        r = len(ends) // 2
-        entries = (np.tile([1.0, -1.0], r), (ends, np.arange(r).repeat(2)))
-        return sp.csc_array(sp.coo_array(entries, shape=(joint.size[0], r))), np.full(r, self.stiffness)
+        names = [part.name for part in joint.part]
+        sides = [[(name == a) - (name == b) for a, b in self.tied(joint)] for name in names]
+        T = sp.csc_array(sp.kron(np.array(sides, dtype=float), joint.weights(self.marks(joint)).T))
+        return T, np.full(T.shape[1], self.stiffness)
 
     def force(self, joint: Joint) -> Vector:
         T, k = self.springs(joint)
         return T @ (k * self.approach)
+
+
+def _places(given: Positions, joint: Joint) -> set[tuple[float, float]]:
+    """To the nanometre."""
+    return {(x, y) for x, y in given.marks(joint).round(6).tolist()}

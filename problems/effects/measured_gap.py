@@ -35,6 +35,10 @@ class MeasuredGap(ContactEffect, GapEffect):
             if isinstance(other, MeasuredGap) and set(self.pairs(joint)) & set(other.pairs(joint)):
                 yield "between", self.between, "one measured_gap per contact: another one covers this contact"
 
+    def unusual(self, joint: Joint) -> Faults:
+        if (mean := float(np.mean(self.points, axis=0)[2])) < 0:
+            yield "points, their mean gap", mean, "0 mm or more: the parts would overlap"
+
     def gap(self, joint: Joint) -> Vector:
         points = np.array(self.points)
         places, values = points[:, :2], points[:, 2]

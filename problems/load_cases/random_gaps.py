@@ -1,6 +1,8 @@
 """Load cases that differ in a random initial gap."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,13 +12,15 @@ from problems.build import load_case
 from problems.effects.initial_gap import InitialGap
 from problems.errors import Fault, InputError
 from problems.forms import Form
-from problems.forms.assembly import LoadCase
+from problems.forms.assembly import LoadCase, Matrix
 from problems.input.bounded import validation_faults
+from problems.model.effect import contacts_of
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
 from . import LoadCases
+from .scan import Scan, read_scan
 
 #: The bits of a case's seed: integers of this size are exact in every JSON reader.
 SEED_BITS = 53
@@ -26,7 +30,8 @@ SEED_BITS = 53
 class RandomGaps(LoadCases):
     """Case k is the scene with its `initial_gap` drawn anew, with a seed derived from (seed, k).
 
-    rest : the scene's forces and its other gaps. field : the `initial_gap`.
+    rest : the scene's forces and its other gaps. field : the `initial_gap`. points : of a scan that the gaps
+    pass through, (s, 3) x, y, gap in mm.
     """
 
     joint: Joint
@@ -34,21 +39,36 @@ class RandomGaps(LoadCases):
     field: InitialGap
     seed: int
     count: int
+    points: Matrix | None = None
 
     @property
     def key(self) -> str:
-        return digest(self.field.model_dump(mode="json"), self.seed)
+        given = [] if self.points is None else [self.points.tolist()]
+        return digest(self.field.model_dump(mode="json"), self.seed, *given)
 
     def parameters(self, k: int) -> dict[str, Any]:
-        """The seed which, written into the scene's `random`, gives this case."""
+        """The seed which, written into the scene's `random`, gives this case, if there is no scan."""
         state = np.random.SeedSequence((self.seed, k)).generate_state(1, np.uint64)[0]
         return {"gap_seed": int(state) >> (64 - SEED_BITS)}
 
     def load(self, k: int) -> LoadCase:
         assert self.field.random is not None
-        drawn = self.field.random.model_copy(update={"seed": self.parameters(k)["gap_seed"]})
+        seed, sd = self.parameters(k)["gap_seed"], self.field.random.sd
+        drawn = self.field.random.model_copy(update={"seed": seed})
         gap = self.field.model_copy(update={"random": drawn}).gap(self.joint)
+        if self._scan is not None:
+            random = np.random.default_rng((seed, 1))
+            for pair in self.field.pairs(self.joint):
+                own = contacts_of(pair, self.joint)
+                gap[own] = self._scan.through(gap[own], sd, random)
         return LoadCase(self.rest.f, self.rest.g + gap)
+
+    @cached_property
+    def _scan(self) -> Scan | None:
+        if self.points is None:
+            return None
+        assert self.field.random is not None
+        return Scan.of(self.joint, self.points, self.field.random.correlation_length)
 
 
 def random_gaps(
@@ -59,9 +79,12 @@ def random_gaps(
     sd: float | None = None,
     correlation_length: float | None = None,
     form: Form = "dual",
+    around: Path | None = None,
 ) -> RandomGaps:
     """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) override its values.
     Around a measured gap the mean is 0 by default.
+    around : a CSV of a scan, with columns x, y and gap in mm, that the gaps pass through (scan.py); its mean
+        is theirs by default.
     form : what will be solved; f has an entry per unknown of its K.
 
     Raises InputError if one of them is given by neither, or if the scene has no joint or more than one
@@ -76,8 +99,13 @@ def random_gaps(
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
     options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    around = 0.0 if any(effect.kind == "measured_gap" for effect in scene.effects) else None
-    own = {"mean": table.get("mean", around)} | (table.get("random") or {})
+    points = None if around is None else read_scan(around, scene.joint)
+    usual = None if points is None else float(points[:, 2].mean())
+    if any(effect.kind == "measured_gap" for effect in scene.effects):
+        if around is not None:
+            raise InputError.one(where, "measured_gap", "an effect", f"{around} would be added: give one")
+        usual = 0.0
+    own = {"mean": table.get("mean", usual)} | (table.get("random") or {})
     given = own | {key: value for key, value in options.items() if value is not None}
     if missing := [key for key in options if given.get(key) is None]:
         allowed = "is not in the scene: give --{}, in mm"
@@ -88,4 +116,4 @@ def random_gaps(
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = [effect for effect in scene.effects if effect not in found]
-    return RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases)
+    return RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)

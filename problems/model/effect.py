@@ -66,6 +66,10 @@ class Effect(Table):
         """Of parameters that do not fit the joint, or contradict the other effects of the scene."""
         yield from ()
 
+    def unusual(self, joint: Joint) -> Faults:
+        """What may be, but is rarely meant: key, value, what is usual."""
+        yield from ()
+
 
 class PartEffect(Effect):
     """Acts on one part."""
@@ -144,7 +148,11 @@ class GapEffect(Effect):
 
 
 class SpringEffect(ForceEffect):
-    """Adds springs between parts at junction nodes: K += T diag(k) Tᵀ, after condensation."""
+    """Adds springs between parts at points of the junction: K += T diag(k) Tᵀ, after condensation."""
+
+    @abstractmethod
+    def tied(self, joint: Joint) -> list[Pair]:
+        """The pairs that its springs join, each at all of its marks: the order of the columns of T."""
 
     @abstractmethod
     def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,6 +20,7 @@ from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
 from .joint import Faults, Joint
 
 CSV_MIB = 100
+UNIT = re.compile(r"[\s_]*(?:mm|\[\s*mm\s*\]|\(\s*mm\s*\))$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,16 @@ class EffectTable:
                     str(self.where), f"{self._name}.file", content["file"], "give either points or file"
                 )
                 return
-            self.rows = read_columns(self.where.parent / str(content["file"]), effect.columns)
-            content = {key: value for key, value in content.items() if key != "file"}
+            headings = content.get("columns", {})
+            named = isinstance(headings, dict) and all(isinstance(value, str) for value in headings.values())
+            if not (named and set(headings) <= set(effect.columns)):
+                allowed = f"headings of the file by name, as {{ {effect.columns[0]} = 'X [mm]' }}; names: "
+                allowed += ", ".join(effect.columns)
+                yield Fault(str(self.where), f"{self._name}.columns", headings, allowed)
+                return
+            path = self.where.parent / str(content["file"])
+            self.rows = read_columns(path, {name: headings.get(name, name) for name in effect.columns})
+            content = {key: value for key, value in content.items() if key not in ("file", "columns")}
             content["points"] = self.rows.rows
         try:
             self.effect = effect.model_validate(content)
@@ -102,12 +111,20 @@ class EffectTable:
         return bool(self.rows and self.rows.faults and key in ("", "points"))
 
 
-def read_columns(path: Path, names: tuple[str, ...]) -> Rows:
-    """The named columns of a file, row by row; other columns are ignored. Bad rows are faults."""
+def read_columns(path: Path, headings: Mapping[str, str]) -> Rows:
+    """The columns of a file, row by row, by name and heading; others are ignored. Bad rows are faults.
+
+    Cells are separated by what the header has of ; tab and comma, in this order; a comma that separates
+    nothing is a decimal one. A heading may be written large and end in its unit, mm; a row of units may
+    follow.
+    """
     read = Rows(path)
     try:
         with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
-            _read(csv.reader(file), names, read)
+            first = file.readline()
+            delimiter = next((mark for mark in ";\t" if mark in first), ",")
+            file.seek(0)
+            _read(csv.reader(file, delimiter=delimiter), delimiter, headings, read)
     except InputError as error:
         read.faults.extend(error.faults)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -116,25 +133,35 @@ def read_columns(path: Path, names: tuple[str, ...]) -> Rows:
     return read
 
 
-def _read(reader: Any, names: tuple[str, ...], read: Rows) -> None:
-    header = [cell.strip() for cell in next(reader, [])]
-    if not set(names) <= set(header):
-        wanted = f"a header line with the columns {', '.join(names)}, separated by commas"
-        read.faults.append(Fault(str(read.path), "line 1", ",".join(header), wanted))
+def _read(reader: Any, delimiter: str, headings: Mapping[str, str], read: Rows) -> None:
+    header: list[str] = next(reader, [])
+    found = [_heading(cell) for cell in header]
+    wanted = [_heading(heading) for heading in headings.values()]
+    if any(found.count(heading) != 1 for heading in wanted):
+        allowed = f"a header line with the columns {', '.join(headings.values())}, once each"
+        read.faults.append(Fault(str(read.path), "line 1", delimiter.join(header), allowed))
         return
-    columns = [header.index(name) for name in names]
+    columns = [found.index(heading) for heading in wanted]
     for cells in reader:
-        if not any(cell.strip() for cell in cells):
+        own = [cells[column].strip() if column < len(cells) else "" for column in columns]
+        units = reader.line_num == 2 and any(own) and {_heading(cell) for cell in own} == {""}
+        if units or not any(cell.strip() for cell in cells):
             continue
         try:
-            row = tuple(float(cells[column]) for column in columns)
-        except (ValueError, IndexError):
+            row = tuple(float(cell if delimiter == "," else cell.replace(",", ".")) for cell in own)
+        except ValueError:
             row = (math.nan,)
-        if all(map(math.isfinite, row)):
+        if all(map(math.isfinite, row)) and not any(cells[len(header) :]):  # 0,5 would be two cells
             read.rows.append(row)
             read.lines.append(reader.line_num)
         else:
-            allowed = f"a finite number in each of the columns {', '.join(names)}"
-            read.faults.append(Fault(str(read.path), f"line {reader.line_num}", ",".join(cells), allowed))
+            allowed = f"a finite number in each of the columns {', '.join(headings.values())}"
+            line = delimiter.join(cells)
+            read.faults.append(Fault(str(read.path), f"line {reader.line_num}", line, allowed))
     if not read.rows and not read.faults:
         read.faults.append(Fault(str(read.path), "rows", 0, "at least one row below the header"))
+
+
+def _heading(cell: str) -> str:
+    """Without its unit, if that is mm, in small letters."""
+    return UNIT.sub("", cell.strip()).lower()

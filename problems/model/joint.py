@@ -18,13 +18,15 @@ import numpy as np
 import scipy.sparse as sp
 from pydantic import BaseModel, ConfigDict, Field
 
-from problems.forms.assembly import Matrix
+from problems.forms.assembly import Indices, Matrix, Vector
 from problems.input.bounded import Name, Positive
 
 from .plate import Plate
 
 MOST = 100_000  # grid lines; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]
+SHORT = 20.0  # mm, a junction that may have been given in metres
+SOFT, STIFF = 1e3, 1e6  # N/mm², around the moduli of plastics and metals
 TOOL = "tool"  # the second of a contact pair: a rigid surface
 #: (key, value, what is allowed)
 Faults = Iterator[tuple[str, object, str]]
@@ -103,6 +105,20 @@ class Joint(Table):
         X, Y = np.meshgrid(self.x, self.y)
         return np.column_stack([X.ravel(), Y.ravel()])
 
+    def weights(self, points: Matrix) -> sp.csr_array:
+        """W (k, node_count), bilinear on each element: Wv are the values at points (k, 2) in mm of a field
+        with the values v at the junction nodes; Wᵀp are nodal forces with the resultant and moments of forces
+        p at the points.
+        """
+        (ix, s), (iy, t) = (_within(grid, at) for grid, at in zip((self.x, self.y), points.T, strict=True))
+        nx, k = len(self.x), len(points)
+        corners = iy * nx + ix + np.array([[0], [1], [nx], [nx + 1]])
+        shares = np.stack([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t])
+        entries = shares.ravel(), (np.tile(np.arange(k), 4), corners.ravel())
+        W = sp.csr_array(sp.coo_array(entries, shape=(k, self.node_count)))
+        W.eliminate_zeros()
+        return W
+
     def unknowns(self, part: str) -> slice:
         """The part's displacements, as a slice of x."""
         index = [p.name for p in self.part].index(part)
@@ -152,3 +168,24 @@ class Joint(Table):
         sides = [[(name == a) - (name == b) for name in names] for a, b in self.pairs]
         if self.pairs and np.linalg.matrix_rank(sides) < len(sides):
             yield "contacts", [list(pair) for pair in self.pairs], "no pair twice, no closed chain of pairs"
+
+    def unusual(self) -> Faults:
+        """What may be, but is rarely meant: key, value, what is usual."""
+        length, width = self.junction.length, self.junction.width
+        if max(length, width) < SHORT:
+            yield "junction.length", length, f"at least {SHORT:g} mm: are these metres?"
+        for part in self.part:
+            y = self.plate(part).y
+            if part.thickness > (side := min(length, y[-1] - y[0])):
+                yield f"part.{part.name}.thickness", part.thickness, f"far less than the part's {side:g} mm"
+            if not SOFT <= part.young <= STIFF:
+                metals = f"{SOFT:g} … {STIFF:g} N/mm²; aluminium has 70e3"
+                yield f"part.{part.name}.young", part.young, metals
+
+
+def _within(grid: Vector, at: Vector) -> tuple[Indices, Vector]:
+    """The element in which each point lies, and how far along it, 0 … 1, to 12 digits: what was meant to be
+    at a node is there.
+    """
+    element = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+    return element, np.round((at - grid[element]) / np.diff(grid)[element], 12)

@@ -168,7 +168,7 @@ class JointModel:
         """(N, k): the rows of M (n, k) at the junction's deflections, the others zero."""
         M = sp.csc_array(M)
         found = sp.csc_array(
-            (M.data, self.junction[M.indices], M.indptr), shape=(self.numbering.size, M.shape[1])
+            (M.data.copy(), self.junction[M.indices], M.indptr), shape=(self.numbering.size, M.shape[1])
         )
         found.sort_indices()
         return found

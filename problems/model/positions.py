@@ -1,4 +1,4 @@
-"""Effects at positions: points on the junction, each moved to its nearest node."""
+"""Effects at positions: points on the junction, between its nodes too."""
 
 from __future__ import annotations
 
@@ -8,19 +8,26 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from problems.forms.assembly import Indices, Matrix, Vector
+from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, NotNegative
 
 from .effect import Effect, ForceEffect
 from .joint import Faults, Joint, Table
 
+FORCES = ("preload", "clamping_force")  # keys of the effects that press at points
+TEARS = 400.0  # N/mm² of the square of a thickness: the yield stress of an aluminium alloy
+
 
 class Pattern(Table):
-    """columns × rows points, evenly spaced over the junction up to `edge` mm from its border."""
+    """columns × rows points, evenly spaced over the junction up to `edge` mm from its border.
+
+    on_nodes : each is moved to the nearest node of the junction.
+    """
 
     columns: Annotated[int, Field(ge=1, le=10_000)]
     rows: Annotated[int, Field(ge=1, le=10_000)]
     edge: Annotated[NotNegative, "mm"] = 0.0
+    on_nodes: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
 
 
 class Positions(ForceEffect):
@@ -42,8 +49,17 @@ class Positions(ForceEffect):
             return np.array(self.points)
         x = _spread(joint.junction.length, self.pattern.edge, self.pattern.columns)
         y = _spread(joint.junction.width, self.pattern.edge, self.pattern.rows)
+        if self.pattern.on_nodes:
+            x, y = (grid[abs(at[:, None] - grid).argmin(axis=1)] for at, grid in ((x, joint.x), (y, joint.y)))
         X, Y = np.meshgrid(x, y)
         return np.column_stack([X.ravel(), Y.ravel()])
+
+    def unusual(self, joint: Joint) -> Faults:
+        thinnest = min(part.thickness for part in joint.part)
+        for key in FORCES:
+            force, most = getattr(self, key, 0.0), TEARS * thinnest**2
+            if force > most:
+                yield key, force, f"at most {most:g} N on {thinnest:g} mm: it would tear the part"
 
     def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
@@ -57,15 +73,6 @@ class Positions(ForceEffect):
         for k, (x, y) in enumerate(self.points):
             if not (0 <= x <= length and 0 <= y <= width):
                 yield f"points[{k}]", [x, y], allowed
-
-    def nearest_nodes(self, joint: Joint) -> Indices:
-        """The junction node nearest to each point, at most half a node spacing away along x and y."""
-        nx, _ = joint.junction.nodes
-        positions = self.marks(joint)
-        ix, iy = (
-            np.abs(positions[:, [axis]] - grid).argmin(axis=1) for axis, grid in enumerate((joint.x, joint.y))
-        )
-        return np.asarray(iy * nx + ix)
 
 
 def _spread(size: float, edge: float, count: int) -> Vector:

@@ -95,6 +95,17 @@ class JointScene(Scene):
     def expected_size(self) -> tuple[int, int]:
         return self.joint.size
 
+    @property
+    def unusual(self) -> list[str]:
+        """A sentence on each parameter that may be, but is rarely meant."""
+        found = [("joint", self.joint.unusual())]
+        found += [(effect.kind, effect.unusual(self.joint)) for effect in self.effects]
+        return [
+            f"{where}.{key} = {value:g} is unusual; usual is {usual}"
+            for where, some in found
+            for key, value, usual in some
+        ]
+
     def marks(self) -> Matrix:
         own = [effect.marks(self.joint) for effect in self.effects_of(ForceEffect)]
         return np.concatenate([super().marks(), *own])

@@ -13,11 +13,14 @@ from report.results.answers import Answer, pair_name
 
 from . import style
 from .maps import CLOSED, LARGER, RIM, Array, Map, Scale, drawn, rooted
+from .section import section_figure
 
 
 def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
     with style.applied():
         figures = {"gap": _gap(record, arrays)} if record["m"] else {}
+        if (section := section_figure(record, arrays)) is not None:
+            figures["section"] = section
         if (arrays["lam"] > 0).any():
             figures["forces"] = _forces(record, arrays)
         return figures | {"displacement": _displacement(record, arrays)}

@@ -35,7 +35,7 @@ MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", "#E8112D", "#444444"
 THINNEST = 0.02  # a map's shorter side over its longer one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
 # inches
-LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.3, 0.35, 0.5
+LEFT, RIGHT, TOP, BOTTOM = 0.85, 1.45, 0.35, 0.5
 BESIDE, BELOW = 0.5, 0.4  # between maps; the title of the next one is below a map
 NAME_LEFT, NAME_BELOW = 0.6, 0.27  # of an axis, from the map
 LOWEST, TALLEST = 0.4, 5.5  # of a row, which has room for "y, mm"; of a map

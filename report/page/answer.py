@@ -37,6 +37,7 @@ def facts(record: Data) -> list[list[str]]:
         "judged error, mm": record.get("judged_error_mm"),
         "error bound, mm": record.get("error_bound_mm"),
         "gaps proven to, mm": (record.get("allowed_gap") or {}).get("uncertainty_mm"),
+        "left out by the grid, mm (estimated)": (record.get("grid") or {}).get("error_mm"),
         "memory, MiB": record.get("peak_rss_mib"),
         **{f"{step}, s": seconds for step, seconds in record.get("steps", {}).items()},
     }
@@ -66,7 +67,8 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
         return {"kind": "", "text": f"{largest[0].upper()}{largest[1:]}."}
     kinds = {None: ("", "CANNOT BE TOLD"), True: ("fail", "FAIL"), False: ("pass", "PASS")}
     kind, word = kinds[check["exceeded"]]
-    return {"kind": kind, "text": f"{word} at {significant(check['allowed_mm'])} mm: {largest}."}
+    near = ", closer to the limit than the grid can tell" if check.get("closer_than_grid_mm") else ""
+    return {"kind": kind, "text": f"{word} at {significant(check['allowed_mm'])} mm: {largest}{near}."}
 
 
 def two_answers_data(answers: list[Answer]) -> Data:

@@ -151,6 +151,12 @@ def _swept(series: Series, key: str) -> Figure:
     axes.set(xlabel=key, ylabel="remaining gap, mm")
     drawing.legend(loc="outside right upper")
     caption = f"*The largest and the mean gap per case against {key}*, shaded: the range over the other keys."
+    error = 2 * series.cases["gap_error_mm"].astype(float).max()  # NaN if one is unknown
+    if np.ptp(found[[f"{name}_{end}" for name in GAPS for end in ("min", "max")]], axis=0).max() <= error:
+        caption += (
+            f" **{key} changes neither**, to what is proven: closed contacts carry the difference, or it "
+            "acts where no gap is left."
+        )
     return Figure(f"sweep-{file_name(key)}", caption, drawing, found.reset_index())
 
 

@@ -1,5 +1,5 @@
-"""Writes the answer of one scene: answer.md, a PNG per field, CSV files of the nodal results, VTU, and a page
-in HTML with the maps.
+"""Writes the answer of one scene: answer.md, a PNG per field, CSV files of the nodal results, VTU, a page in
+HTML with the maps, and one of PDF to file.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from report.page.write import write as write_page
 from report.results.answers import contacts, fasteners, nodes, pair_name, read
 from report.results.series import Array
 from report.writers.pages import written
+from report.writers.pdf import write_pdf
 
 CAPTIONS = {
+    "section": "*A section through the largest gap*, its height exaggerated: the faces of the parts.",
     "gap": "*The gap before and after*, on square-root scales; outlined: closed contacts.",
     "forces": "*The contact forces*, on a square-root scale; outlined: closed contacts.",
     "displacement": "*The displacements*, positive from the first part of a contact to the second; hatched: "
@@ -30,8 +32,8 @@ CAPTIONS = {
 
 
 def write(directory: Path) -> Path:
-    """Write answer.md, index.html and their files into DIRECTORY, from its solution.json and solution.npz;
-    returns the path of answer.md.
+    """Write answer.md, answer.pdf, index.html and their files into DIRECTORY, from its solution.json and
+    solution.npz; returns the path of answer.md.
     """
     record, arrays = read(directory)
     files = {"nodes": nodes(record, arrays)}
@@ -42,29 +44,36 @@ def write(directory: Path) -> Path:
         files["exceeding"] = files["contacts"].iloc[check["contacts"]]
     for name, table in files.items():
         csv_frame(table).to_csv(directory / f"{name}.csv", index=False)
-    blocks: list[Block] = [Text(_proven(record))]
+    blocks: list[Block] = []
     if check.get("exceeded"):
         larger = f"{len(check['contacts'])} of {record['m']} contacts, {significant(100 * check['share'])} %"
         text = f"**The gap is larger than {check['allowed_mm']} mm** at {larger} of the junction"
         blocks.append(Text(f"{text}: [exceeding.csv](exceeding.csv)."))
-    known = pd.DataFrame(facts(record), columns=["what", "value"])
-    blocks += [
-        *_fields(record, arrays),
-        Table("", "*The solve.*", known, [word("what", "what"), word("value", "value")]),
-    ]
-    vtu = "not written: the nodes have no coordinates"
+    figures, vtu = {}, "not written: the nodes have no coordinates"
     if "nodes" in arrays:
         figures = answer_figures(record, arrays)
-        blocks += [Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()]
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
+    drawn = {name: Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()}
+    blocks += [drawn.pop(name) for name in ("gap", "section") if name in drawn]
+    blocks += [*_fields(record, arrays), *drawn.values()]
+    known = pd.DataFrame(facts(record), columns=["what", "value"])
+    of_grid = record["grid"]["said"]
+    sure: list[Block] = [
+        Text(f"{_proven(record)} {of_grid}."),
+        Table("", "*The solve.*", known, [word("what", "what"), word("value", "value")]),
+    ]
     links = ", ".join(f"[{name}.csv]({name}.csv)" for name in files)
     blocks.append(Text(f"Every value: {links}, `solution.npz`. VTU for ParaView: {vtu}."))
     title = str(record["title"])
     write_page(directory / "index.html", title, answer_data(record, arrays))
-    sections = [Section("The answer", blocks)]
+    sections = [Section("The answer", blocks), Section("How sure it is", sure)]
     if skipped := _skipped(record):
         sections.append(Section("What was skipped", skipped))
-    return written(directory / "answer.md", title, sections, [f"**{headline(record, arrays)['text']}**"])
+    first = [f"**{headline(record, arrays)['text']}**"]
+    page = written(directory / "answer.md", title, sections, first)
+    pictures = [directory / f"{name}.png" for name in ("gap", "section") if name in figures]
+    write_pdf(directory / "answer.pdf", record, arrays, pictures)
+    return page
 
 
 def _proven(record: dict[str, Any]) -> str:

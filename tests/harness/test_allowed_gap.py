@@ -13,6 +13,7 @@ import pytest
 import scipy.sparse as sp
 from commands import harness
 from long import draws
+from scipy.stats import beta
 from small import solve_by_nnls
 from strip import write_strip
 
@@ -166,6 +167,9 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     done = harness(*asked, "--allow-gap", allowed, "--out", tmp_path)
     assert done.exit_code == 4, done.output
     assert f"in 5 of {CASES} cases" in done.stdout
+    low, high = beta.ppf(0.025, CASES - 5, 6), beta.ppf(0.975, CASES - 4, 5)
+    assert f"{CASES - 5} of {CASES} cases are surely within" in done.stdout
+    assert f"between {low:.2%} and {high:.2%}" in done.stdout
     assert f"at {larger.any(axis=0).sum()} of {gaps.shape[1]} contacts" in done.stdout
     assert f"in case {gaps.max(axis=1).argmax()}. Where" in done.stdout
     assert (tmp_path / "allowed-gap.png").is_file()

@@ -198,7 +198,8 @@ def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", K=K, A=A, f=np.array([5.0, 1.0, 0.0]), g=np.array([0.1, 9.0]))
     assert said_by(partial(solve, str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "out"))[0] == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        *("answer.md", "contacts.csv", "index.html", "nodes.csv", "solution.json", "solution.npz")
+        *("answer.md", "answer.pdf", "contacts.csv", "index.html", "nodes.csv"),
+        *("solution.json", "solution.npz"),
     }
     said = harness("validate", tmp_path / "mine.npz").output
     assert "n = 3, m = 2, blocks of 3" in said

@@ -74,7 +74,7 @@ def test_its_page_has_no_contacts(path: Path) -> None:
     assert "displacement.png" in page
     assert not any(word in page for word in ("gap.png", "gap before", "closed contacts", "contacts.csv"))
     assert {file.name for file in out.iterdir()} == {
-        *("answer.md", "displacement.png", "index.html", "nodes.csv"),
+        *("answer.md", "answer.pdf", "displacement.png", "index.html", "nodes.csv"),
         *("solution.json", "solution.npz", "solution.vtu"),
     }
 

@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from problems.effects.clamps import Clamps
 from problems.effects.fasteners import Fasteners
-from problems.effects.initial_gap import SHIFT, InitialGap
-from problems.effects.initial_gap import _square_root as square_root
+from problems.effects.initial_gap import SHIFT, InitialGap, square_root
 from problems.effects.measured_gap import MeasuredGap
 from problems.effects.pressure import Pressure
 from problems.effects.rigid_tool import RigidTool
@@ -34,17 +33,23 @@ CORNERS = [(0.0, 0.0), (400.0, 0.0), (0.0, 120.0), (400.0, 120.0)]
 
 @given(st.lists(POINT, min_size=1, max_size=6))
 @settings(deadline=None)
-def test_fastener_acts_on_the_nearest_node(points: list[tuple[float, float]]) -> None:
+def test_a_fastener_acts_where_it_is(points: list[tuple[float, float]]) -> None:
     f = Fasteners(kind="fasteners", preload=700.0, points=tuple(points)).force(JOINT)
     on_a, on_b = f[:45], f[45:]
-    assert on_a.sum() == pytest.approx(700.0 * len(points))
     np.testing.assert_array_equal(on_b, -on_a)  # equilibrium, node for node
-    nodes = np.array([(50.0 * ix, 30.0 * iy) for iy in range(5) for ix in range(9)])
-    loaded = nodes[on_a > 0]
-    for point in points:
-        nearest = np.linalg.norm(nodes - point, axis=1).min()
-        assert np.linalg.norm(loaded - point, axis=1).min() <= nearest + 1e-9
-        assert nearest <= np.hypot(25.0, 15.0)
+    assert (on_a >= 0).all()
+    fields = np.column_stack([np.ones(45), JOINT.nodes, JOINT.nodes.prod(axis=1)])  # 1, x, y, xy
+    at = np.array(points)
+    there = np.column_stack([np.ones(len(at)), at, at.prod(axis=1)]).sum(axis=0)
+    np.testing.assert_allclose(on_a @ fields, 700 * there, rtol=1e-12, atol=700 * 400 * 120 * 2e-12)
+    far = (abs(JOINT.nodes[:, None] - at) > (50.0, 30.0)).any(axis=2).all(axis=1)
+    assert not on_a[far].any()  # on the nodes of its element alone
+
+
+def test_a_fastener_at_a_node_acts_on_it_alone() -> None:
+    for k, point in enumerate(JOINT.nodes.tolist()):
+        f = Fasteners(kind="fasteners", preload=7.0, points=(tuple(point),)).force(JOINT)
+        assert f[:45].tolist() == [7.0 * (node == k) for node in range(45)]
 
 
 def test_fastener_on_a_tool_has_no_counterpart() -> None:
@@ -166,23 +171,27 @@ def test_a_tool_is_a_parabola_about_its_crest() -> None:
 
 
 def test_a_clamp_spreads_its_force_evenly_under_its_pad() -> None:
-    f = Clamps(kind="clamps", clamping_force=900.0, radius=51.0, points=((199.0, 61.0), (0.0, 0.0))).force(
-        JOINT
-    )
-    on_a = f[:45].reshape(5, 9)
-    np.testing.assert_array_equal(f[45:], -f[:45])
-    assert on_a.sum() == pytest.approx(1800.0)
-    # Around the middle node: itself, ±50 in x, ±30 in y; the diagonal is 58 mm away.
-    np.testing.assert_allclose(on_a[[2, 2, 2, 1, 3], [4, 3, 5, 4, 4]], 180.0)
-    # In the corner the pad meets three nodes only, and bears the same force.
-    np.testing.assert_allclose(on_a[[0, 0, 1], [0, 1, 0]], 300.0)
+    fine = make_joint(PART, PART | {"name": "b"}, nodes=(81, 25))
+    clamp = Clamps(kind="clamps", clamping_force=900.0, radius=40.0, points=((199.0, 61.0),))
+    f = clamp.force(fine).reshape(2, -1)
+    np.testing.assert_array_equal(f[1], -f[0])
+    x, y = fine.nodes.T - np.array([[199.0], [61.0]])
+    assert f[0].sum() == pytest.approx(900.0)
+    assert abs(f[0] @ np.column_stack([x, y])).max() < 1e-9
+    for second in (x * x, y * y):  # ∫ of a uniform pressure on a disc: F R²/4
+        assert f[0] @ second == pytest.approx(900.0 * 40.0**2 / 4, rel=0.03)
+    assert not f[0][np.hypot(x, y) > 40 + np.hypot(5, 5)].any()
+    # In the corner a quarter of the pad bears the same force.
+    corner = clamp.model_copy(update={"points": ((0.0, 0.0),)}).force(fine)[: fine.node_count]
+    assert corner.sum() == pytest.approx(900.0)
+    np.testing.assert_allclose(corner @ fine.nodes, 900.0 * 4 * 40.0 / (3 * np.pi), rtol=0.02)
 
 
-def test_a_clamp_smaller_than_the_mesh_is_a_fastener() -> None:
+def test_a_small_clamp_is_a_fastener() -> None:
     point = ((120.0, 100.0),)
-    clamp = Clamps(kind="clamps", clamping_force=40.0, radius=1.0, points=point)
+    clamp = Clamps(kind="clamps", clamping_force=40.0, radius=1e-3, points=point)
     fastener = Fasteners(kind="fasteners", preload=40.0, points=point)
-    np.testing.assert_array_equal(clamp.force(THREE), fastener.force(THREE))
+    np.testing.assert_allclose(clamp.force(THREE), fastener.force(THREE), atol=1e-12)
 
 
 def test_a_fastener_through_a_stack_presses_its_outer_parts_alone() -> None:

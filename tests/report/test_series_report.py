@@ -1,6 +1,7 @@
 """Statistics of a series against brute force, and the report's files."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from harness.results import series_file
 from report.results.series import QUANTILES, Series, convergence, exceedance, quantile_maps, read
-from report.writers.series import write
+from report.writers.series import _swept, write
 
 CASES, M = 240, 12
 IDENTITY = {"solver": "newton", "form": "dual", "tolerance": 1e-11}
@@ -98,6 +99,22 @@ def test_the_report_and_its_files(swept: bool, tmp_path: Path) -> None:
     np.testing.assert_allclose(maps["q0.95_mm"], np.quantile(gaps, 0.95, axis=0))
     assert "239 within, 1 no answer" in text.replace("1 no answer, 239 within", "239 within, 1 no answer")
     assert "76.9 cases per second of work" in text
+
+
+def test_a_sweep_that_changes_nothing_says_so(tmp_path: Path) -> None:
+    made(tmp_path, swept=True)
+    series = read(tmp_path)
+    values = series.cases["initial_gap.mean"]
+    for moved, error, said in (
+        (0.0, 1e-12, True),
+        (3e-13, 1e-12, True),
+        (1e-9, 1e-12, False),
+        (0.0, None, False),
+    ):
+        own = {"max_gap_mm": 0.04 + moved * values, "mean_gap_mm": 0.01, "gap_error_mm": error}
+        cases = series.cases.assign(**own)
+        figure = _swept(replace(series, cases=cases), "initial_gap.mean")
+        assert ("initial_gap.mean changes neither" in figure.caption) is said
 
 
 def test_a_series_without_nodes_has_no_map(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def test_the_scene_of_the_page_is_solved_and_drawn_whole(tmp_path: Path) -> None
     """Its parts meet; the borders of the pictures are white, so that no title is cut."""
     (tmp_path / "scene.toml").write_text(JOINT[1])
     assert solve(str(tmp_path / "scene.toml"), None, 1e-9, tmp_path, Console(file=StringIO())) == 0
-    for name in ("gap", "forces", "displacement"):
+    for name in ("gap", "section", "forces", "displacement"):
         picture = imread(tmp_path / f"{name}.png")[:, :, :3]
         for border in (picture[:3], picture[-3:], picture[:, :3], picture[:, -3:]):
             assert (border == 1.0).all()

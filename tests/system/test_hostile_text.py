@@ -62,6 +62,7 @@ def solution(folder: Path, name: str) -> Path:
         "closest_mm": 0.1, "judged_error_mm": 1e-9, "error_bound_mm": 1e-9, "parts": parts,
         "pairs": [{"pair": [name, name], "start": 0, "stop": 6}], "marks": {name: [[1.0, 2.0]]},
         "digits": None, "skipped": [name], "steps": {name: 1.0}, "peak_rss_mib": 100.0,
+        "grid": {"said": name}, "scene": name, "scene_key": name,
     }  # fmt: skip
     (folder / "solution.json").write_text(json.dumps(record))
     nodes = np.array([(x, y) for y in (0.0, 10.0) for x in (0.0, 10.0, 20.0)])

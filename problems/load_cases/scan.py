@@ -1,0 +1,72 @@
+"""Random gaps that pass through a scan: a Gaussian field given its values at points.
+
+Of z ~ N(0, σ²C) at the junction nodes and a scan d = Wz + ε, with W the bilinear weights of its points and
+ε ~ N(0, (νσ)² I), a field given d is, exactly (Chilès, Delfiner, Geostatistics, 2012, section 7.3.1),
+
+    z + CWᵀ (WCWᵀ + ν²I)⁻¹ (d − ε − Wz).
+
+Its mean is the scan, continued by kriging; its scatter is νσ at the scan's points and σ far from them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+
+from problems.effects.initial_gap import square_root
+from problems.errors import Fault, InputError
+from problems.forms.assembly import Matrix, Vector
+from problems.model.effect_tables import read_columns
+from problems.model.joint import Joint
+
+NOISE = 1e-3  # ν
+
+
+def read_scan(path: Path, joint: Joint) -> Matrix:
+    """(s, 3) x, y and gap in mm. Raises InputError with all faults, also of points off the junction."""
+    read = read_columns(path, {name: name for name in ("x", "y", "gap")})
+    length, width = joint.junction.length, joint.junction.width
+    allowed = f"on the junction, 0 … {length:g} × 0 … {width:g} mm"
+    outside = [
+        Fault(str(path), f"line {line}", [x, y], allowed)
+        for line, (x, y, _) in zip(read.lines, read.rows, strict=True)
+        if not (0 <= x <= length and 0 <= y <= width)
+    ]
+    if faults := [*read.faults, *outside]:
+        raise InputError(faults)
+    return np.array(read.rows)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """W (s, node_count), Cx and Cy with C = Cy ⊗ Cx, the Cholesky factor of WCWᵀ + ν²I, and d (s,) mm."""
+
+    W: sp.csr_array
+    Cx: Matrix
+    Cy: Matrix
+    factor: Any
+    gaps: Vector
+
+    @classmethod
+    def of(cls, joint: Joint, points: Matrix, correlation_length: float) -> Scan:
+        W = joint.weights(points[:, :2])
+        Lx, Ly = (square_root(grid.tobytes(), correlation_length) for grid in (joint.x, joint.y))
+        Cx, Cy = Lx @ Lx, Ly @ Ly
+        spread = (W @ _times(Cx, Cy, W[[k]].toarray()) for k in range(len(points)))
+        S = np.array(list(spread)) + NOISE**2 * np.eye(len(points))
+        return cls(W, Cx, Cy, sla.cho_factor((S + S.T) / 2), points[:, 2])
+
+    def through(self, gap: Vector, sd: float, random: np.random.Generator) -> Vector:
+        """The random gap (node_count,) mm of a pair, made to pass through the scan. sd : σ, mm."""
+        missed = self.gaps - NOISE * sd * random.standard_normal(len(self.gaps)) - self.W @ gap
+        return gap + _times(self.Cx, self.Cy, self.W.T @ sla.cho_solve(self.factor, missed))
+
+
+def _times(Cx: Matrix, Cy: Matrix, v: Vector) -> Vector:
+    """(Cy ⊗ Cx) v."""
+    return np.asarray(Cy @ v.reshape(len(Cy), len(Cx)) @ Cx).ravel()

@@ -1,0 +1,75 @@
+"""One page to file: the answer of a scene, its pictures, how sure it is, from what and by which version."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from report.document.escape import plain
+from report.document.numbers import significant
+from report.figures import style
+from report.page.answer import facts, headline
+from report.results.answers import fasteners
+from report.results.series import Array
+
+A4 = (8.27, 11.69)  # inches
+LEFT, WIDTH, TOP, LINE, LOWEST = 0.07, 0.86, 0.965, 0.0145, 0.03  # of the page
+TALLEST = 0.3  # of a picture
+COLOURS = {"pass": style.GREEN, "fail": style.VERMILLION, "": style.BLACK}
+LETTERS = 105  # of a line
+
+
+def write_pdf(path: Path, record: dict[str, Any], arrays: dict[str, Array], pictures: list[Path]) -> None:
+    """A4, with those pictures below the headline; of the fasteners, as many as fit."""
+    page, found = _Page(), headline(record, arrays)
+    page.text(str(record["title"]), size=13, weight="bold", letters=70)
+    page.text(found["text"], size=11, weight="bold", color=COLOURS[found["kind"]], letters=85)
+    for file in pictures:
+        page.picture(file)
+    known = [("scene", f"{record['scene']}, key {record['scene_key'][:16]}"), *facts(record)]
+    known += [(name, str(record[name])) for name in ("commit", "machine", "recorded_at") if record.get(name)]
+    forces = [
+        f"{kind}, {contact}, at ({significant(x)}, {significant(y)}) mm: {significant(force)} N"
+        for kind, contact, x, y, force in fasteners(record).itertuples(index=False)
+    ]
+    room = page.lines_left - len(known) - 4
+    if forces:
+        page.text("Forces in the fasteners", weight="bold")
+        for line in forces[:room]:
+            page.text(line)
+        if len(forces) > room:
+            page.text(f"and {len(forces) - room} more: answer.md")
+    page.text("How sure it is, and from what", weight="bold")
+    page.text(f"{record['grid']['said']}.")
+    for name, value in known:
+        page.text(f"{name}: {value}")
+    page.figure.savefig(path, format="pdf", dpi=style.DPI)
+
+
+class _Page:
+    """Filled from the top."""
+
+    def __init__(self) -> None:
+        self.figure, self.at = Figure(figsize=A4), TOP
+
+    @property
+    def lines_left(self) -> int:
+        return int((self.at - LOWEST) / LINE)
+
+    def text(self, text: str, size: float = 8.0, letters: int = LETTERS, **look: Any) -> None:
+        for line in wrap(plain(text), letters):
+            self.figure.text(LEFT, self.at, line, va="top", size=size, parse_math=False, **look)
+            self.at -= LINE * size / 8.0
+
+    def picture(self, file: Path) -> None:
+        image = imread(file)
+        height = WIDTH * image.shape[0] / image.shape[1] * A4[0] / A4[1]
+        shown = min(height, TALLEST)
+        axes = self.figure.add_axes((LEFT, self.at - shown, WIDTH * shown / height, shown))
+        axes.imshow(image)
+        axes.set_axis_off()
+        self.at -= shown + LINE

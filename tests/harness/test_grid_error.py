@@ -1,0 +1,79 @@
+"""What the grid leaves out of a gap, beside references on finer grids."""
+
+import numpy as np
+import pytest
+
+from harness import load_scene, own_matrices, solve
+from harness.scene.grid_error import estimated, recorded, regridded
+from harness.scene.solution import Solution
+from problems.model.scene import JointScene
+
+STRIPS = {
+    "junction": {"length": 300.0, "width": 60.0, "nodes": [31, 7]},
+    "part": [
+        {"name": name, "thickness": 3.0, "north": {"length": 60.0, "elements": 6}, "clamped": ["north"]}
+        for name in ("upper", "lower")
+    ],
+}
+
+
+def strips(*effects: dict[str, object]) -> Solution:
+    gap = {"kind": "initial_gap", "mean": 0.5, "random": {"sd": 0.2, "correlation_length": 60, "seed": 3}}
+    return solve({"title": "strips", "joint": STRIPS, "effect": [gap, *effects]}, form="sparse")
+
+
+def finest(found: Solution, factor: float) -> float:
+    """How far the gaps are from those of a grid of `factor` times as many lines."""
+    from harness.scene.grid_error import _moved
+
+    return _moved(found, regridded(found.problem.scene.joint, factor))
+
+
+PLANS = {
+    "fasteners at nodes": [{"kind": "fasteners", "preload": 400.0, "points": [[50, 30], [250, 30]]}],
+    "fasteners between nodes": [
+        {"kind": "fasteners", "preload": 400.0, "pattern": {"columns": 4, "rows": 2, "edge": 13}}
+    ],
+    "pressure": [
+        {"kind": "pressure", "part": "upper", "value": 0.02},
+        {"kind": "pressure", "part": "lower", "value": -0.02},
+    ],
+    "springs": [{"kind": "installed_fasteners", "approach": 0.4, "points": [[51, 22], [250, 31]]}],
+}
+
+
+@pytest.mark.parametrize("plan", PLANS)
+def test_the_estimate_is_about_the_distance_to_a_far_finer_grid(plan: str) -> None:
+    found = strips(*PLANS[plan])
+    two, three = estimated(found), estimated(found, refine=True)
+    true = finest(found, 6.0)
+    assert (two.grids, two.order, three.grids) == (2, None, 3)
+    assert true / 2 < three.error_mm < 2 * true
+    assert true / 2 < two.error_mm < 20 * true  # rough, and rarely too small
+    assert 0 < three.order < 4
+
+
+def test_a_coarser_grid_keeps_the_sides_and_one_element_at_least() -> None:
+    joint = load_scene("gallery/measured-gap").joint
+    coarse = regridded(joint, 0.5)
+    assert coarse.junction.nodes == (31, 6)
+    assert [part.north.elements for part in coarse.part] == [2, 2]
+    assert (coarse.x[-1], coarse.y[-1]) == (joint.x[-1], joint.y[-1])
+    assert regridded(regridded(coarse, 1e-3), 1e-3).junction.nodes == (2, 2)
+    assert regridded(joint, 2.0).junction.nodes == (121, 21)
+
+
+def test_an_answer_without_a_coarser_grid_says_so() -> None:
+    single = {"junction": {"length": 300.0, "width": 60.0, "nodes": [2, 2]}, "part": STRIPS["part"]}
+    gap = {"kind": "initial_gap", "mean": 0.5}
+    assert estimated(solve({"joint": single, "effect": [gap]}, form="sparse")) is None
+    given = own_matrices(np.eye(2), np.eye(2), [1.0, 2.0], [0.5, 3.0])
+    assert recorded(estimated(solve(given))) == {"said": "What the grid leaves out is not known here"}
+
+
+def test_gaps_that_no_grid_moves_leave_nothing_out() -> None:
+    """Parts that nothing presses keep their gap on every grid."""
+    found = solve({"joint": STRIPS, "effect": [{"kind": "initial_gap", "mean": 0.5}]}, form="sparse")
+    assert isinstance(found.problem.scene, JointScene)
+    assert estimated(found).error_mm < 1e-12
+    assert estimated(found, refine=True).error_mm < 1e-12

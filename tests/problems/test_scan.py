@@ -1,0 +1,81 @@
+"""Random gaps that pass through a scan, against the conditional Gaussian distribution written out."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from joints import make_joint, make_scene
+
+from problems.effects.initial_gap import InitialGap
+from problems.effects.measured_gap import MeasuredGap
+from problems.errors import InputError
+from problems.load_cases.random_gaps import RandomGaps, random_gaps
+from problems.load_cases.scan import NOISE
+
+PART = {"north": {"length": 90.0, "elements": 2}, "clamped": ["north"]}
+JOINT = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
+SD, LENGTH, COUNT = 0.2, 120.0, 4000
+SCAN = np.array([[0.0, 0.0, 0.5], [130.0, 41.0, 0.9], [133.0, 44.0, 0.95], [400.0, 120.0, 0.3]])
+
+
+def cases(folder: Path, scan: np.ndarray = SCAN, **more: float) -> RandomGaps:
+    path = folder / "scan.csv"
+    path.write_text("x;y;gap\n" + "\n".join(";".join(f"{v}" for v in row) for row in scan.tolist()))
+    return random_gaps(make_scene(JOINT), COUNT, 7, sd=SD, correlation_length=LENGTH, around=path, **more)
+
+
+def test_mean_and_covariance_are_those_of_the_field_given_the_scan(tmp_path: Path) -> None:
+    mean = 0.6
+    drawn = np.array([cases_.load(k).g for cases_ in [cases(tmp_path, mean=mean)] for k in range(COUNT)])
+    nodes, W = JOINT.nodes, JOINT.weights(SCAN[:, :2]).toarray()
+    C = SD**2 * np.exp(-0.5 * ((nodes[:, None] - nodes) ** 2).sum(axis=2) / LENGTH**2)
+    gain = C @ W.T @ np.linalg.inv(W @ C @ W.T + (NOISE * SD) ** 2 * np.eye(len(SCAN)))
+    wanted, left = mean + gain @ (SCAN[:, 2] - mean), C - gain @ W @ C
+    error = SD / np.sqrt(COUNT)
+    assert abs(drawn.mean(axis=0) - wanted).max() < 4.5 * error
+    assert abs(np.cov(drawn.T) - left).max() < 6 * SD * error
+    assert left.diagonal().min() < 1e-3 * SD**2 < left.diagonal().max()
+
+
+def test_every_case_passes_through_the_scan(tmp_path: Path) -> None:
+    found = cases(tmp_path)
+    W = JOINT.weights(SCAN[:, :2])
+    for k in range(50):
+        assert abs(W @ found.load(k).g - SCAN[:, 2]).max() < 6 * NOISE * SD
+    assert found.field.mean == pytest.approx(SCAN[:, 2].mean())  # of the scan, if no other is given
+    assert cases(tmp_path, mean=0.1).field.mean == 0.1
+
+
+def test_the_cases_depend_on_the_scan_and_the_seed_alone(tmp_path: Path) -> None:
+    one, again = cases(tmp_path), cases(tmp_path)
+    other = cases(tmp_path, SCAN + np.array([0.0, 0.0, 1e-3]))
+    assert one.key == again.key != other.key
+    np.testing.assert_array_equal(one.load(3).g, again.load(3).g)
+
+
+def test_a_scan_off_the_junction_or_beside_a_measured_gap(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as error:
+        cases(tmp_path, SCAN + np.array([1.0, 0.0, 0.0]))
+    assert [(fault.key, fault.value) for fault in error.value.faults] == [("line 5", [401.0, 120.0])]
+    cases(tmp_path)
+    measured = MeasuredGap(kind="measured_gap", points=((0, 0, 1), (9, 0, 1), (0, 9, 1)))
+    with pytest.raises(InputError, match=r"scan\.csv would be added"):
+        random_gaps(
+            make_scene(JOINT, measured), 1, 0, sd=1, correlation_length=9, around=tmp_path / "scan.csv"
+        )
+
+
+def test_far_from_the_scan_the_field_is_the_scenes_own(tmp_path: Path) -> None:
+    """A field that is short beside the junction forgets its scan."""
+    (tmp_path / "scan.csv").write_text("x,y,gap\n0,0,5\n")
+    gap = InitialGap.model_validate(
+        {"kind": "initial_gap", "mean": 0.5, "random": {"sd": 0.1, "correlation_length": 20, "seed": 1}}
+    )
+    scene = make_scene(JOINT, gap)
+    near, free = (
+        random_gaps(scene, 9, 2, around=tmp_path / "scan.csv").load(1).g,
+        random_gaps(scene, 9, 2).load(1).g,
+    )
+    far = np.hypot(*JOINT.nodes.T) > 160
+    np.testing.assert_allclose(near[far], free[far], atol=1e-9)
+    assert near[0] == pytest.approx(5.0, abs=1e-3)

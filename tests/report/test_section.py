@@ -1,0 +1,85 @@
+"""The section through the largest gap, and the page of PDF."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from report.figures.section import section_figure
+from report.writers.pdf import LETTERS, write_pdf
+
+X, Y = np.linspace(0.0, 60.0, 7), np.linspace(0.0, 20.0, 3)
+PAIRS = [{"pair": ["a", "b"], "start": 0, "stop": 21}, {"pair": ["b", "tool"], "start": 21, "stop": 42}]
+
+
+def answer(worst: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Two parts and a tool, the largest gap at that contact; the nodes in any order."""
+    random = np.random.default_rng(worst)
+    order = random.permutation(21)
+    nodes = np.column_stack([np.tile(X, 3), np.repeat(Y, 7)])[order]
+    x, after = random.normal(size=42), random.uniform(0, 1, 42)
+    after[worst] = 2.0
+    rows = np.concatenate([np.column_stack([np.arange(21), np.arange(21, 42)]).ravel(), np.arange(21, 42)])
+    arrays = {
+        "x": x,
+        "gap_after": after,
+        "gap_before": after + x + np.concatenate([-x[21:], np.zeros(21)]),
+        "contact_nodes": np.tile(nodes, (2, 1)),
+        "A_data": np.concatenate([np.tile([1.0, -1.0], 21), np.ones(21)]),
+        "A_indices": rows,
+        "A_indptr": np.concatenate([np.arange(0, 43, 2), np.arange(43, 64)]),
+    }
+    return {"m": 42, "pairs": PAIRS}, arrays
+
+
+@pytest.mark.parametrize("worst", [0, 5, 13, 20, 21, 30, 41])
+def test_both_lines_go_through_the_largest_gap(worst: int) -> None:
+    record, arrays = answer(worst)
+    figure = section_figure(record, arrays)
+    assert figure is not None
+    place = arrays["contact_nodes"][worst]
+    own = slice(0, 21) if worst < 21 else slice(21, 42)
+    moved = arrays["x"][own]  # of the first part of the pair
+    for axes, axis in zip(figure.axes, (0, 1), strict=True):
+        first, second, before, begun = axes.get_lines()
+        on = np.isclose(arrays["contact_nodes"][own][:, 1 - axis], place[1 - axis])
+        order = np.argsort(arrays["contact_nodes"][own][on][:, axis])
+
+        def along(values: np.ndarray, on: np.ndarray = on, order: np.ndarray = order) -> np.ndarray:
+            return values[own][on][order]
+
+        np.testing.assert_allclose(first.get_xdata(), (X, Y)[axis])
+        np.testing.assert_allclose(first.get_ydata(), moved[on][order])
+        np.testing.assert_allclose(second.get_ydata() - first.get_ydata(), along(arrays["gap_after"]))
+        np.testing.assert_allclose(begun.get_ydata() - before.get_ydata(), along(arrays["gap_before"]))
+        assert (second.get_ydata() - first.get_ydata()).max() == 2.0
+    (legend,) = figure.legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == [f"{name}, after" for name in PAIRS[worst // 21]["pair"]] + ["gap left", "before"]
+
+
+def test_scattered_contacts_have_no_section() -> None:
+    record, arrays = answer(3)
+    arrays["contact_nodes"] = arrays["contact_nodes"] + np.random.default_rng(0).normal(size=(42, 2))
+    assert section_figure(record, arrays) is None
+    assert section_figure({"m": 0, "pairs": []}, {}) is None
+
+
+@pytest.mark.parametrize("count", [0, 3, 400])
+def test_the_page_to_file_is_one_page(tmp_path: Path, count: int) -> None:
+    record, arrays = answer(8)
+    forces = [
+        {"kind": "fasteners", "pair": ["a", "b"], "x": k, "y": 2.0, "force_N": 9.0} for k in range(count)
+    ]
+    record |= {"title": "A $joint_ of " + LETTERS * "two ", "scene": "here", "scene_key": "0" * 64, "n": 42}
+    record |= {"method": "newton", "fasteners": forces, "grid": {"said": "Nothing is known"}, "steps": {}}
+    record |= {"allowed_gap": {"exceeded": True, "allowed_mm": 0.05}, "commit": "c0ffee"}
+    figure = section_figure(record, arrays)
+    assert figure is not None
+    figure.savefig(tmp_path / "section.png")
+    write_pdf(tmp_path / "answer.pdf", record, arrays, [tmp_path / "section.png"])
+    content = (tmp_path / "answer.pdf").read_bytes()
+    assert content.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type /Page\b", content)) == 1
