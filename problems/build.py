@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from problems.errors import InputError
 from problems.forms import Form
@@ -19,30 +19,42 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared
 from problems.model.effect import Effect
+from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
 from problems.storage import digest, fingerprint
 
 if TYPE_CHECKING:
     from problems.model.joint_model import JointModel
+    from problems.model.superelement_model import SuperelementModel
+
+    Model: TypeAlias = "JointModel | SuperelementModel | GivenModel"
 
 DENSEST = 0.25  # of a block's entries: a denser K gains nothing from the sparse form
 SMALL = 200  # unknowns up to which any K is taken
 
-_last: tuple[Scene, JointModel | GivenModel] | None = None  # of several, only the last one stays in memory
+_last: tuple[Scene, Model] | None = None  # of several, only the last one stays in memory
 
 
-def model_of(scene: Scene) -> JointModel | GivenModel:
+def model_of(scene: Scene) -> Model:
     """The model of a scene, made once for the same scene object."""
     global _last
     if _last is None or _last[0] is not scene:
         if isinstance(scene, JointScene):
-            from problems.model.joint_model import JointModel
-
-            _last = scene, JointModel.of(scene)
+            _last = scene, _of_joint(scene)
         else:
             assert isinstance(scene, MatricesScene | ManufacturedScene)
             _last = scene, GivenModel.of(scene)
     return _last[1]
+
+
+def _of_joint(scene: JointScene) -> JointModel | SuperelementModel:
+    if isinstance(scene.joint, Joint):
+        from problems.model.joint_model import JointModel
+
+        return JointModel.of(scene)
+    from problems.model.superelement_model import SuperelementModel
+
+    return SuperelementModel.of(scene)
 
 
 def prepared(scene: Scene, progress: Progress = silent, form: Form = "dual") -> Prepared:

@@ -6,7 +6,8 @@
     kind = "initial_gap"                  # a file in problems/effects
     mean = 0.6
 
-or, for a user's own matrices, `[matrices]` with K, A, f, g (Matrix Market) or problem (.npz).
+whose parts are plates, or superelements with `superelement` and `nodes` (docs/own-parts.md); or, for matrices
+of a whole problem, `[matrices]` with K, A, f, g (Matrix Market) or problem (.npz).
 """
 
 import tomllib
@@ -23,6 +24,7 @@ from problems.input.bounded import regular_file, resolved, unknown, validation_f
 from problems.ladders import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
+from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MatricesScene, Scene
 
@@ -123,7 +125,7 @@ def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:
     if joint is not None:
         for table in tables:
             faults += table.misfits(joint, tables)
-        if len(effects) == len(tables):
+        if len(effects) == len(tables) and isinstance(joint, Joint):
             faults += _floating(joint_path, joint, effects)
     if faults or joint is None:
         raise InputError(faults)
@@ -151,20 +153,36 @@ def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple
 
 def _joint(
     path: Path, table: dict[str, Any], effects: tuple[Effect, ...], faults: list[Fault]
-) -> Joint | None:
+) -> AnyJoint | None:
     """The joint with the contacts that effects add; None if its table is wrong."""
     if not table:
         return None
+    parts = table.get("part")
+    own = isinstance(parts, list) and any(isinstance(part, dict) and "superelement" in part for part in parts)
     try:
-        joint = Joint.model_validate(table)
+        joint: AnyJoint = _of_superelements(path, table) if own else Joint.model_validate(table)
+    except InputError as error:
+        faults += error.faults
+        return None
     except ValidationError as error:
         faults += validation_faults(path, Joint, error)
         return None
     new = [pair for effect in effects for pair in effect.contacts if pair not in joint.pairs]
     if new:
-        joint = joint.model_copy(update={"contacts": (*joint.pairs, *dict.fromkeys(new))})
-    faults += [Fault(str(path), *fault) for fault in joint.faults()]
-    return joint
+        joint = joint.with_contacts((*joint.pairs, *dict.fromkeys(new)))
+    wrong = [Fault(str(path), *fault) for fault in joint.faults()]
+    faults += wrong
+    return None if own and wrong else joint  # without places nothing can be said of the effects
+
+
+def _of_superelements(path: Path, table: dict[str, Any]) -> AnyJoint:
+    from problems.model.superelement_joint import SuperelementJoint, SuperelementJointTable
+
+    try:
+        read = SuperelementJointTable.model_validate(table)
+    except ValidationError as error:
+        raise InputError(list(validation_faults(path, SuperelementJointTable, error))) from error
+    return SuperelementJoint.of(path.parent, read)
 
 
 def _effect_tables(where: Path, data: dict[str, Any], faults: list[Fault]) -> list[EffectTable]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +12,11 @@ import typer
 from .options import NOTHING_WRITTEN, AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
 
 STARTER = Path(__file__).with_name("starter.toml")
+STARTER_OF_PARTS = STARTER.with_name("starter-superelements.toml")
+DOFS = """dofs = [3]                              # the rows of K at each node: 1, 2, 3 displacements,
+                                        # 4, 5, 6 rotations; DMIG and Abaqus' text say them themselves
+
+"""
 
 
 def solve(
@@ -91,13 +98,20 @@ def validate(scene: SceneName) -> None:
 
 
 def init(
-    file: Annotated[Path, typer.Argument(metavar="[FILE]", help="The scene to write.")] = Path("joint.toml"),
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[FILE]", help="The scene to write.  [default: joint.toml]"),
+    ] = None,
+    superelements: Annotated[
+        bool, typer.Option("--superelements", help="Of the parts whose K is in the other FILEs.")
+    ] = False,
 ) -> None:
-    """Write a commented scene to start from: a joint of two sheets, a gap, fasteners.
+    """Write a commented scene to start from: a joint of two sheets, a gap, fasteners; or of your own parts.
 
     \b
     Examples:
       python -m harness init joint.toml && python -m harness solve joint.toml --out results/joint
+      python -m harness init --superelements wing.op4 frame.op4 joint.toml
 
     \b
     Exit codes: 0 written, 2 the file exists, or is no .toml.
@@ -105,10 +119,32 @@ def init(
     with error_reporting(*NOTHING_WRITTEN) as console:
         from problems.errors import InputError
 
-        if file.suffix != ".toml":
-            raise InputError.one("FILE", "path", str(file), "must end in .toml, which makes it a scene")
+        given = files or []
+        scenes = [each for each in given if each.suffix == ".toml"] if superelements else given
+        parts = [each for each in given if each not in scenes]
+        file = scenes[0] if scenes else Path("joint.toml")
+        if file.suffix != ".toml" or len(scenes) > 1:
+            allowed = "one scene, which ends in .toml; superelements with --superelements"
+            raise InputError.one("FILE", "path", ", ".join(map(str, scenes)), allowed)
+        if superelements and len(parts) < 1:
+            raise InputError.one("--superelements", "FILE", None, "the file of K of each part")
         if file.exists() or file.is_symlink():
             raise InputError.one("FILE", "path", str(file), "exists: name another")
+        text = _of_parts(parts, file) if superelements else STARTER.read_text("utf-8")
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(STARTER.read_text("utf-8").replace("FILE", str(file)), "utf-8")
+        file.write_text(text.replace("FILE", str(file)), "utf-8")
         console.print(f"{file}: edit it, then `python -m harness solve {file} --out results/{file.stem}`.")
+
+
+def _of_parts(parts: list[Path], scene: Path) -> str:
+    """The scene of parts whose K are in these files, their nodes beside them."""
+    tables = ""
+    for part in parts:
+        there = Path(os.path.relpath(part, scene.parent)).as_posix()
+        nodes = Path(there).with_suffix(".csv").as_posix()
+        files = f"superelement = {json.dumps(there)}\nnodes = {json.dumps(nodes)}\n"
+        tables += f"[[joint.part]]\nname = {json.dumps(part.stem)}\n{files}"
+        tables += DOFS
+    title = " on ".join(part.stem for part in parts)
+    text = STARTER_OF_PARTS.read_text("utf-8")
+    return text.replace("TITLE", title).replace("PARTS\n", tables)

@@ -20,6 +20,7 @@ from problems.errors import InputError
 from problems.forms import DENSE_FORMS, Form, default_form
 from problems.input.user_matrices import SMALL, holds_sparse, stored_matrices
 from problems.model.effect import SpringEffect
+from problems.model.joint import Joint
 from problems.model.scene import JointScene, ManufacturedScene, MatricesScene, Scene
 from problems.stiffness.dense import dense_slices
 
@@ -55,10 +56,12 @@ class Size:
 
 
 def size_of(scene: Scene) -> Size | None:
-    """Of a joint, or of sparse matrices; None for matrices that are arrays, which then fit, or small."""
+    """Of a joint of plates, or of sparse matrices; None for arrays, which then fit, or small matrices."""
     match scene:
-        case JointScene():
-            return _of_joint(scene)
+        case JointScene(joint=Joint() as joint):
+            return _of_joint(scene, joint)
+        case JointScene() if _holds_sparse(scene):
+            assembly = model_of(scene).sparse().assembly
         case ManufacturedScene() if scene.sparse and sum(scene.block_sizes) > SMALL:
             assembly = scene.made.assembly
         case MatricesScene() if holds_sparse(files := dict(scene.files)):
@@ -72,18 +75,25 @@ def size_of(scene: Scene) -> Size | None:
     return Size(assembly.n, assembly.m, *_dense(blocks, assembly.m), sparse, peak, assembly.n)
 
 
+def _holds_sparse(scene: JointScene) -> bool:
+    from problems.model.superelement_model import SuperelementModel  # of superelements only
+
+    model = model_of(scene)
+    return isinstance(model, SuperelementModel) and model.holds_sparse
+
+
 def _dense(blocks: Sequence[int], m: int) -> tuple[float, float]:
     """MiB of K, its factors and Q, and at the peak: with a copy of the largest block and of Q."""
     stored = 8 * (2 * sum(block**2 for block in blocks) + m**2) / MIB
     return stored, PROCESS_MIB + stored + 8 * (max(blocks) ** 2 + m**2) / MIB
 
 
-def _of_joint(scene: JointScene) -> Size:
+def _of_joint(scene: JointScene, joint: Joint) -> Size:
     """From the numbering of the full model; springs between parts are taken to make one block of all.
 
     An element joins a node, with 4 unknowns, to the next on the next line: 4 (nodes per line + 1) + 3.
     """
-    joint, tied = scene.joint, any(scene.effects_of(SpringEffect))
+    tied = any(scene.effects_of(SpringEffect))
     (n, m), (nx, ny) = joint.size, joint.junction.nodes
     dense = _dense([n] if tied else [joint.node_count] * len(joint.part), m)
     # The grid lines y = const of each part that are not built in.
@@ -107,10 +117,9 @@ def refuse_what_cannot_fit(scene: Scene, size: Size | None, form: Form) -> None:
     allowed = f"a {form} form needs about {size.peak_mib(form):.0f} MiB, this machine has {physical}"
     if form in DENSE_FORMS and size.sparse_peak_mib <= physical:
         allowed += f"; the sparse form (--form sparse) needs {size.sparse_peak_mib:.0f}"
-    if isinstance(scene, JointScene):
+    if isinstance(scene, JointScene) and isinstance(scene.joint, Joint):
         nodes = list(scene.joint.junction.nodes)
         raise InputError.one(scene.name, "junction.nodes", nodes, f"fewer nodes: {allowed}")
-    assert isinstance(scene, MatricesScene | ManufacturedScene)
     raise InputError.one(scene.source_of("K"), "K", f"{size.n} unknowns", allowed)
 
 

@@ -41,15 +41,16 @@ class GridError:
 
 
 def estimated(found: Solution, refine: bool = False) -> GridError | None:
-    """Of an answer; None for own matrices, whose grid is not known, and without contacts or a coarser grid.
+    """Of an answer; None for own matrices and superelements, whose grid is not known, and without contacts
+    or a coarser grid.
 
     r is that of the side of the junction where it is smaller, but above 1. refine : solve on a finer grid
     too, with four times the unknowns.
     """
     scene = found.problem.scene
-    if not isinstance(scene, JointScene) or not len(found.gap):
+    joint = scene.joint if isinstance(scene, JointScene) else None
+    if not isinstance(joint, Joint) or not len(found.gap):
         return None
-    joint = scene.joint
     coarse = regridded(joint, 0.5)
     pairs = zip(joint.junction.nodes, coarse.junction.nodes, strict=True)
     ratios = [(fine - 1) / (few - 1) for fine, few in pairs if few < fine]

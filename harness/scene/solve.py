@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from rich.console import Console
 from rich.text import Text
 
@@ -32,6 +33,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Vector
 from problems.model.effect import Effect, ForceEffect, SpringEffect
+from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.positions import FORCES
 from problems.model.scene import JointScene, MatricesScene, Scene
@@ -110,10 +112,15 @@ def solve(
 
 
 def _arrays(found: Solution) -> dict[str, Any]:
-    """DIR/solution.npz: of x and A, what is asked for."""
-    assembly = found.problem.prepared.assembly
-    A, nodes = assembly.asked_contacts, assembly.asked_nodes
-    arrays = {"x": found.x, "lam": found.lam, "gap_before": found.problem.load.g, "gap_after": found.gap}
+    """DIR/solution.npz: of x and A, what is asked for. Where parts keep more than the displacement along the
+    normal of each node, x and A are of these displacements alone, and `unknowns` is all of x.
+    """
+    assembly, scene = found.problem.prepared.assembly, found.problem.scene
+    x, A, nodes, more = found.x, assembly.asked_contacts, assembly.asked_nodes, {}
+    if isinstance(scene, JointScene) and (D := scene.joint.shown) is not None:
+        more, x, A = {"unknowns": x}, D @ x, sp.csc_array(D @ A)
+        nodes = np.concatenate([scene.joint.nodes_of(name) for name in scene.joint.names])
+    arrays = more | {"x": x, "lam": found.lam, "gap_before": found.problem.load.g, "gap_after": found.gap}
     arrays |= {"A_data": A.data, "A_indices": A.indices, "A_indptr": A.indptr}
     return arrays if nodes is None else arrays | {"nodes": nodes, "contact_nodes": assembly.contact_nodes}
 
@@ -143,7 +150,7 @@ def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, 
         "route": known.route,
         **layout(scene, data.assembly),
         "fasteners": fastener_forces(scene, found.x),
-        "digits": digits_sentence(problem)[0] if isinstance(scene, MatricesScene) else None,
+        "digits": digits_sentence(problem)[0] if _is_given(scene) else None,
         "skipped": list(_skipped(found, built, solver)),
         "steps": found.seconds,
         "peak_rss_mib": resident_mib("VmHWM"),
@@ -165,10 +172,17 @@ def _skipped(found: Solution, built: list[str], solver: str | None) -> Iterator[
         yield "condensation, dense factors and Q: the sparse model was solved as it is"
     elif not built:
         yield "condensation, Cholesky factors and Q: the assembly came from the cache"
-    elif isinstance(found.problem.scene, JointScene) and not any(
-        step.startswith("condensing") for step in built
-    ):
+    elif _is_of_plates(found.problem.scene) and not any(step.startswith("condensing") for step in built):
         yield "condensation: the parts came from the cache"
+
+
+def _is_given(scene: Scene) -> bool:
+    """Whether the entries of its K were read from files."""
+    return isinstance(scene, MatricesScene) or (isinstance(scene, JointScene) and not _is_of_plates(scene))
+
+
+def _is_of_plates(scene: Scene) -> bool:
+    return isinstance(scene, JointScene) and isinstance(scene.joint, Joint)
 
 
 def _show(record: dict[str, Any], console: Console) -> None:
@@ -191,20 +205,21 @@ def _show(record: dict[str, Any], console: Console) -> None:
 
 
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
-    """The ranges of parts in x and of pairs in λ, and what a picture marks."""
+    """The ranges of parts in the displacements shown and of pairs in λ, and what a picture marks."""
     if not isinstance(scene, JointScene):
         nodes = assembly.nodes if assembly.nodes is not None else np.zeros((assembly.n, 2))
         spans = zip(assembly.parts, assembly.K.slices, strict=True)
         parts = [_part(name, s.start, s.stop, _extent(nodes[s])) for name, s in spans]
         pairs = [{"pair": ["all parts"], "start": 0, "stop": assembly.m}] if assembly.m else []
         return {"parts": parts, "pairs": pairs, "marks": {}}
-    joint, size, parts = scene.joint, scene.joint.node_count, []
-    for k, part in enumerate(joint.part):
-        y = joint.plate(part).y
-        outline = [0.0, joint.junction.length, y[0], y[-1]]
-        held = [point for e in scene.stiffness_effects if e.part == part.name for point in e.held_points]
-        parts.append(_part(part.name, k * size, (k + 1) * size, outline, part.clamped, held))
-    pairs = [{"pair": pair, "start": k * size, "stop": (k + 1) * size} for k, pair in enumerate(joint.pairs)]
+    joint, parts, start = scene.joint, [], 0
+    for name in joint.names:
+        stop, (outline, clamped) = start + len(joint.nodes_of(name)), joint.outline(name)
+        held = [point for e in scene.stiffness_effects if e.part == name for point in e.held_points]
+        parts.append(_part(name, start, stop, outline, clamped, held))
+        start = stop
+    own = [(pair, joint.span(pair)) for pair in joint.pairs]
+    pairs = [{"pair": pair, "start": span.start, "stop": span.stop} for pair, span in own]
     marks: dict[str, list[list[float]]] = {}
     for effect in scene.effects_of(ForceEffect):
         if len(points := effect.marks(joint)):
@@ -231,7 +246,7 @@ def fastener_forces(scene: Scene, x: Vector) -> list[dict[str, Any]]:
     return [entry for effect in scene.effects for entry in _of_effect(effect, scene.joint, x)]
 
 
-def _of_effect(effect: Effect, joint: Joint, x: Vector) -> Iterator[dict[str, Any]]:
+def _of_effect(effect: Effect, joint: AnyJoint, x: Vector) -> Iterator[dict[str, Any]]:
     given: Any = effect  # its kind is not imported here, so that no other is
     if isinstance(effect, SpringEffect):
         T, k = effect.springs(joint)

@@ -52,7 +52,10 @@ def refuse_other_contacts(first: str, second: str) -> None:
     one, other = read_scene(first), read_scene(second)
     if isinstance(one, JointScene) and isinstance(other, JointScene):
         contacts = [list(pair) for pair in other.joint.pairs]
-        same = one.joint.pairs == other.joint.pairs and np.array_equal(one.joint.nodes, other.joint.nodes)
+        first_joint, second_joint = one.joint, other.joint
+        same = first_joint.pairs == second_joint.pairs and all(
+            np.array_equal(first_joint.places(pair), second_joint.places(pair)) for pair in first_joint.pairs
+        )
         if not (same and contacts):
             allowed = f"the contacts of {first}, at least one, at the same nodes"
             raise Incomparable.one(second, "contacts", contacts, allowed)

@@ -18,6 +18,7 @@ from problems.forms import FORMS
 from problems.forms.assembly import Assembly
 from problems.input.matrix_files import DOUBLE, apparent_digits, expected_error
 from problems.model.effect import SpringEffect
+from problems.model.joint import Joint
 from problems.model.part import PartLoadEffect
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
@@ -28,6 +29,9 @@ def validate(source: str, console: Console) -> None:
     scene = read_scene(source)
     if not isinstance(scene, JointScene):
         _matrices(scene, console)
+        return
+    if not isinstance(scene.joint, Joint):
+        _superelements(scene, console)
         return
     size, physical = size_of(scene), physical_memory_mib()
     assert size is not None
@@ -67,8 +71,30 @@ def _matrices(scene: Scene, console: Console) -> None:
     console.print(f"K is symmetric and positive definite, its entries seem to have {digits} digits. Fine.")
 
 
+def _superelements(scene: JointScene, console: Console) -> None:
+    """Print parts and contacts, sizes and digits. Raises InputError if K is not positive definite."""
+    from problems.model.superelement_joint import SuperelementJoint  # of such scenes only
+
+    joint = scene.joint
+    assert isinstance(joint, SuperelementJoint)
+    table = Table("what", "how many", title="What will be built")
+    for part in joint.parts:
+        table.add_row(f"part {part.name}", f"{part.size} unknowns, {len(part.contacts)} contact nodes")
+    for pair, found in joint.pairings.items():
+        a, b = pair
+        beyond = f", {found.beyond} nodes of {a} are beyond {b}" if found.beyond else ""
+        table.add_row(f"contact {a} – {b}", f"{len(found.nodes)} nodes of {a}{beyond}")
+    for sentence in scene.unusual:
+        console.print(Text(f"{sentence}.", style="yellow"))
+    console.print(_with_effects(table, scene))
+    x, y, normal = (", ".join(f"{each:.4g}" for each in axis) for axis in joint.axes)
+    console.print(f"Points are given along x = ({x}) and y = ({y}); the normal of their plane is ({normal}).")
+    _matrices(scene, console)
+
+
 def _contents(scene: JointScene) -> Table:
     joint = scene.joint
+    assert isinstance(joint, Joint)
     nx, ny = joint.junction.nodes
     table = Table("what", "how many", title="What will be built")
     for part in joint.part:
@@ -76,6 +102,10 @@ def _contents(scene: JointScene) -> Table:
         table.add_row(f"part {part.name}", f"{plate.size} unknowns, condensed onto {joint.node_count}")
     for first, second in joint.pairs:
         table.add_row(f"contact {first} – {second}", f"{joint.node_count} node pairs, {nx} × {ny}")
+    return _with_effects(table, scene)
+
+
+def _with_effects(table: Table, scene: JointScene) -> Table:
     for effect in scene.effects:
         table.add_row(f"effect {effect.kind}", (inspect.getdoc(effect) or "").partition("\n")[0])
     return table

@@ -1,13 +1,14 @@
 """Holding clamps: each presses the parts together over a round pad."""
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Positive
-from problems.model.effect import ContactEffect, pressing_forces
-from problems.model.joint import Joint
+from problems.model.effect import ContactEffect, Pair, pressing_forces
+from problems.model.interface import AnyJoint
 from problems.model.positions import Positions
 
 _AXIS = (np.arange(16) - 7.5) / 8
@@ -19,17 +20,22 @@ DISC = _INSIDE / (2 * _INSIDE.std())
 class Clamps(Positions, ContactEffect):
     """f += force on the first part of every contact, −= on the second, spread evenly under the pad.
 
-    clamping_force in N per clamp, on what lies on the junction of a disc of `radius` mm around its place: on
-    points that share it evenly, each by bilinear weights on the nodes around it.
+    clamping_force in N per clamp, on what both parts have of a disc of `radius` mm around its place:
+    on points that share it evenly, each by the weights of the nodes around it.
     """
 
     clamping_force: Annotated[Positive, "N"]
     radius: Annotated[Positive, "mm"] = 20.0
 
-    def force(self, joint: Joint) -> Vector:
-        nodal, size = np.zeros(joint.node_count), (joint.junction.length, joint.junction.width)
-        for centre in self.marks(joint):
-            points = centre + self.radius * DISC
-            under = points[((points >= 0) & (points <= size)).all(axis=1)]
-            nodal += self.clamping_force / len(under) * joint.weights(under).sum(axis=0)
-        return pressing_forces(nodal, self.pairs(joint), joint)
+    def force(self, joint: AnyJoint) -> Vector:
+        centres = self.marks(joint)
+
+        def under(pair: Pair) -> Iterator[tuple[Matrix, float]]:
+            parts = tuple(part for part in pair if part in joint.names)
+            for centre in centres:
+                points = centre + self.radius * DISC
+                points = points[joint.covers(parts, points)]
+                points = points if len(points) else centre[None]
+                yield points, self.clamping_force / len(points)
+
+        return pressing_forces(under, self.pairs(joint), joint)

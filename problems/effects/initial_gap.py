@@ -1,5 +1,6 @@
 """Initial gap between the parts before riveting: constant, or a random field around its mean."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Annotated
 
@@ -7,8 +8,9 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, Positive, Seed
-from problems.model.effect import ContactEffect, GapEffect, at_contacts, contacts_of
-from problems.model.joint import Faults, Joint, Table
+from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
+from problems.model.interface import AnyJoint
+from problems.model.joint import Faults, Table
 
 #: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `square_root`.
 SHIFT = 1e-10
@@ -27,25 +29,33 @@ class InitialGap(ContactEffect, GapEffect):
 
     The covariance sd² exp(−r² / 2ℓ²) is separable, so the field needs only the symmetric square
     roots Lx and Ly of two one-dimensional correlation matrices; it is met to some 1e-10 of its largest
-    eigenvalue. A negative gap is an overclosure. Each contact has a random field of its own.
+    eigenvalue. Its grid is that of the contacts; if they have none, one of six lines or more per correlation
+    length is interpolated by cubic splines. A negative gap is an overclosure. Each contact has a random field
+    of its own.
     """
 
     mean: Annotated[Finite, "mm"]
     random: RandomField | None = None
 
-    def unusual(self, joint: Joint) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
+        if self.random and self.random.correlation_length < joint.shortest:
+            length = self.random.correlation_length
+            yield "random.correlation_length", length, f"at least {joint.shortest:.3g} mm on this junction"
+
+    def unusual(self, joint: AnyJoint) -> Faults:
         if self.mean < 0:
             yield "mean", self.mean, "0 mm or more: the parts would overlap"
 
-    def gap(self, joint: Joint) -> Vector:
-        g = at_contacts(self.mean, self.pairs(joint), joint)
+    def gap(self, joint: AnyJoint) -> Vector:
+        g = at_contacts(lambda pair: self.mean, self.pairs(joint), joint)
         if self.random:
             rng = np.random.default_rng(self.random.seed)
             length = self.random.correlation_length
-            Lx, Ly = (square_root(grid.tobytes(), length) for grid in (joint.x, joint.y))
+            Lx, Ly = (square_root(grid.tobytes(), length) for grid in joint.grid(length))
             for pair in self.pairs(joint):
-                Z = rng.standard_normal((len(joint.y), len(joint.x)))
-                g[contacts_of(pair, joint)] += self.random.sd * (Ly @ Z @ Lx).ravel()
+                Z = rng.standard_normal((len(Ly), len(Lx)))
+                g[joint.span(pair)] += self.random.sd * joint.from_grid(pair, Ly @ Z @ Lx)
         return g
 
 

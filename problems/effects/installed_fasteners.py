@@ -8,8 +8,9 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import ContactEffect, Effect, Pair, SpringEffect
-from problems.model.joint import TOOL, Faults, Joint
+from problems.model.effect import ContactEffect, Effect, Pair, SpringEffect, sides
+from problems.model.interface import AnyJoint
+from problems.model.joint import TOOL, Faults
 from problems.model.positions import Positions
 
 
@@ -19,13 +20,13 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
     stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
     shank through 20 mm. approach in mm: by how much the gap was reduced when the fastener was set; 0 keeps
     the gap as it was, the value of the initial gap keeps it closed. Each fastener acts where it is: w_a and
-    w_b are the bilinear weights of its place on the nodes of the element around it.
+    w_b are the weights of its place on the nodes of each part around it, along the normal of the first.
     """
 
     stiffness: Annotated[Positive, "N/mm"] = 1e5
     approach: Annotated[Finite, "mm"] = 0.0
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         if joint.pairs and not self.tied(joint):
             yield "between", self.between, "a contact of two parts; a fastener cannot tie a part to the tool"
@@ -39,20 +40,29 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
                     allowed = f"separate places: {other.kind} acts at the same ones"
                     yield "points", [list(place) for place in sorted(shared)], allowed
 
-    def tied(self, joint: Joint) -> list[Pair]:
+    def tied(self, joint: AnyJoint) -> list[Pair]:
         return [pair for pair in self.pairs(joint) if pair[1] != TOOL]
 
-    def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
-        names = [part.name for part in joint.part]
-        sides = [[(name == a) - (name == b) for a, b in self.tied(joint)] for name in names]
-        T = sp.csc_array(sp.kron(np.array(sides, dtype=float), joint.weights(self.marks(joint)).T))
+    def springs(self, joint: AnyJoint) -> tuple[sp.csc_array, Vector]:
+        points, columns = self.marks(joint), []
+        for pair in self.tied(joint):
+            rows = {part: sign * joint.deflection(part, points, pair[0]).T for part, sign in sides(pair)}
+            none = {part: sp.csc_array((_count(joint, part), len(points))) for part in joint.names}
+            columns.append(sp.vstack([(none | rows)[part] for part in joint.names]))
+        T = sp.csc_array(sp.hstack(columns))
+        T.sort_indices()
         return T, np.full(T.shape[1], self.stiffness)
 
-    def force(self, joint: Joint) -> Vector:
+    def force(self, joint: AnyJoint) -> Vector:
         T, k = self.springs(joint)
         return T @ (k * self.approach)
 
 
-def _places(given: Positions, joint: Joint) -> set[tuple[float, float]]:
+def _count(joint: AnyJoint, part: str) -> int:
+    own = joint.unknowns(part)
+    return own.stop - own.start
+
+
+def _places(given: Positions, joint: AnyJoint) -> set[tuple[float, float]]:
     """To the nanometre."""
     return {(x, y) for x, y in given.marks(joint).round(6).tolist()}

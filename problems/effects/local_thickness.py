@@ -8,7 +8,8 @@ import scipy.sparse as sp
 
 from problems.input.bounded import Finite, Positive
 from problems.model.effect import Effect, StiffnessEffect
-from problems.model.joint import Faults, Joint
+from problems.model.interface import AnyJoint
+from problems.model.joint import Faults
 from problems.model.plate import Plate, Range
 
 
@@ -31,7 +32,7 @@ class LocalThickness(StiffnessEffect):
             if not grid[0] <= start < stop <= grid[-1]:
                 yield key, [start, stop], f"start < stop on the part, {grid[0]:g} … {grid[-1]:g} mm"
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         for other in others:
             if (

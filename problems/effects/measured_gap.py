@@ -9,8 +9,9 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
-from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
-from problems.model.joint import Faults, Joint
+from problems.model.effect import ContactEffect, Effect, GapEffect, Pair, at_contacts
+from problems.model.interface import AnyJoint
+from problems.model.joint import Faults
 
 
 class MeasuredGap(ContactEffect, GapEffect):
@@ -23,7 +24,7 @@ class MeasuredGap(ContactEffect, GapEffect):
     columns: ClassVar[tuple[str, ...]] = ("x", "y", "gap")
     points: Annotated[tuple[tuple[Finite, Finite, Finite], ...], Field(min_length=3), "mm"]
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         places = np.array(self.points)[:, :2]
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=1e-9 * np.ptp(places)) < 2:
@@ -35,14 +36,20 @@ class MeasuredGap(ContactEffect, GapEffect):
             if isinstance(other, MeasuredGap) and set(self.pairs(joint)) & set(other.pairs(joint)):
                 yield "between", self.between, "one measured_gap per contact: another one covers this contact"
 
-    def unusual(self, joint: Joint) -> Faults:
+    def unusual(self, joint: AnyJoint) -> Faults:
         if (mean := float(np.mean(self.points, axis=0)[2])) < 0:
             yield "points, their mean gap", mean, "0 mm or more: the parts would overlap"
 
-    def gap(self, joint: Joint) -> Vector:
+    def gap(self, joint: AnyJoint) -> Vector:
         points = np.array(self.points)
         places, values = points[:, :2], points[:, 2]
-        at_nodes = LinearNDInterpolator(places, values)(joint.nodes)
-        beyond = np.isnan(at_nodes)
-        at_nodes[beyond] = NearestNDInterpolator(places, values)(joint.nodes[beyond])
-        return at_contacts(at_nodes, self.pairs(joint), joint)
+        inside, nearest = LinearNDInterpolator(places, values), NearestNDInterpolator(places, values)
+
+        def at(pair: Pair) -> Vector:
+            nodes = joint.places(pair)
+            found = inside(nodes)
+            beyond = np.isnan(found)
+            found[beyond] = nearest(nodes[beyond])
+            return np.asarray(found)
+
+        return at_contacts(at, self.pairs(joint), joint)

@@ -1,4 +1,4 @@
-"""Uniform pressure on one part's junction strip."""
+"""Uniform pressure on one part where it faces others."""
 
 from typing import Annotated
 
@@ -7,7 +7,7 @@ import numpy as np
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.model.effect import ForceEffect, PartEffect
-from problems.model.joint import Joint
+from problems.model.interface import AnyJoint
 
 
 class Pressure(PartEffect, ForceEffect):
@@ -19,15 +19,7 @@ class Pressure(PartEffect, ForceEffect):
 
     value: Annotated[Finite, "N/mm²"]
 
-    def force(self, joint: Joint) -> Vector:
+    def force(self, joint: AnyJoint) -> Vector:
         f = np.zeros(joint.size[0])
-        f[joint.unknowns(self.part)] = (
-            self.value * np.outer(_tributary_lengths(joint.y), _tributary_lengths(joint.x)).ravel()
-        )
+        f[joint.unknowns(self.part)] = self.value * joint.areas(self.part)
         return f
-
-
-def _tributary_lengths(grid: Vector) -> Vector:
-    """The tributary length of each grid point (trapezoidal rule)."""
-    h = np.diff(grid)
-    return 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))

@@ -3,10 +3,13 @@
 from collections.abc import Sequence
 from typing import Annotated
 
+import numpy as np
+
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.model.effect import Effect, GapEffect, Pair, PartEffect, at_contacts
-from problems.model.joint import TOOL, Faults, Joint
+from problems.model.interface import AnyJoint
+from problems.model.joint import TOOL, Faults
 
 
 class RigidTool(PartEffect, GapEffect):
@@ -26,12 +29,15 @@ class RigidTool(PartEffect, GapEffect):
     def contacts(self) -> tuple[Pair, ...]:
         return ((self.part, TOOL),)
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         if any(isinstance(other, RigidTool) and other.part == self.part for other in others):
             yield "part", self.part, "one rigid_tool per part: another one faces this part"
 
-    def gap(self, joint: Joint) -> Vector:
-        crest = self.crest or (joint.junction.length / 2, joint.junction.width / 2)
-        away = 0.5 * (joint.nodes - crest) ** 2 @ self.curvature
-        return at_contacts(self.distance + away, self.contacts, joint)
+    def gap(self, joint: AnyJoint) -> Vector:
+        crest = self.crest or tuple(joint.bounds.mean(axis=0))
+
+        def away(pair: Pair) -> Vector:
+            return np.asarray(self.distance + 0.5 * (joint.places(pair) - crest) ** 2 @ self.curvature)
+
+        return at_contacts(away, self.contacts, joint)

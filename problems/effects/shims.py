@@ -5,10 +5,11 @@ from typing import Annotated
 
 import numpy as np
 
-from problems.forms.assembly import Mask, Vector
+from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
-from problems.model.joint import Faults, Joint
+from problems.model.effect import ContactEffect, Effect, GapEffect, Pair, at_contacts
+from problems.model.interface import AnyJoint
+from problems.model.joint import Faults
 
 
 class Shims(ContactEffect, GapEffect):
@@ -21,16 +22,19 @@ class Shims(ContactEffect, GapEffect):
     x: Annotated[tuple[Finite, Finite], "mm"]
     y: Annotated[tuple[Finite, Finite], "mm"]
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
-        if not self._covered(joint).any():
-            hx, hy = joint.x[1] - joint.x[0], joint.y[1] - joint.y[0]
-            allowed = f"ranges that contain a node; nodes are spaced {hx:g} × {hy:g} mm from (0, 0)"
+        pairs = [pair for pair in self.pairs(joint) if pair in joint.pairs]
+        if pairs and not any(self._covered(joint.places(pair)).any() for pair in pairs):
+            allowed = f"ranges that contain a node; {joint.spacing}"
             yield "x, y", [list(self.x), list(self.y)], allowed
 
-    def _covered(self, joint: Joint) -> Mask:
-        at_x, at_y = joint.nodes.T
+    def _covered(self, nodes: Matrix) -> Mask:
+        at_x, at_y = nodes.T
         return (self.x[0] <= at_x) & (at_x <= self.x[1]) & (self.y[0] <= at_y) & (at_y <= self.y[1])
 
-    def gap(self, joint: Joint) -> Vector:
-        return at_contacts(np.where(self._covered(joint), -self.thickness, 0.0), self.pairs(joint), joint)
+    def gap(self, joint: AnyJoint) -> Vector:
+        def filled(pair: Pair) -> Vector:
+            return np.where(self._covered(joint.places(pair)), -self.thickness, 0.0)
+
+        return at_contacts(filled, self.pairs(joint), joint)

@@ -9,7 +9,8 @@ from pydantic import Field
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite
 from problems.model.effect import Effect
-from problems.model.joint import Faults, Joint
+from problems.model.interface import AnyJoint
+from problems.model.joint import Faults
 from problems.model.part import PartLoadEffect, PartModel
 
 from .supports import Supports
@@ -24,7 +25,7 @@ class SupportShift(PartLoadEffect):
     points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=1), "mm"]
     shift: Annotated[Finite, "mm"]
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
 
         def points(kind: type[SupportShift | Supports]) -> list[tuple[float, float]]:

@@ -6,7 +6,7 @@ Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,6 +18,8 @@ from problems.input.user_matrices import NAMES, SMALL
 from . import nastran, text
 
 Data = dict[str, Any]
+Labels = np.ndarray | None
+T = TypeVar("T")
 DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 
 
@@ -27,6 +29,7 @@ class Format:
 
     read : the matrices of a file by their names in it; a single one by the file's stem. accepts : whether a
     file is of this format, where another has its suffix. omits_zeros : f and g that are zero everywhere.
+    labelled : K of a file, and the node and degree of freedom of each row (n, 2), None if it does not say so.
     """
 
     description: str
@@ -35,6 +38,7 @@ class Format:
     read: Callable[[Path], Data]
     accepts: Callable[[Path], bool] = lambda path: True
     omits_zeros: bool = False
+    labelled: Callable[[Path], tuple[Any, Labels]] | None = None
 
     @property
     def suffix(self) -> str:
@@ -57,6 +61,7 @@ FORMATS = {
         text.write_abaqus,
         text.read_abaqus,
         lambda path: not text.is_matrix_market(path),
+        labelled=text.labelled_abaqus,
     ),
     "dmig": Format(
         "a file .pch (Nastran DMIG), 10 digits",
@@ -64,6 +69,7 @@ FORMATS = {
         nastran.write_dmig,
         nastran.read_dmig,
         omits_zeros=True,
+        labelled=nastran.labelled_dmig,
     ),
     "mtx": Format(
         "a folder of Matrix Market files, bit for bit",
@@ -88,9 +94,26 @@ def read(path: Path) -> Data:
     """
     if not path.is_file():
         raise InputError.one(path, "file", str(path), "no such file")
+    found = _read(path, format_of(path).read)
+    return {name: vector(M) if name in ("f", "g") else M for name, M in found.items()}
+
+
+def read_stiffness(path: Path) -> tuple[Any, Labels]:
+    """K of a file, or its only matrix, and the node and degree of freedom of each row, if the file says them.
+
+    Raises InputError.
+    """
+    if path.is_file() and (labelled := format_of(path).labelled):
+        return _read(path, labelled)
+    found = read(path)
+    if "K" not in found and len(found) != 1:
+        raise InputError.one(path, "matrices", list(found), "a matrix K, or one matrix alone")
+    return found.get("K", next(iter(found.values()))), None
+
+
+def _read(path: Path, read: Callable[[Path], T]) -> T:
     try:
-        found = format_of(path).read(path)
-        return {name: vector(M) if name in ("f", "g") else M for name, M in found.items()}
+        return read(path)
     except InputError:
         raise
     except Exception as error:  # of the libraries, which raise whatever a damaged file leads to

@@ -85,6 +85,17 @@ def read_dmig(path: Path) -> dict[str, Any]:
     return data
 
 
+def labelled_dmig(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """K, or the only matrix of a file, and (n, 2) the point and component of each row."""
+    found = pyyeti(path).rddmig(str(path))
+    if "k" not in found and len(found) != 1:
+        raise InputError.one(path, "matrices", list(found), "a matrix K, or one matrix alone")
+    frame = found.get("k", next(iter(found.values())))
+    if not frame.index.equals(frame.columns):
+        raise InputError.one(path, "K", "other points in rows than in columns", "a square matrix")
+    return frame.to_numpy(), np.array([*map(tuple, frame.index)], dtype=np.intp)
+
+
 def _points(count: int) -> pd.MultiIndex:
     import pandas as pd
 

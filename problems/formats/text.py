@@ -56,6 +56,11 @@ def write_abaqus(path: Path, data: dict[str, Any]) -> None:
 
 
 def read_abaqus(path: Path) -> dict[str, Any]:
+    return {path.stem: labelled_abaqus(path)[0]}
+
+
+def labelled_abaqus(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
+    """K, and (n, 2) the node and degree of freedom of each row where the file says them."""
     rows = _rows(path)
     unknowns, place = np.unique(np.vstack(np.hsplit(rows[:, :-1], 2)), axis=0, return_inverse=True)
     i, j = place.reshape(2, -1)
@@ -63,7 +68,8 @@ def read_abaqus(path: Path) -> dict[str, Any]:
     K = sp.csr_array(sp.coo_array((rows[:, -1], (i, j)), shape=(n, n)))
     if sp.tril(K, -1).nnz == 0 or sp.triu(K, 1).nnz == 0:
         K = K + K.T - sp.diags_array(K.diagonal())
-    return {path.stem: sp.csr_array(K)}
+    labels = unknowns.astype(np.intp) if unknowns.shape[1] == 2 else None
+    return sp.csr_array(K), labels
 
 
 def _rows(path: Path) -> np.ndarray:

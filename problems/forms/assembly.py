@@ -25,6 +25,7 @@ class Assembly:
     notes : sentences on what reading has rounded or symmetrised of a user's numbers.
     junction : the unknowns that are asked for, displacements in mm; None if all are. The others, of a model
         without condensation, are inner displacements, slopes and twists.
+    places : (m, 2) coordinates of the contacts in mm, where they are not those of their first unknowns.
     """
 
     K: Stiffness
@@ -33,6 +34,7 @@ class Assembly:
     parts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     junction: Indices | None = None
+    places: Matrix | None = None
 
     @property
     def n(self) -> int:
@@ -64,8 +66,8 @@ class Assembly:
     @property
     def contact_nodes(self) -> Matrix | None:
         """(m, 2) coordinates of the contacts in mm: those of the first unknown of each."""
-        if self.nodes is None:
-            return None
+        if self.places is not None or self.nodes is None:
+            return self.places
         return self.nodes[self.A.indices[self.A.indptr[:-1]]]
 
 

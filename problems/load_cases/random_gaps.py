@@ -14,7 +14,7 @@ from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix
 from problems.input.bounded import validation_faults
-from problems.model.effect import contacts_of
+from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
@@ -34,7 +34,7 @@ class RandomGaps(LoadCases):
     pass through, (s, 3) x, y, gap in mm.
     """
 
-    joint: Joint
+    joint: AnyJoint
     rest: LoadCase
     field: InitialGap
     seed: int
@@ -59,7 +59,7 @@ class RandomGaps(LoadCases):
         if self._scan is not None:
             random = np.random.default_rng((seed, 1))
             for pair in self.field.pairs(self.joint):
-                own = contacts_of(pair, self.joint)
+                own = self.joint.span(pair)
                 gap[own] = self._scan.through(gap[own], sd, random)
         return LoadCase(self.rest.f, self.rest.g + gap)
 
@@ -68,6 +68,7 @@ class RandomGaps(LoadCases):
         if self.points is None:
             return None
         assert self.field.random is not None
+        assert isinstance(self.joint, Joint)
         return Scan.of(self.joint, self.points, self.field.random.correlation_length)
 
 
@@ -99,7 +100,7 @@ def random_gaps(
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
     options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    points = None if around is None else read_scan(around, scene.joint)
+    points = None if around is None else _scan_of(around, scene)
     usual = None if points is None else float(points[:, 2].mean())
     if any(effect.kind == "measured_gap" for effect in scene.effects):
         if around is not None:
@@ -117,3 +118,12 @@ def random_gaps(
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = [effect for effect in scene.effects if effect not in found]
     return RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)
+
+
+def _scan_of(path: Path, scene: JointScene) -> Matrix:
+    if not isinstance(scene.joint, Joint):
+        allowed = (
+            "needs a joint of plates; for superelements give a measured_gap, or a table of gaps (--gaps)"
+        )
+        raise InputError.one(f"scene {scene.name}", "--around", str(path), allowed)
+    return read_scan(path, scene.joint)

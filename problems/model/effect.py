@@ -18,7 +18,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -27,10 +27,9 @@ from pydantic import Field
 
 from problems.forms.assembly import Matrix, Vector
 
-from .joint import TOOL, Faults, Joint, Table
+from .interface import AnyJoint, Pair
+from .joint import TOOL, Faults, Table
 from .plate import Plate, Range
-
-Pair = tuple[str, str]
 
 #: A contact, or None for all. None is left out of a scene's key, as if the parameter did not exist.
 Between = Annotated[Pair | None, Field(exclude_if=lambda pair: pair is None)]
@@ -62,11 +61,15 @@ class Effect(Table):
         """The contacts that this effect adds."""
         return ()
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def parts(self, joint: AnyJoint) -> tuple[str, ...]:
+        """The parts on which it acts."""
+        return joint.names
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         """Of parameters that do not fit the joint, or contradict the other effects of the scene."""
         yield from ()
 
-    def unusual(self, joint: Joint) -> Faults:
+    def unusual(self, joint: AnyJoint) -> Faults:
         """What may be, but is rarely meant: key, value, what is usual."""
         yield from ()
 
@@ -76,7 +79,10 @@ class PartEffect(Effect):
 
     part: str
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def parts(self, joint: AnyJoint) -> tuple[str, ...]:
+        return (self.part,)
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         yield from unknown_part(self.part, joint)
 
@@ -86,14 +92,18 @@ class ContactEffect(Effect):
 
     between: Between = None
 
-    def pairs(self, joint: Joint) -> tuple[Pair, ...]:
+    def pairs(self, joint: AnyJoint) -> tuple[Pair, ...]:
         """The contacts that it acts on."""
         return joint.pairs if self.between is None else (self.between,)
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def parts(self, joint: AnyJoint) -> tuple[str, ...]:
+        named = (part for pair in self.pairs(joint) for part in pair)
+        return tuple(dict.fromkeys(part for part in named if part in joint.names))
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
         if not joint.pairs:
-            needs = f"needs a contact, but {joint.part[0].name} is the only part"
+            needs = f"needs a contact, but {joint.names[0]} is the only part"
             yield "between", self.between, f'{needs}: add a part, a rigid_tool or "tool" in contacts'
         elif self.between is not None and self.between not in joint.pairs:
             yield "between", list(self.between), f"one of the contacts {[list(pair) for pair in joint.pairs]}"
@@ -116,11 +126,11 @@ class StiffnessEffect(PartEffect):
     def stiffness(self, plate: Plate) -> sp.csr_array:
         """(plate.size, plate.size) term in N/mm, coupling only neighbouring grid lines y = const."""
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
-        for part in joint.part:
-            if part.name == self.part:
-                yield from self.misfits(joint.plate(part))
+        if self.part in joint.names:
+            plate = joint.plate_of(self.part)
+            yield from self.misfits(plate) if plate is not None else no_elements(self, joint)
 
     def misfits(self, plate: Plate) -> Faults:
         """Of parameters that do not fit the part."""
@@ -131,10 +141,10 @@ class ForceEffect(Effect):
     """Adds nodal forces in the junction."""
 
     @abstractmethod
-    def force(self, joint: Joint) -> Vector:
+    def force(self, joint: AnyJoint) -> Vector:
         """(n,) forces in N, positive from the first part of a pair towards the second."""
 
-    def marks(self, joint: Joint) -> Matrix:
+    def marks(self, joint: AnyJoint) -> Matrix:
         """(k, 2) points to mark in figures of the junction, mm."""
         return np.zeros((0, 2))
 
@@ -143,7 +153,7 @@ class GapEffect(Effect):
     """Adds to the initial gap."""
 
     @abstractmethod
-    def gap(self, joint: Joint) -> Vector:
+    def gap(self, joint: AnyJoint) -> Vector:
         """(m,) gap in mm."""
 
 
@@ -151,42 +161,55 @@ class SpringEffect(ForceEffect):
     """Adds springs between parts at points of the junction: K += T diag(k) Tᵀ, after condensation."""
 
     @abstractmethod
-    def tied(self, joint: Joint) -> list[Pair]:
+    def tied(self, joint: AnyJoint) -> list[Pair]:
         """The pairs that its springs join, each at all of its marks: the order of the columns of T."""
 
     @abstractmethod
-    def springs(self, joint: Joint) -> tuple[sp.csc_array, Vector]:
+    def springs(self, joint: AnyJoint) -> tuple[sp.csc_array, Vector]:
         """T (n, r), one column per spring with its direction, and k (r,) in N/mm."""
 
 
-def contacts_of(pair: Pair, joint: Joint) -> slice:
-    """The contacts of a pair, as a slice of g and λ."""
-    start = joint.pairs.index(pair) * joint.node_count
-    return slice(start, start + joint.node_count)
-
-
-def at_contacts(values: Vector | float, pairs: Sequence[Pair], joint: Joint) -> Vector:
-    """g (m,) with these values, (node_count,), at the contacts of each pair, and 0 at the others."""
+def at_contacts(values: Callable[[Pair], Vector | float], pairs: Sequence[Pair], joint: AnyJoint) -> Vector:
+    """g (m,) with these values, (c,), at the contacts of each pair, and 0 at the others."""
     g = np.zeros(joint.size[1])
     for pair in pairs:
-        g[contacts_of(pair, joint)] = values
+        g[joint.span(pair)] = values(pair)
     return g
 
 
-def pressing_forces(nodal: Vector, pairs: Sequence[Pair], joint: Joint) -> Vector:
-    """f (n,) for nodal forces (node_count,), N, that press the two parts of each pair together."""
+def pressing_forces(
+    acting: Callable[[Pair], Iterable[tuple[Matrix, float]]], pairs: Sequence[Pair], joint: AnyJoint
+) -> Vector:
+    """f (n,) of forces that press the two parts of each pair together along the normal of the first.
+
+    acting : gives points (k, 2), mm, and the force at each of them, N.
+    """
     f = np.zeros(joint.size[0])
-    for first, second in pairs:
-        f[joint.unknowns(first)] += nodal
-        if second != TOOL:
-            f[joint.unknowns(second)] -= nodal
+    for pair in pairs:
+        presses = list(acting(pair))
+        for part, sign in sides(pair):
+            nodal = np.zeros(f[joint.unknowns(part)].shape)
+            for points, newton in presses:
+                nodal += newton * joint.deflection(part, points, pair[0]).sum(axis=0)
+            f[joint.unknowns(part)] += sign * nodal
     return f
 
 
-def unknown_part(part: str, joint: Joint) -> Faults:
-    names = [p.name for p in joint.part]
-    if part not in names:
-        yield "part", part, f"one of {names}"
+def sides(pair: Pair) -> list[tuple[str, float]]:
+    """The parts of a pair, without a tool, and their signs in a column of A."""
+    return [(part, sign) for part, sign in zip(pair, (1.0, -1.0), strict=True) if part != TOOL]
+
+
+def unknown_part(part: str, joint: AnyJoint) -> Faults:
+    if part not in joint.names:
+        yield "part", part, f"one of {list(joint.names)}"
+
+
+def no_elements(effect: PartEffect, joint: AnyJoint) -> Faults:
+    """Of an effect that acts on the elements of its part."""
+    if effect.part in joint.names and joint.plate_of(effect.part) is None:
+        kind = f"a superelement has no elements for {effect.kind} to act on: put it into its K"
+        yield "part", effect.part, kind
 
 
 def effect_kinds() -> list[str]:

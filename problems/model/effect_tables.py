@@ -17,7 +17,8 @@ from problems.errors import Fault, InputError
 from problems.input.bounded import regular_file, unknown, validation_faults
 
 from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
-from .joint import Faults, Joint
+from .interface import AnyJoint
+from .joint import Faults
 
 CSV_MIB = 100
 UNIT = re.compile(r"[\s_]*(?:mm|\[\s*mm\s*\]|\(\s*mm\s*\))$", re.IGNORECASE)
@@ -82,7 +83,7 @@ class EffectTable:
                     yield fault
         yield from self.rows.faults if self.rows else ()
 
-    def misfits(self, joint: Joint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
+    def misfits(self, joint: AnyJoint, tables: Sequence[EffectTable]) -> Iterator[Fault]:
         """The faults with respect to the joint and to the effects of the other tables."""
         found: Faults = iter(())
         if self.effect is not None:
@@ -111,6 +112,17 @@ class EffectTable:
         return bool(self.rows and self.rows.faults and key in ("", "points"))
 
 
+def headings(path: Path) -> list[str]:
+    """The columns of a file, in small letters and without units; none if it cannot be read."""
+    try:
+        with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
+            first = file.readline()
+    except (InputError, OSError, UnicodeDecodeError):
+        return []
+    header: list[str] = next(csv.reader([first], delimiter=_delimiter(first)), [])
+    return [_heading(cell) for cell in header]
+
+
 def read_columns(path: Path, headings: Mapping[str, str]) -> Rows:
     """The columns of a file, row by row, by name and heading; others are ignored. Bad rows are faults.
 
@@ -122,7 +134,7 @@ def read_columns(path: Path, headings: Mapping[str, str]) -> Rows:
     try:
         with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
             first = file.readline()
-            delimiter = next((mark for mark in ";\t" if mark in first), ",")
+            delimiter = _delimiter(first)
             file.seek(0)
             _read(csv.reader(file, delimiter=delimiter), delimiter, headings, read)
     except InputError as error:
@@ -160,6 +172,10 @@ def _read(reader: Any, delimiter: str, headings: Mapping[str, str], read: Rows) 
             read.faults.append(Fault(str(read.path), f"line {reader.line_num}", line, allowed))
     if not read.rows and not read.faults:
         read.faults.append(Fault(str(read.path), "rows", 0, "at least one row below the header"))
+
+
+def _delimiter(header: str) -> str:
+    return next((mark for mark in ";\t" if mark in header), ",")
 
 
 def _heading(cell: str) -> str:

@@ -11,23 +11,25 @@ y = −south.length          └──────────────┘
 """
 
 import itertools
-from collections.abc import Iterator
-from typing import Annotated, Literal
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import scipy.sparse as sp
 from pydantic import BaseModel, ConfigDict, Field
 
-from problems.forms.assembly import Indices, Matrix, Vector
+from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded import Name, Positive
 
 from .plate import Plate
+from .surface import Grid
 
 MOST = 100_000  # grid lines; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]
 SHORT = 20.0  # mm, a junction that may have been given in metres
 SOFT, STIFF = 1e3, 1e6  # N/mm², around the moduli of plastics and metals
 TOOL = "tool"  # the second of a contact pair: a rigid surface
+Pair = tuple[str, str]
 #: (key, value, what is allowed)
 Faults = Iterator[tuple[str, object, str]]
 
@@ -73,13 +75,23 @@ class Joint(Table):
 
     junction: Junction
     part: Annotated[tuple[Part, ...], Field(min_length=1, max_length=100)]
-    contacts: tuple[tuple[str, str], ...] = ()
+    contacts: tuple[Pair, ...] = ()
 
     @property
-    def pairs(self) -> tuple[tuple[str, str], ...]:
+    def names(self) -> tuple[str, ...]:
+        return tuple(part.name for part in self.part)
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
         """The contacts; by default each part with the next one, so none if there is one part."""
-        names = [part.name for part in self.part]
-        return self.contacts or tuple(itertools.pairwise(names))
+        return self.contacts or tuple(itertools.pairwise(self.names))
+
+    def with_contacts(self, pairs: tuple[Pair, ...]) -> Self:
+        return self.model_copy(update={"contacts": pairs})
+
+    @property
+    def content(self) -> Any:
+        return self.model_dump(mode="json")
 
     @property
     def node_count(self) -> int:
@@ -105,24 +117,81 @@ class Joint(Table):
         X, Y = np.meshgrid(self.x, self.y)
         return np.column_stack([X.ravel(), Y.ravel()])
 
+    @property
+    def bounds(self) -> Matrix:
+        return np.array([[0.0, 0.0], [self.junction.length, self.junction.width]])
+
+    @property
+    def region(self) -> str:
+        return f"on the junction, 0 … {self.junction.length:g} × 0 … {self.junction.width:g} mm"
+
+    @property
+    def spacing(self) -> str:
+        hx, hy = self.x[1] - self.x[0], self.y[1] - self.y[0]
+        return f"nodes are spaced {hx:g} × {hy:g} mm from (0, 0)"
+
+    @property
+    def thinnest(self) -> float:
+        return min(part.thickness for part in self.part)
+
+    @property
+    def shortest(self) -> float:
+        return 0.0
+
+    @property
+    def shown(self) -> None:
+        return None
+
+    @property
+    def surface(self) -> Grid:
+        return Grid(self.x, self.y)
+
     def weights(self, points: Matrix) -> sp.csr_array:
         """W (k, node_count), bilinear on each element: Wv are the values at points (k, 2) in mm of a field
         with the values v at the junction nodes; Wᵀp are nodal forces with the resultant and moments of forces
         p at the points.
         """
-        (ix, s), (iy, t) = (_within(grid, at) for grid, at in zip((self.x, self.y), points.T, strict=True))
-        nx, k = len(self.x), len(points)
-        corners = iy * nx + ix + np.array([[0], [1], [nx], [nx + 1]])
-        shares = np.stack([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t])
-        entries = shares.ravel(), (np.tile(np.arange(k), 4), corners.ravel())
-        W = sp.csr_array(sp.coo_array(entries, shape=(k, self.node_count)))
-        W.eliminate_zeros()
-        return W
+        return self.surface.weights(points)
+
+    def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
+        """All normals are those of the junction."""
+        return self.weights(points)
+
+    def covers(self, parts: tuple[str, ...], points: Matrix) -> Mask:
+        return self.surface.covers(points)
+
+    def areas(self, part: str) -> Vector:
+        return self.surface.areas
 
     def unknowns(self, part: str) -> slice:
         """The part's displacements, as a slice of x."""
-        index = [p.name for p in self.part].index(part)
+        index = self.names.index(part)
         return slice(index * self.node_count, (index + 1) * self.node_count)
+
+    def span(self, pair: Pair) -> slice:
+        """The contacts of a pair, as a slice of g and λ."""
+        start = self.pairs.index(pair) * self.node_count
+        return slice(start, start + self.node_count)
+
+    def places(self, pair: Pair) -> Matrix:
+        return self.nodes
+
+    def nodes_of(self, part: str) -> Matrix:
+        return self.nodes
+
+    def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
+        return self.x, self.y
+
+    def from_grid(self, pair: Pair, values: Matrix) -> Vector:
+        return values.ravel()
+
+    def plate_of(self, part: str) -> Plate | None:
+        return self.plate(self.part[self.names.index(part)])
+
+    def outline(self, part: str) -> tuple[list[float], tuple[str, ...]]:
+        own = self.part[self.names.index(part)]
+        y = self.plate(own).y
+        return [0.0, self.junction.length, y[0], y[-1]], own.clamped
 
     def contact_matrix(self) -> sp.csc_array:
         """A, (n, m): +1 for the first part of a pair, −1 for the second unless that is the tool."""
@@ -154,20 +223,11 @@ class Joint(Table):
 
     def faults(self) -> Faults:
         """Those that the types cannot catch."""
-        names = [part.name for part in self.part]
-        if len(set(names)) < len(names) or TOOL in names:
-            yield "part.name", names, f'each part needs a unique name other than "{TOOL}"'
         for part in self.part:
             for edge in part.clamped:
                 if getattr(part, edge) is None:
                     yield f"part.{part.name}.clamped", edge, f"needs an extension to the {edge}"
-        for pair in self.contacts:
-            if pair[0] not in names or pair[1] not in (*names, TOOL) or pair[0] == pair[1]:
-                yield "contacts", list(pair), f'two different parts of {names}; the second may be "{TOOL}"'
-        # Q = AᵀK⁻¹A is positive definite only if no contact is implied by others.
-        sides = [[(name == a) - (name == b) for name in names] for a, b in self.pairs]
-        if self.pairs and np.linalg.matrix_rank(sides) < len(sides):
-            yield "contacts", [list(pair) for pair in self.pairs], "no pair twice, no closed chain of pairs"
+        yield from wrong_contacts(self.names, self.contacts, self.pairs)
 
     def unusual(self) -> Faults:
         """What may be, but is rarely meant: key, value, what is usual."""
@@ -183,9 +243,15 @@ class Joint(Table):
                 yield f"part.{part.name}.young", part.young, metals
 
 
-def _within(grid: Vector, at: Vector) -> tuple[Indices, Vector]:
-    """The element in which each point lies, and how far along it, 0 … 1, to 12 digits: what was meant to be
-    at a node is there.
-    """
-    element = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
-    return element, np.round((at - grid[element]) / np.diff(grid)[element], 12)
+def wrong_contacts(names: Sequence[str], contacts: Sequence[Pair], pairs: Sequence[Pair]) -> Faults:
+    """Of parts of these names. contacts : those that are named; pairs : those that there are."""
+    known = list(names)
+    if len(set(known)) < len(known) or TOOL in known:
+        yield "part.name", known, f'each part needs a unique name other than "{TOOL}"'
+    for pair in contacts:
+        if pair[0] not in known or pair[1] not in (*known, TOOL) or pair[0] == pair[1]:
+            yield "contacts", list(pair), f'two different parts of {known}; the second may be "{TOOL}"'
+    # Q = AᵀK⁻¹A is positive definite only if no contact is implied by others.
+    sides = [[(name == a) - (name == b) for name in known] for a, b in pairs]
+    if pairs and np.linalg.matrix_rank(sides) < len(sides):
+        yield "contacts", [list(pair) for pair in pairs], "no pair twice, no closed chain of pairs"

@@ -16,10 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from problems import storage
-from problems.forms.assembly import Assembly, Indices, LoadCase, Matrix, Vector
+from problems.forms.assembly import Assembly, Indices, LoadCase
 from problems.forms.problem import Progress, silent
 from problems.forms.stages import DensePrepared, SparsePrepared, indefinite
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
@@ -27,10 +26,12 @@ from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse import sparse_block
 from problems.storage import fingerprint
 
-from .effect import Effect, ForceEffect, GapEffect, SpringEffect
+from .effect import Effect, ForceEffect, GapEffect
+from .joint import Joint
 from .numbering import Numbering
 from .part import PartLoadEffect, PartModel, graded
 from .scene import JointScene
+from .springs import Springs
 
 CODE = ("problems/model", "problems/effects")
 WORTH = 0.5  # of the work on the inverse near the diagonal: a coarser model that saves less is none
@@ -41,12 +42,16 @@ class JointModel:
     """The parts of a scene as finite elements."""
 
     scene: JointScene
+    joint: Joint
     parts: tuple[PartModel, ...]
 
     @classmethod
     def of(cls, scene: JointScene) -> JointModel:
         joint = scene.joint
-        return cls(scene, tuple(PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part))
+        assert isinstance(joint, Joint)
+        return cls(
+            scene, joint, tuple(PartModel.of(joint, part, scene.stiffness_effects) for part in joint.part)
+        )
 
     def sparse(self) -> SparsePrepared:
         """K̂ and B. Raises InputError, where factors are first needed, if K̂ is not positive definite."""
@@ -63,13 +68,13 @@ class JointModel:
         from .condense import part_key  # of the dense forms only
 
         known = [*map(part_key, self.parts)]
-        if self.springs is not None:
-            known.append(self._spring_key(storage.digest(known)))
+        if self.springs:
+            known.append(self.springs.key(storage.digest(known)))
         return None not in map(storage.load, known) and self.dense().built
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
-        joint, given = self.scene.joint, self.scene.effects if effects is None else tuple(effects)
+        joint, given = self.joint, self.scene.effects if effects is None else tuple(effects)
         f, g = np.zeros(self.numbering.size if sparse else joint.size[0]), np.zeros(joint.size[1])
         here = self.junction if sparse else slice(None)
         for effect in given:
@@ -92,7 +97,7 @@ class JointModel:
 
     def graded(self) -> JointModel:
         """A coarser model with the same junction, for a preconditioner."""
-        return JointModel(self.scene, tuple(map(graded, self.parts)))
+        return JointModel(self.scene, self.joint, tuple(map(graded, self.parts)))
 
     @property
     def work(self) -> float:
@@ -100,24 +105,13 @@ class JointModel:
         return float(sum(len(part.free_lines) ** 3 for part in self.parts))
 
     @cached_property
-    def springs(self) -> tuple[sp.csc_array, Vector] | None:
-        """Directions T (n, r), stiffnesses k (r,) N/mm of the springs between parts: K + T diag(k) Tᵀ."""
-        pairs = [effect.springs(self.scene.joint) for effect in self.scene.effects_of(SpringEffect)]
-        if not pairs:
-            return None
-        return sp.csc_array(sp.hstack([T for T, _ in pairs])), np.concatenate([k for _, k in pairs])
+    def springs(self) -> Springs:
+        return Springs.of(self.scene)
 
-    @cached_property
+    @property
     def tied(self) -> list[list[int]]:
         """The parts of each block of K̂: parts that springs join are one block."""
-        count = len(self.parts)
-        linked = sp.lil_array((count, count))
-        if self.springs is not None:
-            T = self.springs[0]
-            part = T.indices // self.scene.joint.node_count
-            linked[part[T.indptr[:-1]].repeat(np.diff(T.indptr)), part] = 1
-        _, label = connected_components(sp.csr_array(linked), directed=False)
-        return [np.flatnonzero(label == k).tolist() for k in dict.fromkeys(label.tolist())]
+        return self.springs.tied
 
     @cached_property
     def numbering(self) -> Numbering:
@@ -135,18 +129,17 @@ class JointModel:
         ends = np.cumsum([0, *self.numbering.sizes])
         for parts, start, stop in zip(self.tied, ends[:-1], ends[1:], strict=True):
             K = self._block(parts, int(start), int(stop - start))
-            if self.springs is not None:
-                T, k = self.springs
-                T_here = self._at_junction(T)[start:stop]
-                added = T_here @ sp.diags_array(k) @ T_here.T
+            if self.springs:
+                T_here = self._at_junction(self.springs.T)[start:stop]
+                added = T_here @ sp.diags_array(self.springs.k) @ T_here.T
                 K = K + (added + added.T) / 2  # the order of products is another in K_ji: proofs see it
             blocks.append(sp.csc_array(K))
-        B, nodes = self._at_junction(self.scene.joint.contact_matrix()), self._nodes()
+        B, nodes = self._at_junction(self.joint.contact_matrix()), self._nodes()
         names = self._names(self.tied)
         return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, names, junction=self.junction)
 
     def _names(self, blocks: Iterable[Iterable[int]]) -> tuple[str, ...]:
-        return tuple(" + ".join(self.scene.joint.part[part].name for part in parts) for parts in blocks)
+        return tuple(" + ".join(self.joint.part[part].name for part in parts) for parts in blocks)
 
     def _block(self, parts: list[int], start: int, size: int) -> sp.csc_array:
         """The stiffness of some parts, (size, size), on the unknowns from `start` on."""
@@ -200,7 +193,7 @@ class JointModel:
         """
         from .condense import condensed_stiffness, part_key  # of the dense forms only
 
-        joint, source_of = self.scene.joint, self.scene.source_of
+        joint, source_of = self.joint, self.scene.source_of
         blocks, seconds, keys = [], {}, [*map(part_key, self.parts)]
         for part, key, own in zip(joint.part, keys, self.parts, strict=True):
             say = partial(progress, f"condensing {part.name}")
@@ -211,49 +204,9 @@ class JointModel:
             blocks.append(K)
         groups, key = [[k] for k in range(len(blocks))], storage.digest(keys)
         before = {"condensation": sum(seconds.values())}
-        if self.springs is not None:
-            groups, key = self._ranges(), self._spring_key(key)
-            blocks, before["ties"] = self._with_springs(key, blocks, groups, progress)
+        if self.springs:
+            groups, key = self.springs.ranges, self.springs.key(key)
+            blocks, before["ties"] = self.springs.blocks(key, blocks, progress)
         nodes = np.tile(joint.nodes, (len(joint.part), 1))
         assembly = Assembly(Stiffness.of(*blocks), joint.contact_matrix(), nodes, self._names(groups))
         return DensePrepared(assembly, key, before, source_of, progress)
-
-    def _ranges(self) -> list[list[int]]:
-        """The parts of each dense block, consecutive: from the first to the last that springs join."""
-        ranges: list[list[int]] = []
-        for parts in sorted(self.tied):
-            if ranges and parts[0] <= ranges[-1][-1]:
-                ranges[-1] = list(range(ranges[-1][0], max(ranges[-1][-1], parts[-1]) + 1))
-            else:
-                ranges.append(list(range(parts[0], parts[-1] + 1)))
-        return ranges
-
-    def _spring_key(self, key: str) -> str:
-        assert self.springs is not None
-        T, k = self.springs
-        code = fingerprint([Path(__file__)])
-        return storage.digest("springs", key, T.indices.tolist(), T.data.tolist(), k.tolist(), code)
-
-    def _with_springs(
-        self, key: str, parts: list[Matrix], groups: list[list[int]], progress: Progress
-    ) -> tuple[list[Matrix], float]:
-        """The blocks of K + T diag(k) Tᵀ, and the seconds in which they were made."""
-        assert self.springs is not None
-        T, k = self.springs
-
-        def made() -> storage.Entry:
-            progress("springs between the parts", 0.0)
-            start, count = time.perf_counter(), self.scene.joint.node_count
-            added = sp.csr_array(T @ sp.diags_array(k) @ T.T)
-            arrays = {}
-            for b, group in enumerate(groups):
-                rows = slice(group[0] * count, (group[-1] + 1) * count)
-                K = added[rows, rows].toarray(order="F")
-                for place, part in enumerate(group):
-                    own = slice(place * count, (place + 1) * count)
-                    K[own, own] += parts[part]
-                arrays[f"K{b}"] = K
-            return arrays, {"seconds": time.perf_counter() - start}
-
-        arrays, facts = storage.load_or_make(key, made)
-        return [arrays[f"K{b}"] for b in range(len(groups))], facts["seconds"]

@@ -13,7 +13,7 @@ as wide, and what costs its cube an eighth.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,8 +23,9 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Vector
 
-from .effect import PartEffect, StiffnessEffect
-from .joint import Joint, Part
+from .effect import Effect, PartEffect, StiffnessEffect, no_elements
+from .interface import AnyJoint
+from .joint import Faults, Joint, Part
 from .plate import WHOLE, LineLoads, Plate, line_loads
 
 
@@ -98,6 +99,10 @@ class PartModel:
 
 class PartLoadEffect(PartEffect):
     """Adds a load on one part, in the junction or beyond it."""
+
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
+        yield from super().faults(joint, others)
+        yield from no_elements(self, joint)
 
     @abstractmethod
     def load(self, model: PartModel) -> Vector:

@@ -12,7 +12,8 @@ from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, NotNegative
 
 from .effect import Effect, ForceEffect
-from .joint import Faults, Joint, Table
+from .interface import AnyJoint
+from .joint import Faults, Table
 
 FORCES = ("preload", "clamping_force")  # keys of the effects that press at points
 TEARS = 400.0  # N/mm² of the square of a thickness: the yield stress of an aluminium alloy
@@ -43,36 +44,39 @@ class Positions(ForceEffect):
             raise ValueError("give exactly one of points, file and pattern")
         return self
 
-    def marks(self, joint: Joint) -> Matrix:
+    def marks(self, joint: AnyJoint) -> Matrix:
         """(k, 2) coordinates in mm."""
         if self.pattern is None:
             return np.array(self.points)
-        x = _spread(joint.junction.length, self.pattern.edge, self.pattern.columns)
-        y = _spread(joint.junction.width, self.pattern.edge, self.pattern.rows)
-        if self.pattern.on_nodes:
-            x, y = (grid[abs(at[:, None] - grid).argmin(axis=1)] for at, grid in ((x, joint.x), (y, joint.y)))
+        low, high = joint.bounds
+        counts = self.pattern.columns, self.pattern.rows
+        spread = zip(low, high - low, counts, strict=True)
+        x, y = (start + _spread(size, self.pattern.edge, count) for start, size, count in spread)
         X, Y = np.meshgrid(x, y)
-        return np.column_stack([X.ravel(), Y.ravel()])
+        places = np.column_stack([X.ravel(), Y.ravel()])
+        if not self.pattern.on_nodes:
+            return places
+        nodes = joint.nodes_of(joint.names[0])
+        return nodes[((places[:, None] - nodes) ** 2).sum(axis=2).argmin(axis=1)]
 
-    def unusual(self, joint: Joint) -> Faults:
-        thinnest = min(part.thickness for part in joint.part)
+    def unusual(self, joint: AnyJoint) -> Faults:
+        thinnest = joint.thinnest
         for key in FORCES:
             force, most = getattr(self, key, 0.0), TEARS * thinnest**2
             if force > most:
                 yield key, force, f"at most {most:g} N on {thinnest:g} mm: it would tear the part"
 
-    def faults(self, joint: Joint, others: Sequence[Effect] = ()) -> Faults:
+    def faults(self, joint: AnyJoint, others: Sequence[Effect] = ()) -> Faults:
         yield from super().faults(joint, others)
-        length, width = joint.junction.length, joint.junction.width
+        length, width = np.diff(joint.bounds, axis=0)[0].tolist()
         if pattern := self.pattern:
             spread = [size for size, n in ((length, pattern.columns), (width, pattern.rows)) if n > 1]
             if 2 * pattern.edge > min(spread, default=np.inf):
                 yield "pattern.edge", pattern.edge, f"at most half the junction, {min(spread) / 2:g} mm"
-            return
-        allowed = f"on the junction, 0 … {length:g} × 0 … {width:g} mm"
-        for k, (x, y) in enumerate(self.points):
-            if not (0 <= x <= length and 0 <= y <= width):
-                yield f"points[{k}]", [x, y], allowed
+                return
+        marks = self.marks(joint)
+        for k in np.flatnonzero(~joint.covers(self.parts(joint), marks)):
+            yield f"points[{k}]" if self.points else "pattern", marks[k].tolist(), joint.region
 
 
 def _spread(size: float, edge: float, count: int) -> Vector:

@@ -13,7 +13,8 @@ from problems.forms.assembly import Assembly, LoadCase, Matrix, Vector
 from problems.storage import digest
 
 from .effect import Effect, ForceEffect, StiffnessEffect
-from .joint import Joint, Table
+from .interface import AnyJoint
+from .joint import Table
 
 E = TypeVar("E", bound=Effect)
 
@@ -71,7 +72,7 @@ class Scene(ABC):
 class JointScene(Scene):
     """A joint and the effects that the scene includes."""
 
-    joint: Joint
+    joint: AnyJoint
     effects: tuple[Effect, ...] = ()
 
     def effects_of(self, kind: type[E]) -> Iterator[E]:
@@ -84,7 +85,7 @@ class JointScene(Scene):
 
     @property
     def assembly_key(self) -> str:
-        return digest(plain(self.joint), [plain(effect) for effect in self.stiffness_effects])
+        return digest(self.joint.content, [plain(effect) for effect in self.stiffness_effects])
 
     @property
     def key(self) -> str:

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from report.results.answers import Answer, pair_name
 
 from . import style
-from .maps import CLOSED, LARGER, RIM, Array, Map, Scale, drawn, rooted
+from .maps import CLOSED, LARGER, RIM, Array, Map, Scale, drawn, grid_of, rooted
 from .section import section_figure
 
 
@@ -72,7 +72,8 @@ def _displacement(record: dict[str, Any], arrays: dict[str, Array]) -> Figure:
         west, east, south, north = part["outline"]
         axes.spines[:].set_visible(False)
         edge: dict[str, Any] = {"edgecolor": "#666666", "facecolor": "white", "hatch": "///", "zorder": 0}
-        axes.add_patch(Rectangle((west, south), east - west, north - south, clip_on=False, **edge))
+        if grid_of(arrays["nodes"][part["start"] : part["stop"]]) is not None:
+            axes.add_patch(Rectangle((west, south), east - west, north - south, clip_on=False, **edge))
         for side, y in (("south", south), ("north", north)):
             if side in part["clamped"]:
                 axes.plot([west, east], [y, y], color="#222222", lw=3.0, clip_on=False)

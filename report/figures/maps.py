@@ -32,6 +32,7 @@ Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
 SHAPES = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 MANY = 60
 MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", "#E8112D", "#444444"
+DOTS, DOT = 4000.0, (4.0, 40.0)  # points² of all dots of a map, and of one
 THINNEST = 0.02  # a map's shorter side over its longer one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
 # inches
@@ -118,7 +119,8 @@ def draw(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappabl
     look: dict[str, Any] = {"norm": scale.norm, "cmap": scale.colours}
     grid = grid_of(nodes)
     if grid is None:
-        return axes.scatter(nodes[:, 0], nodes[:, 1], c=values, s=4, **look)
+        size = float(np.clip(DOTS / max(len(nodes), 1), *DOT))
+        return axes.scatter(nodes[:, 0], nodes[:, 1], c=values, s=size, **look)
     x, y, place = grid
     cells = np.empty(len(x) * len(y))
     cells[place] = values
@@ -126,8 +128,13 @@ def draw(axes: Axes, nodes: Array, values: Array, scale: Scale) -> ScalarMappabl
 
 
 def _outlined(axes: Axes, nodes: Array, inside: NDArray[np.bool_], colour: str, label: str) -> None:
-    """The border of some contacts, if they lie on a grid, with a dark rim, so that it shows on any colour."""
+    """The border of some contacts, or a ring around each off a grid, dark-rimmed to show on any colour."""
     grid = grid_of(nodes)
+    if grid is None and inside.any():
+        ring: dict[str, Any] = {"s": 1.5 * DOT[1], "facecolors": "none", "linewidths": 0.9}
+        if colour != RIM:
+            axes.scatter(*nodes[inside].T, **(ring | {"linewidths": 1.7}), edgecolors=RIM)
+        axes.scatter(*nodes[inside].T, **ring, edgecolors=colour, label=label)
     if grid and inside.any():
         look: dict[str, Any] = {"linewidth": 0.9}
         if colour != RIM:

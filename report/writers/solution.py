@@ -147,7 +147,7 @@ def grid_with_fields(
     record: dict[str, Any], arrays: dict[str, Any]
 ) -> tuple[Array, list[tuple[str, Any]], dict[str, Array]]:
     """Points (n, 3), cells and point data for meshio."""
-    nodes, n = arrays["nodes"], record["n"]
+    nodes, n = arrays["nodes"], len(arrays["nodes"])
     force, before, after = np.zeros(n), np.full(n, np.nan), np.full(n, np.nan)
     columns = np.repeat(np.arange(record["m"]), np.diff(arrays["A_indptr"]))
     np.add.at(force, arrays["A_indices"], arrays["A_data"] * np.nan_to_num(arrays["lam"])[columns])

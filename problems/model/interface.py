@@ -1,0 +1,105 @@
+"""What effects, pictures and commands know of a joint, whether of plates or of superelements."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import scipy.sparse as sp
+
+from problems.forms.assembly import Mask, Matrix, Vector
+
+from .joint import Faults
+from .plate import Plate
+
+Pair = tuple[str, str]
+
+
+class AnyJoint(Protocol):
+    """Parts whose displacements x (n,) may touch at m contacts: x_a − x_b ≤ g, along the normal from a to b.
+
+    Points (k, 2) are in the plane of the junction, mm. region, spacing : of points and nodes, in words.
+    thinnest : of its plates, mm; infinite if that is not known. shortest : the least correlation length, mm.
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the parts."""
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The contacts (a, b); b may be "tool"."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(n, m)."""
+
+    @property
+    def bounds(self) -> Matrix:
+        """(2, 2) the lower and the upper corner of the junction."""
+
+    @property
+    def region(self) -> str: ...
+
+    @property
+    def spacing(self) -> str: ...
+
+    @property
+    def thinnest(self) -> float: ...
+
+    @property
+    def shortest(self) -> float: ...
+
+    @property
+    def content(self) -> Any:
+        """All that determines K and A without effects, as JSON, for keys."""
+
+    @property
+    def shown(self) -> sp.csr_array | None:
+        """D (d, n): Dx are the normal displacements at the nodes, part by part; None if x is that."""
+
+    def with_contacts(self, pairs: tuple[Pair, ...]) -> AnyJoint:
+        """The same with these contacts."""
+
+    def unknowns(self, part: str) -> slice:
+        """The part's displacements, as a slice of x."""
+
+    def span(self, pair: Pair) -> slice:
+        """The contacts of a pair, as a slice of g and λ."""
+
+    def places(self, pair: Pair) -> Matrix:
+        """(c, 2) its contacts."""
+
+    def nodes_of(self, part: str) -> Matrix:
+        """The nodes (c, 2) at which Dx is given."""
+
+    def covers(self, parts: tuple[str, ...], points: Matrix) -> Mask:
+        """(k,) which points are on all of these parts."""
+
+    def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
+        """W (k, unknowns of the part): its displacements at points along the normal of the part `along`, by
+        default its own. Wᵀp are nodal forces of forces p at the points.
+        """
+
+    def areas(self, part: str) -> Vector:
+        """(unknowns of the part,) forces of a pressure of 1 N/mm² along its normals."""
+
+    def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
+        """x and y of a grid over the junction on which a random field of that length is drawn."""
+
+    def from_grid(self, pair: Pair, values: Matrix) -> Vector:
+        """(c,) at the contacts of a pair, from values (len(y), len(x)) on that grid."""
+
+    def plate_of(self, part: str) -> Plate | None:
+        """Its finite elements; None of a superelement."""
+
+    def outline(self, part: str) -> tuple[list[float], tuple[str, ...]]:
+        """[west, east, south, north] of the whole part, mm, and its edges that are clamped."""
+
+    def contact_matrix(self) -> sp.csc_array:
+        """A (n, m)."""
+
+    def faults(self) -> Faults:
+        """Those that the types cannot catch."""
+
+    def unusual(self) -> Faults:
+        """What may be, but is rarely meant: key, value, what is usual."""

@@ -1,0 +1,80 @@
+"""The contacts of two faces: each node of the first with its foot on the second.
+
+The foot of p along its normal n is p + tn, at the height of the second face there; both faces are given in
+the axes of the junction's plane, whose third one is the height.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.forms.assembly import Indices, Matrix, Vector
+
+from .surface import Surface
+
+STEPS, SETTLED = 50, 1e-10  # of the search for a foot; mm
+
+
+@dataclass(frozen=True)
+class Face:
+    """xyz (c, 3) mm and normals (c, 3) of contact nodes; the surface through them, seen from above."""
+
+    xyz: Matrix
+    normals: Matrix
+    surface: Surface
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """Of faces a and b. nodes (c,) : the contacts, as nodes of a. W (c, nodes of b) : weights of their feet.
+
+    apart (c,) : t, mm. beyond : how many nodes of a have no foot on b. far : those too far from it, by t.
+    crossed : triangles of a whose feet go round the other way.
+    """
+
+    nodes: Indices
+    W: sp.csr_array
+    apart: Vector
+    beyond: int = 0
+    far: dict[int, float] = field(default_factory=dict)
+    crossed: tuple[tuple[int, ...], ...] = ()
+
+
+def with_tool(a: Face) -> Pairing:
+    """Every node, without a second face."""
+    count = len(a.xyz)
+    return Pairing(np.arange(count), sp.csr_array((count, 0)), np.zeros(count))
+
+
+def paired(a: Face, b: Face, distance: float) -> Pairing:
+    """distance : up to which |t| two surfaces may touch, mm."""
+    t, foot = _feet(a, b)
+    on = b.surface.covers(foot)
+    near = on & (abs(t) <= distance)
+    nodes = np.flatnonzero(near)
+    far = {int(k): float(t[k]) for k in np.flatnonzero(on & ~near)}
+    corners = a.surface.triangles
+    corners = corners[near[corners].all(axis=1)]
+    u, v = (foot[corners[:, k]] - foot[corners[:, 0]] for k in (1, 2))
+    turned = corners[u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] <= 0]
+    crossed = tuple(tuple(each) for each in turned.tolist())
+    return Pairing(nodes, b.surface.weights(foot[nodes]), t[nodes], int((~on).sum()), far, crossed)
+
+
+def _feet(a: Face, b: Face) -> tuple[Vector, Matrix]:
+    """t (c,) and the feet (c, 2): from b's nearest node on, the height of b there, again and again."""
+    from scipy.spatial import cKDTree
+
+    p, n = a.xyz, a.normals
+    t = ((b.xyz[cKDTree(b.xyz).query(p)[1]] - p) * n).sum(axis=1)
+    for _ in range(STEPS):
+        q = p + t[:, None] * n
+        over = b.surface.weights(q[:, :2]) @ b.xyz[:, 2]
+        step = np.where(b.surface.covers(q[:, :2]), over - q[:, 2], 0.0) / n[:, 2]
+        t = t + step
+        if abs(step).max(initial=0.0) <= SETTLED:
+            break
+    return t, (p + t[:, None] * n)[:, :2]

@@ -1,0 +1,298 @@
+"""One part as a superelement: its stiffness K on the unknowns that another program kept, and their nodes.
+
+K u = f with u the kept displacements and rotations, N and mm. A row of K is a degree of freedom of a node: 1,
+2, 3 displacements along x, y, z; 4, 5, 6 rotations about them. A file with labels (DMIG, Abaqus' text) says
+which; in others the rows go through the nodes as their table does, and at each through `dofs`.
+
+A rigid motion r = t + ω × (p − p₀) of the nodes that K gives no force for, Kr = 0, is free: nothing holds the
+part against it but springs to other parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+from pydantic import Field
+
+from problems import storage
+from problems.errors import Fault, InputError
+from problems.formats import DENSEST, read_stiffness
+from problems.forms.assembly import Indices, Mask, Matrix, Vector
+from problems.input import matrix_files
+from problems.input.bounded import Name, regular_file
+from problems.input.user_matrices import SMALL, checked
+from problems.storage import fingerprint
+
+from .effect_tables import headings, read_columns
+from .joint import Table
+from .surface import SAME
+
+NORMAL = ("nx", "ny", "nz")
+MIB = 16_384
+UNIT = 1e-3  # by which the length of a normal may miss 1
+LOST = 0.05  # of a normal: what may be along degrees of freedom that are not kept
+FREE = 1e-9  # of the largest |K||r|: a force Kr that is none; held parts have 1e-4 and more, free ones 1e-12
+SHOWN = 10  # nodes of a message
+SHARE = 0.3  # of its largest component: what a motion is named after
+DIRECTIONS = "xyz"
+Dof = Annotated[int, Field(ge=1, le=6)]
+
+
+class SuperelementTable(Table):
+    """[[joint.part]]: the files of K and of its nodes; dofs, where the file of K does not say them."""
+
+    name: Name
+    superelement: str
+    nodes: str
+    dofs: Annotated[tuple[Dof, ...], Field(min_length=1, max_length=6)] = (3,)
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """ids (N,); xyz (N, 3) mm; normal (N, 3), of length 1; contact (N,) which are of the contact surface."""
+
+    ids: Indices
+    xyz: Matrix
+    normal: Matrix
+    contact: Mask
+
+
+@dataclass(frozen=True, eq=False)
+class Superelement:
+    """node, dof (n,) : the node, by its place in the table, and the degree of freedom of each unknown.
+
+    content : a hash of what its files hold.
+    """
+
+    name: str
+    file: Path
+    content: str
+    nodes: Nodes
+    node: Indices
+    dof: Indices
+
+    @classmethod
+    def of(cls, folder: Path, table: SuperelementTable) -> Superelement:
+        """Raises InputError with all faults of its files."""
+        path, faults, nodes, entry = folder / table.superelement, [], None, None
+        try:
+            nodes = read_nodes(folder / table.nodes)
+        except InputError as error:
+            faults += error.faults
+        try:
+            entry = stored(path)
+        except InputError as error:
+            faults += error.faults
+        if nodes is None or entry is None:
+            raise InputError(faults)
+        node, dof = _unknowns(path, folder / table.nodes, nodes, entry[0], table.dofs)
+        given = [array.tolist() for array in (nodes.xyz, nodes.normal, nodes.contact, node, dof)]
+        found = cls(table.name, path, storage.digest(_content(path), given), nodes, node, dof)
+        if (lost := found._lost).size:
+            where = f"{len(lost)} nodes of the contact surface, ids {listed(map(str, nodes.ids[lost]))}"
+            kept = (
+                "K must keep the displacement along the normal of each contact node; contact = 0 excepts one"
+            )
+            raise InputError.one(folder / table.nodes, "nodes", where, kept)
+        return found
+
+    @property
+    def key(self) -> str:
+        """Of what it adds to a model: what its files hold, and the code that reads them."""
+        return storage.digest(stored_key(self.file), self.content)
+
+    @property
+    def size(self) -> int:
+        return len(self.dof)
+
+    @property
+    def stiffness(self) -> Any:
+        """K (n, n): dense by columns and memory-mapped, or a csc_array."""
+        arrays, facts = stored(self.file)
+        return matrix_files.unpacked(arrays, "K") if facts["sparse"] else arrays["K"]
+
+    @property
+    def notes(self) -> list[str]:
+        return [f"{self.name}: {note}" for note in stored(self.file)[1]["notes"]]
+
+    @property
+    def sparse(self) -> bool:
+        return bool(stored(self.file)[1]["sparse"])
+
+    @cached_property
+    def contacts(self) -> Indices:
+        """The nodes of the contact surface."""
+        return np.flatnonzero(self.nodes.contact)
+
+    def displacements(self, direction: int) -> sp.csr_array:
+        """(contact nodes, n): picks the displacements along x, y or z (0, 1, 2); zero where none is kept."""
+        place = np.full(len(self.nodes.ids), -1)
+        place[self.contacts] = np.arange(len(self.contacts))
+        own = np.flatnonzero((self.dof == direction + 1) & (place[self.node] >= 0))
+        entries = np.ones(len(own)), (place[self.node[own]], own)
+        return sp.csr_array(entries, shape=(len(self.contacts), self.size))
+
+    @property
+    def _lost(self) -> Indices:
+        """The contact nodes along whose normal something is not kept."""
+        kept = np.zeros((len(self.nodes.ids), 6), dtype=bool)
+        kept[self.node, self.dof - 1] = True
+        lost = np.linalg.norm(np.where(kept[:, :3], 0.0, self.nodes.normal), axis=1)
+        return np.flatnonzero(self.nodes.contact & (lost > LOST))
+
+    @cached_property
+    def rigid(self) -> Matrix:
+        """(n, 6): translations along x, y, z, and rotations about them by the angle 1/size of the part."""
+        p = self.nodes.xyz - self.nodes.xyz.mean(axis=0)
+        size = np.sqrt((p**2).sum(axis=1).mean()) or 1.0
+        R = np.zeros((self.size, 6))
+        for axis in range(3):
+            turned = np.cross(np.eye(3)[axis], p) / size
+            for k in range(3):
+                along, about = self.dof == k + 1, self.dof == k + 4
+                R[along, axis] = k == axis
+                R[along, 3 + axis] = turned[self.node[along], k]
+                R[about, 3 + axis] = (k == axis) / size
+        return R
+
+    @cached_property
+    def free(self) -> Matrix:
+        """(n, r) an orthonormal basis of the rigid motions that K gives no force for."""
+        U, s, _ = np.linalg.svd(self.rigid, full_matrices=False)
+        K, Q = self.stiffness, U[:, s > 1e-9 * s[0]]
+        _, V = np.linalg.eigh(Q.T @ (K @ Q))
+        R = Q @ V
+        none = abs(K @ R).max(axis=0) <= FREE * (abs(K) @ abs(R)).max(axis=0)
+        return np.asarray(R[:, none])
+
+    def named(self, motions: Matrix) -> str:
+        """What motions (n, r), orthonormal and rigid, are: translation along z, rotation about x, …"""
+        R = self.rigid
+        sizes = np.linalg.norm(R, axis=0)
+        inside = np.linalg.norm(R - motions @ (motions.T @ R), axis=0) <= 1e-6 * sizes
+        shares = abs(sla.lstsq(R, motions)[0]).max(axis=1)
+        chosen = inside & (sizes > 0)
+        if not chosen.any():
+            chosen = shares > SHARE * shares.max()
+            if chosen[3:].any():  # about an axis somewhere else
+                chosen[:3] = False
+        words = [f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in DIRECTIONS]
+        return ", ".join(word for word, one in zip(words, chosen, strict=True) if one)
+
+
+def stored_key(path: Path) -> str:
+    """Of K in the cache: its file's bytes, and the code that reads and checks it."""
+    code = fingerprint([Path(__file__)], within=("problems/formats", "problems/input"))
+    return storage.digest("superelement", _content(path), code)
+
+
+def _content(path: Path) -> str:
+    found = path.stat()
+    return _hash(path, found.st_mtime_ns, found.st_size)
+
+
+@lru_cache(maxsize=100)
+def _hash(path: Path, changed: int, size: int) -> str:
+    return storage.digest(path.suffix, path.read_bytes())
+
+
+def stored(path: Path) -> storage.Entry:
+    """K, checked, and the labels of its rows if the file has any, from the cache. Raises InputError."""
+    regular_file(path, "superelement", MIB)
+
+    def made() -> storage.Entry:
+        given, labels = read_stiffness(path)
+        n = given.shape[0]
+        nothing = {"A": sp.csc_array((n, 0)), "f": np.zeros(n), "g": np.zeros(0)}
+        sparse = sp.issparse(given) and n > SMALL and given.nnz <= DENSEST * n**2
+        assembly, _ = checked({"K": given} | nothing, dict.fromkeys("KAfg", str(path)), sparse)
+        K = assembly.K.matrix
+        arrays = matrix_files.packed({"K": K if sparse else K.toarray(order="F")})
+        if labels is not None:
+            arrays["labels"] = labels
+        return arrays, {"notes": assembly.notes, "sparse": bool(sparse)}
+
+    return storage.load_or_make(stored_key(path), made)
+
+
+def _unknowns(
+    path: Path, table: Path, nodes: Nodes, arrays: Any, dofs: tuple[int, ...]
+) -> tuple[Indices, Indices]:
+    """The node and the degree of freedom of each row of K. Raises InputError."""
+    count = int(arrays["K_shape"][0]) if "K_shape" in arrays else len(arrays["K"])
+    if "labels" not in arrays:
+        if count != len(nodes.ids) * len(dofs):
+            rows = f"{len(nodes.ids)} nodes of {table} with the dofs {list(dofs)} are"
+            allowed = f"{rows} {len(nodes.ids) * len(dofs)} rows"
+            raise InputError.one(path, "rows of K", count, allowed)
+        return np.repeat(np.arange(len(nodes.ids)), len(dofs)), np.tile(dofs, len(nodes.ids))
+    ids, dof = np.array(arrays["labels"]).T
+    place = {int(each): k for k, each in enumerate(nodes.ids)}
+    if missing := [str(each) for each in dict.fromkeys(ids.tolist()) if each not in place]:
+        raise InputError.one(path, "nodes of K", listed(missing), f"ids of {table}")
+    if len(dofs) == 1:
+        dof = np.where(dof == 0, dofs[0], dof)  # scalar points
+    if not ((dof >= 1) & (dof <= 6)).all():
+        wrong = sorted(set(dof.tolist()) - set(range(1, 7)))
+        raise InputError.one(path, "degrees of freedom of K", wrong, "1 … 6; scalar points need one dof")
+    return np.array([place[each] for each in ids.tolist()], dtype=np.intp), dof.astype(np.intp)
+
+
+def read_nodes(path: Path) -> Nodes:
+    """A CSV with the columns id, x, y, z; nx, ny, nz, by default 0, 0, 1; contact, 1 (the default) or 0.
+
+    Raises InputError with all faults.
+    """
+    there = headings(path)
+    curved, of_surface = any(name in there for name in NORMAL), "contact" in there
+    names = ["id", "x", "y", "z", *(NORMAL if curved else ()), *(["contact"] if of_surface else [])]
+    read = read_columns(path, {name: name for name in names})
+    if read.faults:
+        raise InputError(read.faults)
+    rows = np.array(read.rows)
+    normal = rows[:, 4:7] if curved else np.tile([0.0, 0.0, 1.0], (len(rows), 1))
+    contact = rows[:, -1] == 1 if of_surface else np.ones(len(rows), dtype=bool)
+    ids, length = rows[:, 0], np.linalg.norm(normal, axis=1)
+    found = list(_wrong_nodes(ids, rows[:, 1:4], length, rows[:, -1] if of_surface else contact, contact))
+    if found:
+        raise InputError([Fault(str(path), *fault) for fault in found])
+    return Nodes(ids.astype(np.intp), rows[:, 1:4], normal / length[:, None], contact)
+
+
+def _wrong_nodes(
+    ids: Vector, xyz: Matrix, length: Vector, given: Vector | Mask, contact: Mask
+) -> Iterable[tuple[str, object, str]]:
+    from scipy.spatial import cKDTree
+
+    if (wrong := ids[(ids != np.round(ids)) | (abs(ids) > 2**53)]).size:
+        yield "id", listed(f"{each:g}" for each in wrong), "whole numbers"
+        return
+    names, counts = np.unique(ids, return_counts=True)
+    if (counts > 1).any():
+        yield "id", listed(f"{each:.0f}" for each in names[counts > 1]), "each id once"
+    if (wrong := ids[~np.isin(given, (0, 1))]).size:
+        yield "contact", f"ids {listed(f'{each:.0f}' for each in wrong)}", "0 or 1"
+    if (wrong := ids[abs(length - 1) > UNIT]).size:
+        yield "nx, ny, nz", f"ids {listed(f'{each:.0f}' for each in wrong)}", "a normal of length 1"
+    own = np.flatnonzero(contact)
+    if len(own) < 3:
+        yield "contact", len(own), "at least three nodes of the contact surface"
+        return
+    pairs = cKDTree(xyz[own]).query_pairs(SAME, output_type="ndarray")
+    if len(pairs):
+        twice = listed(f"{ids[own[i]]:.0f} and {ids[own[j]]:.0f}" for i, j in pairs)
+        yield "x, y, z", f"ids {twice}", "one node at each place of the contact surface"
+
+
+def listed(items: Iterable[str]) -> str:
+    """The first ten, and how many more."""
+    every = list(items)
+    more = f" and {len(every) - SHOWN} more" if len(every) > SHOWN else ""
+    return ", ".join(every[:SHOWN]) + more

@@ -1,0 +1,298 @@
+"""A joint of superelements: the plane of its junction, its contacts by projection, weights of points.
+
+The plane is that of x and y, if the mean normal of the first part is within 10° of z; else the plane across
+that normal, with x along the global axis x projected onto it (y, if the normal is nearly along x).
+
+A contact of the pair (a, b) is a contact node of a, at p with the normal n towards b, and its foot on b, at
+p + tn. With the weights w of b's nodes there, the parts do not overlap if
+
+    n·u_a − Σ w_j n·u_b,j ≤ g.
+
+t is not part of the gap g, which comes from the effects.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import scipy.sparse as sp
+from pydantic import Field
+
+from problems.errors import InputError
+from problems.forms.assembly import Mask, Matrix, Vector
+from problems.input.bounded import Positive
+
+from .joint import TOOL, Faults, Pair, Table, wrong_contacts
+from .pairing import Face, Pairing, paired, with_tool
+from .plate import Plate
+from .superelement import Superelement, SuperelementTable, listed
+from .surface import surface_of
+
+LEVEL = np.cos(np.radians(10.0))
+STEEP = 0.1  # the least cosine between a normal and that of the plane
+PER_LENGTH, FEWEST, MOST = 6, 4, 1000  # lines of a grid for random fields: per correlation length; in all
+
+
+class PairingTable(Table):
+    """distance : how far from each other along the normal two surfaces may be, mm."""
+
+    distance: Annotated[Positive, "mm"] = 5.0
+
+
+class SuperelementJointTable(Table):
+    """[joint] of parts that are superelements."""
+
+    pairing: PairingTable = PairingTable()
+    part: Annotated[tuple[SuperelementTable, ...], Field(min_length=1, max_length=100)]
+    contacts: tuple[Pair, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class SuperelementJoint:
+    """x are the kept unknowns of all parts, part after part. See `interface.AnyJoint`."""
+
+    parts: tuple[Superelement, ...]
+    distance: float
+    contacts: tuple[Pair, ...] = ()
+
+    @classmethod
+    def of(cls, folder: Path, table: SuperelementJointTable) -> SuperelementJoint:
+        """Raises InputError with all faults of all files."""
+        parts, faults = [], []
+        for part in table.part:
+            try:
+                parts.append(Superelement.of(folder, part))
+            except InputError as error:
+                faults += error.faults
+        if faults:
+            raise InputError(faults)
+        return cls(tuple(parts), table.pairing.distance, table.contacts)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is made from the files: a copy for another process makes it there."""
+        return {name: getattr(self, name) for name in ("parts", "distance", "contacts")}
+
+    def with_contacts(self, pairs: tuple[Pair, ...]) -> SuperelementJoint:
+        return replace(self, contacts=pairs)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(part.name for part in self.parts)
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        return self.contacts or tuple(itertools.pairwise(self.names))
+
+    @property
+    def content(self) -> Any:
+        keys = [[part.name, part.content] for part in self.parts]
+        return {"superelements": keys, "pairs": self.pairs, "distance": self.distance}
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return sum(part.size for part in self.parts), sum(len(self.places(pair)) for pair in self.pairs)
+
+    @cached_property
+    def axes(self) -> Matrix:
+        """(3, 3) the directions of x, y and the normal of the plane, row by row."""
+        first = self.parts[0]
+        normal = first.nodes.normal[first.contacts].sum(axis=0)
+        normal /= np.linalg.norm(normal) or 1.0
+        if normal[2] >= LEVEL:
+            return np.eye(3)
+        x = np.eye(3)[int(abs(normal[0]) > LEVEL)]
+        x = x - (x @ normal) * normal
+        x /= np.linalg.norm(x)
+        return np.array([x, np.cross(normal, x), normal])
+
+    @cached_property
+    def _normals(self) -> dict[str, Matrix]:
+        """(c, 3) of the contact nodes of each part, along the global axes."""
+        return {part.name: part.nodes.normal[part.contacts] for part in self.parts}
+
+    @cached_property
+    def _of(self) -> dict[str, Superelement]:
+        return {part.name: part for part in self.parts}
+
+    @cached_property
+    def faces(self) -> dict[str, Face]:
+        """In the axes of the plane. Raises ValueError if the nodes of a part are on one line."""
+        found = {}
+        for part in self.parts:
+            xyz, normals = (each[part.contacts] @ self.axes.T for each in (part.nodes.xyz, part.nodes.normal))
+            found[part.name] = Face(xyz, normals, surface_of(xyz[:, :2]))
+        return found
+
+    @cached_property
+    def pairings(self) -> dict[Pair, Pairing]:
+        def of(a: str, b: str) -> Pairing:
+            return (
+                with_tool(self.faces[a]) if b == TOOL else paired(self.faces[a], self.faces[b], self.distance)
+            )
+
+        return {pair: of(*pair) for pair in self.pairs}
+
+    def faults(self) -> Faults:
+        """Of the contacts; of files they are raised when these are read."""
+        wrong = list(wrong_contacts(self.names, self.contacts, self.pairs))
+        for part in self.parts:
+            steep = part.nodes.normal[part.contacts] @ self.axes[2] < STEEP
+            if steep.any():
+                ids = listed(map(str, part.nodes.ids[part.contacts[steep]]))
+                allowed = (
+                    "reversed? The normals of all parts point the same way, from the first to the second"
+                )
+                wrong.append(
+                    (f"part.{part.name}.nodes", f"normals of {steep.sum()} nodes, ids {ids}", allowed)
+                )
+        if not wrong:
+            try:
+                _ = self.faces
+            except ValueError as error:
+                wrong.append(("part.nodes", str(error), "at least three contact nodes off a line"))
+        yield from wrong or itertools.chain.from_iterable(map(self._wrong_pairing, self.pairs))
+
+    def _wrong_pairing(self, pair: Pair) -> Faults:
+        found, a, name = self.pairings[pair], self._of[pair[0]], " – ".join(pair)
+        if not len(found.nodes):
+            nothing = f"no node of {pair[0]} has a foot on {pair[1]}: {found.beyond} are beyond its surface"
+            near = f", {len(found.far)} too far: {self._distances(pair)}" if found.far else ""
+            yield f"contacts, {name}", nothing + near, f"pairing.distance = {self.distance:g} mm or more"
+        if found.crossed:
+            ids = [a.nodes.ids[a.contacts[list(each)]] for each in found.crossed]
+            value = listed(" and ".join(map(str, each)) for each in ids)
+            yield (
+                f"contacts, {name}",
+                f"ids {value}",
+                "neighbours whose feet are neighbours the same way round",
+            )
+
+    def _distances(self, pair: Pair) -> str:
+        a, far = self._of[pair[0]], self.pairings[pair].far
+        return listed(f"{a.nodes.ids[a.contacts[k]]} ({t:.3g} mm)" for k, t in far.items())
+
+    def unusual(self) -> Faults:
+        for pair, found in self.pairings.items():
+            name = " – ".join(pair)
+            if found.far:
+                usual = f"none: they are no contacts: {self._distances(pair)}"
+                yield f"{name}, nodes farther apart than {self.distance:g} mm", len(found.far), usual
+            if len(found.apart) and (apart := float(np.median(found.apart))) < -self.distance / 100:
+                usual = f"0 or more, with {pair[1]} on the side of {pair[0]} to which its normals point"
+                yield f"{name}, median distance along the normal", apart, usual
+
+    @cached_property
+    def bounds(self) -> Matrix:
+        every = np.concatenate([face.xyz[:, :2] for face in self.faces.values()])
+        return np.array([every.min(axis=0), every.max(axis=0)])
+
+    @property
+    def region(self) -> str:
+        (west, south), (east, north) = self.bounds
+        return f"on the contact surface of each part, within {west:g} … {east:g} × {south:g} … {north:g} mm"
+
+    @property
+    def spacing(self) -> str:
+        (west, south), (east, north) = self.bounds
+        return f"they are within {west:g} … {east:g} × {south:g} … {north:g} mm"
+
+    @property
+    def thinnest(self) -> float:
+        return np.inf
+
+    @property
+    def shortest(self) -> float:
+        return PER_LENGTH * float(np.diff(self.bounds, axis=0).max()) / MOST
+
+    def unknowns(self, part: str) -> slice:
+        index = self.names.index(part)
+        start = sum(each.size for each in self.parts[:index])
+        return slice(start, start + self.parts[index].size)
+
+    def span(self, pair: Pair) -> slice:
+        index = self.pairs.index(pair)
+        start = sum(len(self.places(each)) for each in self.pairs[:index])
+        return slice(start, start + len(self.places(pair)))
+
+    def places(self, pair: Pair) -> Matrix:
+        return self.faces[pair[0]].xyz[self.pairings[pair].nodes, :2]
+
+    def nodes_of(self, part: str) -> Matrix:
+        return self.faces[part].xyz[:, :2]
+
+    def covers(self, parts: tuple[str, ...], points: Matrix) -> Mask:
+        inside = np.ones(len(points), dtype=bool)
+        for part in parts:
+            inside &= self.faces[part].surface.covers(points)
+        return inside
+
+    def _along(self, part: str, W: sp.csr_array, normals: Matrix) -> sp.csr_array:
+        """(k, unknowns of the part): Σ_j w_ij n_i·u_j, of weights W (k, contact nodes), normals (k, 3)."""
+        own = self._of[part]
+        terms = [sp.diags_array(normals[:, d]) @ W @ own.displacements(d) for d in range(3)]
+        found = sp.csr_array(terms[0] + terms[1] + terms[2])
+        found.eliminate_zeros()
+        return found
+
+    def deflection(self, part: str, points: Matrix, along: str = "") -> sp.csr_array:
+        normals = self.faces[along or part].surface.weights(points) @ self._normals[along or part]
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        return self._along(part, self.faces[part].surface.weights(points), normals)
+
+    def areas(self, part: str) -> Vector:
+        normals = self._normals[part]
+        tilted = self.faces[part].surface.areas / (normals @ self.axes[2])
+        return np.asarray(self._own_normals(part).T @ tilted)
+
+    def _own_normals(self, part: str) -> sp.csr_array:
+        return self._along(part, sp.eye_array(len(self.faces[part].xyz), format="csr"), self._normals[part])
+
+    @cached_property
+    def shown(self) -> sp.csr_array | None:
+        D = sp.csr_array(sp.block_diag([self._own_normals(name) for name in self.names]))
+        alike = D.shape[0] == D.shape[1] and abs(D - sp.eye_array(D.shape[0])).max() == 0
+        return None if alike else D
+
+    def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
+        def lines(start: float, stop: float) -> Vector:
+            count = int(np.ceil(PER_LENGTH * (stop - start) / correlation_length - 1e-9)) + 1
+            return np.linspace(start, stop, max(count, FEWEST))
+
+        low, high = self.bounds
+        return lines(low[0], high[0]), lines(low[1], high[1])
+
+    def from_grid(self, pair: Pair, values: Matrix) -> Vector:
+        from scipy.interpolate import RectBivariateSpline
+
+        low, high = self.bounds
+        x, y = (np.linspace(low[k], high[k], values.shape[1 - k]) for k in (0, 1))
+        places = self.places(pair)
+        return np.asarray(RectBivariateSpline(y, x, values)(places[:, 1], places[:, 0], grid=False))
+
+    def plate_of(self, part: str) -> Plate | None:
+        return None
+
+    def outline(self, part: str) -> tuple[list[float], tuple[str, ...]]:
+        nodes = self.nodes_of(part)
+        return np.column_stack([nodes.min(axis=0), nodes.max(axis=0)]).ravel().tolist(), ()
+
+    def contact_matrix(self) -> sp.csc_array:
+        columns = []
+        for pair, found in self.pairings.items():
+            normals = self._normals[pair[0]][found.nodes]
+            own = sp.eye_array(len(self.faces[pair[0]].xyz), format="csr")[found.nodes]
+            rows = {pair[0]: self._along(pair[0], own, normals)}
+            if pair[1] != TOOL:
+                rows[pair[1]] = -self._along(pair[1], found.W, normals)
+            none = {part.name: sp.csr_array((len(found.nodes), part.size)) for part in self.parts}
+            columns.append(sp.hstack([(none | rows)[name] for name in self.names]))
+        if not columns:
+            return sp.csc_array((self.size[0], 0))
+        A = sp.csc_array(sp.vstack(columns).T)
+        A.sort_indices()
+        return A

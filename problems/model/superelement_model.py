@@ -1,0 +1,150 @@
+"""The model of a joint of superelements: K from their files, A from their pairing, f and g from the effects.
+
+    min ½xᵀKx − fᵀx   subject to   Aᵀx ≤ g,    K = blockdiag(K_1, …, K_p) + T diag(k) Tᵀ
+
+x are all unknowns that the parts kept; nothing is condensed. T, k are springs, of installed fasteners. They
+must hold the free rigid motions of the parts, K_i r = 0: with N a basis of these, NᵀT diag(k) TᵀN is positive
+definite.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems import storage
+from problems.errors import Fault, InputError
+from problems.formats import DENSEST
+from problems.forms.assembly import Assembly, LoadCase, Matrix
+from problems.forms.problem import Progress, silent
+from problems.forms.stages import DensePrepared, SparsePrepared
+from problems.input.user_matrices import SMALL, refuse_dependent
+from problems.stiffness.operator import Stiffness
+from problems.storage import fingerprint
+
+from .effect import Effect, ForceEffect, GapEffect
+from .scene import JointScene
+from .springs import Springs
+from .superelement_joint import SuperelementJoint
+
+HELD = 1e-9  # of the stiffest motion that springs hold: a softer one is not held
+
+
+@dataclass(frozen=True)
+class SuperelementModel:
+    """As JointModel."""
+
+    scene: JointScene
+    joint: SuperelementJoint
+
+    @classmethod
+    def of(cls, scene: JointScene) -> SuperelementModel:
+        """Raises InputError if parts are free, or if contacts depend on one another."""
+        assert isinstance(scene.joint, SuperelementJoint)
+        model = cls(scene, scene.joint)
+        model._refuse_free()
+        refuse_dependent(model.A, scene.source_of("A"))
+        return model
+
+    @cached_property
+    def A(self) -> sp.csc_array:
+        return self.joint.contact_matrix()
+
+    @cached_property
+    def springs(self) -> Springs:
+        return Springs.of(self.scene)
+
+    @property
+    def holds_sparse(self) -> bool:
+        """Whether every large K is stored as a sparse matrix, and there is one."""
+        large = [part.sparse for part in self.joint.parts if part.size > SMALL]
+        return bool(large) and all(large)
+
+    def sparse(self) -> SparsePrepared:
+        """Raises InputError also if a K is dense."""
+        start = time.perf_counter()
+        for part in self.joint.parts:
+            if part.size > SMALL and not part.sparse:
+                allowed = f"at most {DENSEST:.0%} of its entries nonzero: use --form dual or primal"
+                raise InputError.one(part.file, "K", "dense", allowed)
+        given = [sp.csc_array(part.stiffness) for part in self.joint.parts]
+        added, blocks = (self.springs.added + self.springs.added.T) / 2, []
+        for group in self.springs.ranges:
+            rows = self.springs.rows(group)
+            K = sp.block_diag([given[part] for part in group], format="csc")
+            blocks.append(sp.csc_array(K + added[rows, rows] if self.springs else K))
+        seconds = time.perf_counter() - start
+        key = storage.digest("sparse", self._key, fingerprint([Path(__file__)], ("problems/model",)))
+        return SparsePrepared(self._assembly(blocks), key, seconds, self.scene.source_of, own=True)
+
+    def dense(self, progress: Progress = silent) -> DensePrepared:
+        start = time.perf_counter()
+        blocks = [_dense(part.stiffness) for part in self.joint.parts]
+        before = {"condensation": time.perf_counter() - start}
+        if self.springs:
+            blocks, before["ties"] = self.springs.blocks(self._key, blocks, progress)
+        return DensePrepared(self._assembly(blocks), self._key, before, self.scene.source_of, progress)
+
+    @property
+    def built(self) -> bool:
+        """Whether every dense matrix is in the cache; computes nothing."""
+        return (not self.springs or storage.load(self._key) is not None) and self.dense().built
+
+    def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
+        """f (n,), N and N·mm, and g (m,) mm."""
+        joint, given = self.joint, self.scene.effects if effects is None else tuple(effects)
+        f, g = (np.zeros(size) for size in joint.size)
+        for effect in given:
+            if isinstance(effect, ForceEffect):
+                f += effect.force(joint)
+            elif isinstance(effect, GapEffect):
+                g += effect.gap(joint)
+        return LoadCase(f, g)
+
+    @property
+    def _key(self) -> str:
+        key = storage.digest("superelements", [part.key for part in self.joint.parts])
+        return self.springs.key(key) if self.springs else key
+
+    def _assembly(self, blocks: list[Any]) -> Assembly:
+        joint = self.joint
+        inplane = [(part.nodes.xyz @ joint.axes.T)[part.node, :2] for part in joint.parts]
+        nodes = np.concatenate(inplane)
+        names = tuple(" + ".join(joint.names[part] for part in group) for group in self.springs.ranges)
+        notes = tuple(note for part in joint.parts for note in part.notes)
+        places = np.concatenate([np.zeros((0, 2)), *map(joint.places, joint.pairs)])
+        return Assembly(Stiffness.of(*blocks, nodes=nodes), self.A, nodes, names, notes, places=places)
+
+    def _refuse_free(self) -> None:
+        joint, motions = self.joint, [part.free for part in self.joint.parts]
+        owner = np.repeat(np.arange(len(motions)), [N.shape[1] for N in motions])
+        if not len(owner):
+            return
+        held = self.springs.T.T @ sp.block_diag(motions, format="csr")
+        S = (held.T @ sp.diags_array(self.springs.k) @ held).toarray()
+        w, V = np.linalg.eigh((S + S.T) / 2)
+        loose = V[:, w <= HELD * max(w[-1], 0.0)]
+        faults = []
+        for k, (part, N) in enumerate(zip(joint.parts, motions, strict=True)):
+            own = loose[owner == k]
+            Q, s, _ = np.linalg.svd(own, full_matrices=False)
+            if own.size and (s > HELD).any():
+                allowed = (
+                    "no free rigid motion: hold the part before it is reduced, or by installed_fasteners"
+                )
+                faults.append(
+                    Fault(str(part.file), f"part.{part.name}", part.named(N @ Q[:, s > HELD]), allowed)
+                )
+        if faults:
+            raise InputError(faults)
+
+
+def _dense(K: Any) -> Matrix:
+    return K.toarray(order="F") if sp.issparse(K) else K

@@ -1,0 +1,137 @@
+"""Commands on a scene of superelements: init, validate, solve, two scenes, series, run, export."""
+
+import csv
+import json
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import harness
+from superelements import flat, stiffnesses, two_plates, write_part
+
+from problems.scene import read_scene
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The starter of two parts, one with three unknowns per node, one scattered; its fasteners placed."""
+    folder, joint = tmp_path_factory.mktemp("parts"), two_plates()
+    K, _ = stiffnesses(joint)
+    local = np.diag(np.tile([1e3, 2e3, 0.0], 45))
+    local[2::3, 2::3] = K
+    write_part(folder, "wing", local, flat(joint.nodes))
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 400, 11), np.linspace(0, 120, 6)))
+    inside = (x > 0) & (x < 400) & (y > 0) & (y < 120)
+    moved = np.random.default_rng(8).uniform(-6, 6, (66, 2)) * inside[:, None]
+    nodes = flat(np.column_stack([x, y]) + moved)
+    distance = np.linalg.norm(nodes[:, None] - nodes, axis=2)
+    springs = 30 * np.eye(66) + 200 * np.exp(-((distance / 60) ** 2))
+    write_part(folder, "frame", springs, nodes)
+    done = harness(
+        "init", "--superelements", folder / "wing.npz", folder / "frame.npz", folder / "scene.toml"
+    )
+    assert done.exit_code == 0, done.output
+    text = (folder / "scene.toml").read_text().replace("dofs = [3]", "dofs = [1, 2, 3]", 1)
+    (folder / "edited.toml").write_text(
+        text.replace("points = [[0.0, 0.0]]", "points = [[100.0, 60.0], [290.0, 33.0]]")
+    )
+    return folder
+
+
+def test_the_starter_needs_one_edit(folder: Path) -> None:
+    text = (folder / "scene.toml").read_text()
+    assert text.count("EDIT") == 1
+    assert 'superelement = "wing.npz"\nnodes = "wing.csv"' in text
+    assert f"solve {folder / 'scene.toml'}" in text
+    assert read_scene(str(folder / "edited.toml")).joint.names == ("wing", "frame")
+    assert harness("init", "--superelements", folder / "wing.npz", folder / "scene.toml").exit_code == 2
+    assert harness("init", "--superelements", folder / "new.toml").exit_code == 2
+
+
+def test_validate_says_what_there_is(folder: Path) -> None:
+    done = harness("validate", folder / "edited.toml")
+    assert done.exit_code == 0, done.output
+    for said in (
+        "135 unknowns, 45 contact nodes",
+        "45 nodes of wing",
+        "n = 201, m = 45",
+        "Points are given along",
+    ):
+        assert said in done.output
+
+
+def test_solve_writes_pictures_tables_and_forces(folder: Path, tmp_path: Path) -> None:
+    done = harness("solve", folder / "edited.toml", "--out", tmp_path / "out", "--allow-gap", 5.0)
+    assert done.exit_code == 0, done.output
+    assert "What the grid leaves out is not known here" in done.output
+    record = json.loads((tmp_path / "out" / "solution.json").read_text())
+    assert [force["force_N"] for force in record["fasteners"]] == [300.0, 300.0]
+    assert record["marks"] == {"fasteners": [[100.0, 60.0], [290.0, 33.0]]}
+    assert "digits" in record["digits"]
+    with np.load(tmp_path / "out" / "solution.npz") as saved:
+        assert len(saved["unknowns"]) == 201
+        assert len(saved["x"]) == len(saved["nodes"]) == 45 + 66
+        np.testing.assert_array_equal(saved["x"][:45], saved["unknowns"][2:135:3])
+    for name in ("gap.png", "forces.png", "displacement.png", "index.html"):
+        assert (tmp_path / "out" / name).stat().st_size > 5000
+    with (tmp_path / "out" / "nodes.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 111
+    meshio = pytest.importorskip("meshio")
+    mesh = meshio.read(tmp_path / "out" / "solution.vtu")
+    pushed = mesh.point_data["contact_force_N"]
+    assert pushed[:45].sum() == pytest.approx(-pushed[45:].sum())
+
+
+def test_two_plans_a_series_and_a_run(folder: Path, tmp_path: Path) -> None:
+    text = (folder / "edited.toml").read_text()
+    (folder / "more.toml").write_text(text.replace("preload = 300.0", "preload = 600.0"))
+    done = harness("solve", folder / "edited.toml", folder / "more.toml", "--out", tmp_path / "both")
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "both" / "comparison.md").is_file()
+    options = ("--sd", 0.05, "--correlation-length", 80.0)
+    done = harness("series", folder / "edited.toml", "--cases", 6, *options, "--out", tmp_path / "series")
+    assert done.exit_code == 0, done.output
+    scan = folder / "scan.csv"
+    scan.write_text("x,y,gap\n10,10,0.2\n")
+    done = harness(
+        "series", folder / "edited.toml", *options, "--cases", 2, "--around", scan, "--out", tmp_path / "no"
+    )
+    assert done.exit_code == 2
+    assert "joint of plates" in done.output
+    run = ("run", "--scene", folder / "edited.toml", "--solver", "gi", "--out", tmp_path / "run")
+    done = harness(*run)
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "run" / "report" / "report.md").is_file()
+
+
+def test_what_is_exported_is_the_same_problem(folder: Path, tmp_path: Path) -> None:
+    done = harness("export", folder / "edited.toml", "--format", "npz", "--out", tmp_path / "out.npz")
+    assert done.exit_code == 0, done.output
+    done = harness("solve", tmp_path / "out.npz", "--out", tmp_path / "again")
+    assert done.exit_code == 0, done.output
+    done = harness("solve", folder / "edited.toml", "--out", tmp_path / "first")
+    with (
+        np.load(tmp_path / "again" / "solution.npz") as again,
+        np.load(tmp_path / "first" / "solution.npz") as first,
+    ):
+        np.testing.assert_allclose(again["gap_after"], first["gap_after"], atol=1e-9)
+        np.testing.assert_allclose(again["x"], first["unknowns"], atol=1e-9)
+
+
+def test_small_dense_parts_have_a_sparse_form(folder: Path) -> None:
+    done = harness("export", folder / "edited.toml", "--form", "sparse", "--out", folder / "program.npz")
+    assert done.exit_code == 0, done.output
+
+
+def test_the_example_is_solved_and_made_again(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples" / "own-parts"
+    done = harness("solve", example / "joint.toml", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    made = runpy.run_path(str(example / "make_parts.py"))
+    for name in ("wing", "frame"):
+        assert (example / f"{name}.npz").stat().st_size < 300_000
+    K, nodes = made["plate"](np.linspace(0, 600, 17), np.linspace(0, 300, 11), 2.5, 300.0, 0.0)
+    with np.load(example / "wing.npz") as stored:
+        np.testing.assert_allclose(K, stored["K"], atol=1e-9 * abs(K).max())
+    assert len(nodes) == len((example / "wing.csv").read_text().splitlines()) - 1

@@ -1,0 +1,306 @@
+"""Joints of superelements against the built-in joint, closed forms, and themselves elsewhere."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import skfem
+from joints import make_scene
+from skfem.helpers import dd, ddot, eye, trace
+from superelements import Array, Tables, flat, scene_from, solved, stiffnesses, two_plates, write_part
+
+from problems.build import load_case, model_of, prepared
+from problems.model.scene import JointScene
+from problems.scene import scene_of
+
+JOINT = two_plates()
+FASTENERS = {"kind": "fasteners", "preload": 900.0, "points": [[50.0, 30.0], [231.0, 47.0]]}
+INSTALLED = {"kind": "installed_fasteners", "approach": 0.1, "points": [[341.0, 21.0], [150.0, 90.0]]}
+PRESSURE = {"kind": "pressure", "part": "b", "value": -2e-4}
+CLAMPS = {"kind": "clamps", "clamping_force": 300.0, "points": [[300.0, 100.0]]}
+SHIMS = {"kind": "shims", "thickness": 0.1, "x": [100.0, 200.0], "y": [0.0, 60.0]}
+RANDOM = {"sd": 0.1, "correlation_length": 90.0, "seed": 3}
+
+
+def measured(joint: Any) -> Tables:
+    """A random gap, given at the nodes."""
+    gap = {"kind": "initial_gap", "mean": 0.4, "random": RANDOM}
+    g = load_case(scene_of({"joint": joint.model_dump(exclude_unset=True), "effect": [gap]})).g
+    return {"kind": "measured_gap", "points": np.column_stack([joint.nodes, g]).tolist()}
+
+
+EFFECTS = (measured(JOINT), FASTENERS, INSTALLED, PRESSURE, CLAMPS, SHIMS)
+
+
+def built_in(*effects: Tables) -> JointScene:
+    return scene_of({"joint": JOINT.model_dump(exclude_unset=True), "effect": list(effects)})
+
+
+def plates(folder: Path, format: str = "npz", **more: Any) -> list[Tables]:
+    """The parts of the built-in joint."""
+    K = stiffnesses(JOINT)
+    return [
+        write_part(folder, name, K[k], flat(JOINT.nodes), format=format, **more)
+        for k, name in enumerate("ab")
+    ]
+
+
+@pytest.mark.parametrize("format", ["npz", "mtx", "op4", "abaqus"])
+def test_the_built_in_joint_as_superelements_has_its_answer(format: str, tmp_path: Path) -> None:
+    if format == "op4":
+        pytest.importorskip("pyyeti")
+    ours, theirs = solved(built_in(*EFFECTS)), solved(scene_from(plates(tmp_path, format), *EFFECTS))
+    assert 0 < (ours.lam > 0).sum() < len(ours.lam)
+    for name in ("x", "gap"):
+        np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(theirs.lam, ours.lam, rtol=1e-8, atol=1e-8)
+    (one, load), (other, other_load) = (
+        (prepared(s), load_case(s)) for s in (built_in(*EFFECTS), theirs.problem.scene)
+    )
+    assert (one.assembly.A != other.assembly.A).nnz == 0
+    np.testing.assert_array_equal(load.f, other_load.f)
+
+
+def test_dmig_keeps_ten_digits_and_its_labels(tmp_path: Path) -> None:
+    """The points of K in another order than the table of nodes."""
+    pytest.importorskip("pyyeti")
+    parts = plates(tmp_path, "dmig")
+    for part in parts:
+        lines = Path(part["nodes"]).read_text().splitlines()
+        Path(part["nodes"]).write_text("\n".join([lines[0], *reversed(lines[1:])]) + "\n")
+    ours, theirs = solved(built_in(*EFFECTS)), solved(scene_from(parts, *EFFECTS))
+    places = theirs.problem.scene.joint.places(("a", "b"))
+    here = {tuple(place): gap for place, gap in zip(places.tolist(), theirs.gap, strict=True)}
+    np.testing.assert_allclose([here[tuple(p)] for p in JOINT.nodes.tolist()], ours.gap, atol=1e-6)
+
+
+def test_labels_of_abaqus_say_which_row_is_which(tmp_path: Path) -> None:
+    parts = plates(tmp_path, "abaqus", id=np.arange(1, 46))
+    K = stiffnesses(JOINT)
+    order = np.random.default_rng(2).permutation(45)
+    for part in parts:  # the rows of the table in another order
+        lines = Path(part["nodes"]).read_text().splitlines()
+        Path(part["nodes"]).write_text("\n".join([lines[0], *(lines[1 + k] for k in order)]) + "\n")
+    scene = scene_from(parts, *EFFECTS)
+    own = scene.joint.parts[0]
+    np.testing.assert_array_equal(own.nodes.xyz[own.node, :2], JOINT.nodes)
+    np.testing.assert_array_equal(own.stiffness, K[0])
+    assert abs(np.sort(solved(scene).gap) - np.sort(solved(built_in(*EFFECTS)).gap)).max() < 1e-9
+
+
+def error_of_other_meshes(folder: Path, elements: int) -> float:
+    """Of the gaps: b has one and a half times the elements of a, against b on the mesh of a."""
+    fine, other = (
+        two_plates((2 * elements + 1, elements + 1)),
+        two_plates((3 * elements + 1, 3 * elements // 2 + 1)),
+    )
+    a, b = stiffnesses(fine)
+    far = stiffnesses(other)[1]
+    first = write_part(folder, "a", a, flat(fine.nodes))
+    effects = {"kind": "initial_gap", "mean": 0.2}, PRESSURE | {"value": -6e-4}
+    same = solved(scene_from([first, write_part(folder, "b", b, flat(fine.nodes))], *effects))
+    away = solved(
+        scene_from(
+            [first, write_part(folder, "c", far, flat(other.nodes))], *effects[:1], effects[1] | {"part": "c"}
+        )
+    )
+    assert 0 < (same.lam > 0).sum() < len(same.lam)
+    return float(abs(same.gap - away.gap).max())
+
+
+def test_meshes_that_do_not_match_converge_to_those_that_do(tmp_path: Path) -> None:
+    errors = [error_of_other_meshes(tmp_path, elements) for elements in (4, 8, 16)]
+    assert all(fine < coarse / 2.5 for coarse, fine in pairwise(errors)), errors
+    assert errors[-1] < 2e-3
+
+
+def rotation() -> Array:
+    """By no small angles, about no axis."""
+    Q, R = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))
+    Q = Q * np.sign(np.diag(R))
+    return np.asarray(Q if np.linalg.det(Q) > 0 else Q[:, ::-1])
+
+
+def test_parts_anywhere_in_space_have_the_same_gaps(tmp_path: Path) -> None:
+    """Three displacements per node, those in the surface held by springs of their own."""
+    R, parts, moved = rotation(), [], np.array([3e3, -2e3, 500.0])
+    turn = np.kron(np.eye(45), R)  # of local displacements to global ones
+    for name, K in zip("ab", stiffnesses(JOINT), strict=True):
+        local = np.diag(np.tile([1e3, 2e3, 0.0], 45))
+        local[2::3, 2::3] = K
+        xyz = flat(JOINT.nodes) @ R.T + moved
+        normals = np.tile(R[:, 2], (45, 1))
+        whole = turn @ local @ turn.T
+        parts.append(write_part(tmp_path, name, (whole + whole.T) / 2, xyz, normals, dofs=[1, 2, 3]))
+    axes = scene_from(parts).joint.axes
+
+    def there(x: float, y: float) -> list[float]:
+        return (axes @ (R @ [x, y, 0.0] + moved))[:2].tolist()
+
+    def turned(effect: Tables) -> Tables:
+        points = [[*there(*point[:2]), *point[2:]] for point in effect["points"]]
+        return effect | {"points": points}
+
+    effects = [*map(turned, (measured(JOINT), FASTENERS, INSTALLED)), PRESSURE]
+    here, scene = (
+        solved(built_in(measured(JOINT), FASTENERS, INSTALLED, PRESSURE)),
+        scene_from(parts, *effects),
+    )
+    gaps, places = solved(scene).gap, scene.joint.places(("a", "b"))
+    np.testing.assert_allclose(places, [there(*node) for node in JOINT.nodes], atol=1e-9)
+    np.testing.assert_allclose(gaps, here.gap, rtol=0, atol=1e-7)
+    shown = scene.joint.shown
+    np.testing.assert_allclose(shown @ solved(scene).x, here.x, rtol=0, atol=1e-7)
+
+
+def test_metres_and_newtons_per_metre(tmp_path: Path) -> None:
+    parts = [
+        write_part(tmp_path, name, 1e3 * K, flat(JOINT.nodes) / 1e3)
+        for name, K in zip("ab", stiffnesses(JOINT), strict=True)
+    ]
+    points = (np.array(measured(JOINT)["points"]) / 1e3).tolist()
+    gap, fasteners = (
+        {"kind": "measured_gap", "points": points},
+        FASTENERS | {"points": [[0.05, 0.03], [0.231, 0.047]]},
+    )
+    theirs = solved(scene_from(parts, gap, fasteners, pairing={"distance": 0.005}))
+    ours = solved(built_in(measured(JOINT), FASTENERS))
+    np.testing.assert_allclose(1e3 * theirs.gap, ours.gap, rtol=0, atol=1e-9)
+
+
+@skfem.BilinearForm  # type: ignore[untyped-decorator]
+def bending(u: Any, v: Any, w: Any) -> Any:
+    kappa = dd(u)
+    return ddot(0.7 * kappa + 0.3 * eye(trace(kappa), 2), dd(v))
+
+
+def disc(refined: int, turned: float) -> tuple[Array, Array]:
+    """A clamped disc of radius and rigidity 1 in Morley's triangles: K at its inner vertices, and these."""
+    mesh = skfem.MeshTri.init_circle(refined)
+    turn = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+    basis = skfem.Basis(skfem.MeshTri(turn @ mesh.p, mesh.t), skfem.ElementTriMorley())
+    K = sp.csr_array(bending.assemble(basis))
+    inner = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
+    kept = basis.nodal_dofs[0, inner]
+    rest = np.setdiff1d(np.arange(basis.N), np.concatenate([kept, basis.get_dofs().all()]))
+    condensed = K[kept][:, kept] - K[kept][:, rest] @ np.linalg.solve(
+        K[rest][:, rest].toarray(), K[rest][:, kept].toarray()
+    )
+    return (condensed + condensed.T) / 2, basis.mesh.p[:, inner].T
+
+
+def test_two_clamped_discs_of_another_code_share_a_pressure(tmp_path: Path) -> None:
+    """Radius R, rigidity D, pressure q on one: both bend by (q/2) R⁴/64D in the middle (Timoshenko)."""
+    parts, R, D, q = [], 100.0, 5e5, 0.05
+    for name, refined, turned in (("a", 4, 0.0), ("b", 4, 0.3)):
+        K, nodes = disc(refined, turned)
+        parts.append(write_part(tmp_path, name, D / R**2 * K, flat(R * nodes)))
+    scene = scene_from(
+        parts, {"kind": "initial_gap", "mean": 0.0}, {"kind": "pressure", "part": "a", "value": q}
+    )
+    found, joint = solved(scene), scene.joint
+    middle = [np.hypot(*joint.nodes_of(name).T).argmin() for name in "ab"]
+    for name, k in zip("ab", middle, strict=True):
+        assert found.x[joint.unknowns(name)][k] == pytest.approx(q / 2 * R**4 / (64 * D), rel=0.03)
+    inner = (np.pi * R**2 - joint.areas("a").sum()) / (np.pi * R**2)
+    assert 0 < inner < 0.2  # the ring between the last nodes and the clamped edge
+
+
+def cylinder(radius: float, angles: Array, y: Array) -> tuple[Array, Array]:
+    A, Y = (each.ravel() for each in np.meshgrid(angles, y))
+    normals = np.column_stack([np.sin(A), np.zeros_like(A), np.cos(A)])
+    return radius * normals + np.column_stack([np.zeros_like(A), Y, np.zeros_like(A)]), normals
+
+
+def test_contacts_of_curved_surfaces_are_along_their_normals(tmp_path: Path) -> None:
+    """Concentric cylinders on radial springs: a pressure on the inner one, by its area, is shared evenly."""
+    y, parts, k = np.linspace(0.0, 50.0, 6), [], 40.0
+    for name, radius, angles in (
+        ("a", 200.0, np.linspace(-0.6, 0.6, 25)),
+        ("b", 202.0, np.linspace(-0.7, 0.7, 41)),
+    ):
+        xyz, normals = cylinder(radius, angles, y)
+        parts.append(write_part(tmp_path, name, k * np.eye(3 * len(xyz)), xyz, normals, dofs=[1, 2, 3]))
+    scene = scene_from(
+        parts, {"kind": "initial_gap", "mean": 0.1}, {"kind": "pressure", "part": "a", "value": 1.0}
+    )
+    joint, A = scene.joint, prepared(scene).assembly.A
+    np.testing.assert_allclose(joint.pairings["a", "b"].apart, 2.0, atol=0.04)  # chords of b
+    assert joint.areas("a").reshape(-1, 3).shape == (150, 3)
+    total = np.linalg.norm(joint.areas("a").reshape(-1, 3), axis=1).sum()
+    assert total == pytest.approx(200 * 1.2 * 50, rel=1e-3)
+    for name, sign in (("a", 1.0), ("b", -1.0)):  # a radial motion of a whole part
+        part = joint.parts["ab".index(name)]
+        radial = np.zeros(A.shape[0])
+        radial[joint.unknowns(name)] = part.nodes.normal.ravel()
+        np.testing.assert_allclose(A.T @ radial, sign, atol=1e-3)
+    assert solved(scene).gap.min() > -1e-9
+
+
+@pytest.mark.parametrize("sparse", [False, True])
+def test_a_sparse_k_stays_sparse_in_the_sparse_form(sparse: bool, tmp_path: Path) -> None:
+    """2501 nodes on springs, coupled to their neighbours."""
+    x = np.linspace(0.0, 400.0, 61)
+    nodes = np.column_stack([each.ravel() for each in np.meshgrid(x, np.linspace(0.0, 120.0, 41))])
+    lines = [sp.diags_array([-1.0, 2.1, -1.0], offsets=[-1, 0, 1], shape=(k, k)) for k in (41, 61)]
+    K = sp.csc_array(100 * sp.kronsum(lines[1], lines[0]))
+    parts = [write_part(tmp_path, name, K if sparse else K.toarray(), flat(nodes)) for name in "ab"]
+    scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.05}, FASTENERS, INSTALLED)
+    model: Any = model_of(scene)
+    assert model.holds_sparse is sparse
+    if sparse:
+        made = prepared(scene, form="sparse").assembly
+        assert not made.K.dense
+        assert solved(scene).choice.form in ("sparse", "dual")
+        v = np.random.default_rng(0).standard_normal(5002)
+        T, k = model.springs.T, model.springs.k
+        wanted = np.concatenate([K @ v[:2501], K @ v[2501:]]) + T @ (k * (T.T @ v))
+        np.testing.assert_allclose(made.K.multiply(v), wanted, rtol=1e-12, atol=1e-9)
+
+
+def test_a_random_gap_on_scattered_nodes_has_its_covariance(tmp_path: Path) -> None:
+    random = np.random.default_rng(6)
+    nodes = np.column_stack([random.uniform(0, 300, 40), random.uniform(0, 100, 40)])
+    parts = [write_part(tmp_path, name, 50 * np.eye(40), flat(nodes)) for name in "ab"]
+    draws = []
+    scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.5, "random": RANDOM})
+    (effect,) = scene.effects
+    for seed in range(1500):
+        own = effect.random.model_copy(update={"seed": seed})
+        draws.append(effect.model_copy(update={"random": own}).gap(scene.joint))
+    places = scene.joint.places(("a", "b"))
+    C = 0.01 * np.exp(-0.5 * ((places[:, None] - places) ** 2).sum(axis=2) / 90.0**2)
+    assert abs(np.mean(draws, axis=0) - 0.5).max() < 4.5 * 0.1 / np.sqrt(1500)
+    assert abs(np.cov(np.transpose(draws)) - C).max() < 6 * 0.01 / np.sqrt(1500)
+
+
+def test_a_tool_and_a_third_part(tmp_path: Path) -> None:
+    K = stiffnesses(JOINT)
+    parts = [write_part(tmp_path, name, K[0], flat(JOINT.nodes)) for name in "abc"]
+    gap, tool = {"kind": "initial_gap", "mean": 0.1}, {"kind": "rigid_tool", "part": "c", "distance": 0.2}
+    theirs = solved(scene_from(parts, gap, tool, FASTENERS | {"between": ["a", "b"]}))
+    table = JOINT.model_dump(exclude_unset=True)
+    same = [table["part"][0] | {"name": name} for name in "abc"]
+    ours = solved(
+        scene_of(
+            {"joint": table | {"part": same}, "effect": [gap, tool, FASTENERS | {"between": ["a", "b"]}]}
+        )
+    )
+    np.testing.assert_allclose(theirs.gap, ours.gap, rtol=0, atol=1e-12)
+    assert make_scene(JOINT).joint.size == (90, 45)
+
+
+def test_the_key_is_that_of_what_the_files_hold(tmp_path: Path) -> None:
+    parts = plates(tmp_path)
+    before = scene_from(parts, FASTENERS)
+    assert scene_from(parts, FASTENERS).key == before.key
+    assert scene_from(parts).assembly_key == before.assembly_key
+    nodes = Path(parts[0]["nodes"])
+    nodes.write_text(nodes.read_text().replace("\n1,0.0,0.0,0.0\n", "\n1,0.5,0.0,0.0\n"))
+    moved = scene_from(parts, FASTENERS)
+    assert moved.assembly_key != before.assembly_key
+    np.savez(parts[1]["superelement"], K=2 * stiffnesses(JOINT)[1])
+    assert scene_from(parts, FASTENERS).assembly_key != moved.assembly_key

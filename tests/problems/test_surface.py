@@ -1,0 +1,80 @@
+"""Weights and areas of a surface through nodes: linear fields are met, areas add up, bays stay open."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from problems.model.surface import Grid, Triangles, surface_of
+
+LINES = np.array([0.0, 1.0, 3.0, 7.0, 8.5]), np.array([2.0, 5.0, 6.0])
+
+
+def crossings(x: np.ndarray = LINES[0], y: np.ndarray = LINES[1]) -> np.ndarray:
+    return np.column_stack([each.ravel() for each in np.meshgrid(x, y)])
+
+
+def turned(nodes: np.ndarray, angle: float) -> np.ndarray:
+    return nodes @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+
+def test_a_grid_is_found_in_any_order_of_its_nodes_and_apart_from_rounding() -> None:
+    nodes = crossings()
+    order = np.random.default_rng(1).permutation(len(nodes))
+    for given_nodes in (
+        nodes,
+        nodes[order],
+        nodes + 1e-9 * np.random.default_rng(2).uniform(-1, 1, nodes.shape),
+    ):
+        assert isinstance(surface_of(given_nodes), Grid)
+    assert isinstance(surface_of(nodes[:-1]), Triangles)
+    shuffled, plain = surface_of(nodes[order]), surface_of(nodes)
+    np.testing.assert_array_equal(shuffled.areas, plain.areas[order])
+    points = np.random.default_rng(3).uniform([0, 2], [8.5, 6], (30, 2))
+    np.testing.assert_array_equal(
+        shuffled.weights(points).toarray(), plain.weights(points).toarray()[:, order]
+    )
+
+
+@given(st.integers(0, 10_000), st.booleans())
+@settings(deadline=None, max_examples=40)
+def test_linear_fields_are_met_and_nodes_are_themselves(seed: int, scattered: bool) -> None:
+    random = np.random.default_rng(seed)
+    nodes = crossings()
+    if scattered:
+        nodes = turned(nodes + random.uniform(-0.2, 0.2, nodes.shape), 0.4)
+    surface = surface_of(nodes)
+    np.testing.assert_array_equal(surface.weights(nodes).toarray(), np.eye(len(nodes)))
+    points = random.dirichlet(np.ones(3), 50)  # inside triangles of the surface
+    corners = nodes[surface.triangles[random.integers(0, len(surface.triangles), 50)]]
+    at = (points[:, :, None] * corners).sum(axis=1)
+    W = surface.weights(at)
+    assert surface.covers(at).all()
+    assert (W.data > 0).all()
+    fields = np.column_stack([np.ones(len(nodes)), nodes])
+    np.testing.assert_allclose(W @ fields, np.column_stack([np.ones(50), at]), atol=1e-10)
+
+
+def test_triangles_have_the_area_of_what_they_fill() -> None:
+    nodes = np.random.default_rng(4).uniform(0, 1, (300, 2))
+    nodes = np.concatenate([nodes, [[0, 0], [1, 0], [0, 1], [1, 1]]]) * [40.0, 20.0]
+    x = np.linspace(0, 1, 20)[1:-1, None]
+    border = np.concatenate([x * [40, 0], x * [40, 0] + [0, 20], x * [0, 20], x * [0, 20] + [40, 0]])
+    surface = surface_of(np.concatenate([nodes, border]))
+    assert surface.areas.sum() == pytest.approx(800.0)
+    assert not surface.covers(np.array([[40.1, 10.0], [-1.0, 3.0]])).any()
+    assert surface.weights(np.array([[40.1, 10.0]])).nnz == 0
+
+
+def test_a_mesh_that_grows_coarser_keeps_its_triangles() -> None:
+    """By a third from line to line, with elements five times as long as wide."""
+    x = 5 * np.cumsum(1.33 ** np.arange(14))
+    nodes = crossings(x, np.linspace(0, 30, 7))[:-1]  # without a corner it is no grid
+    surface = surface_of(nodes)
+    assert surface.areas.sum() == pytest.approx((x[-1] - x[0]) * 30 - (x[-1] - x[-2]) * 5 / 2)
+
+
+def test_nodes_on_a_line_are_no_surface() -> None:
+    line = np.linspace(0, 9, 10)[:, None] * [1.0, 2.0]
+    with pytest.raises(ValueError, match="one line"):
+        surface_of(line)
