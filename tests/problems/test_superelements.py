@@ -1,5 +1,6 @@
 """Joints of superelements against the built-in joint, closed forms, and themselves elsewhere."""
 
+import pickle
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from skfem.helpers import dd, ddot, eye, trace
 from superelements import Array, Tables, flat, scene_from, solved, stiffnesses, two_plates, write_part
 
 from problems.build import load_case, model_of, prepared
+from problems.errors import InputError
 from problems.model.scene import JointScene
 from problems.scene import scene_of
 
@@ -304,3 +306,51 @@ def test_the_key_is_that_of_what_the_files_hold(tmp_path: Path) -> None:
     assert moved.assembly_key != before.assembly_key
     np.savez(parts[1]["superelement"], K=2 * stiffnesses(JOINT)[1])
     assert scene_from(parts, FASTENERS).assembly_key != moved.assembly_key
+
+
+def test_unknowns_off_the_contact_surface_and_rotations_are_solved_for(tmp_path: Path) -> None:
+    """A third of the rows: deflection and rotations at each node, and three nodes that touch nothing."""
+    K = stiffnesses(JOINT)
+    more = [write_part(tmp_path, "b", K[1], flat(JOINT.nodes))]
+    nodes = np.concatenate([flat(JOINT.nodes), [[0.0, 0, 9], [50.0, 0, 9], [90.0, 20, 9]]])
+    random = np.random.default_rng(7).standard_normal((144, 144))
+    whole = random @ random.T / 10 + np.diag(np.tile([200.0, 5e3, 5e3], 48))
+    whole = whole @ np.diag(np.tile([1.0, 8.0, 8.0], 48))
+    whole = whole + whole.T + 1e5 * np.eye(144)
+    condensed = np.linalg.inv(np.linalg.inv(whole)[:135:3, :135:3])
+    rows = {"dofs": [3, 4, 5], "contact": [1] * 45 + [0] * 3}
+    large = write_part(tmp_path, "a", whole, nodes, **rows)
+    small = write_part(tmp_path, "c", (condensed + condensed.T) / 2, flat(JOINT.nodes)) | {"name": "a"}
+    effects = (
+        measured(JOINT),
+        FASTENERS,
+        INSTALLED,
+        PRESSURE,
+        {"kind": "pressure", "part": "a", "value": 1e-3},
+    )
+    one, other = (solved(scene_from([part, *more], *effects)) for part in (large, small))
+    assert len(one.x) == 144 + 45
+    np.testing.assert_allclose(one.gap, other.gap, rtol=0, atol=1e-9)
+    shown = one.problem.scene.joint.shown @ one.x
+    np.testing.assert_allclose(shown, other.x, rtol=0, atol=1e-9)
+
+
+def test_a_free_part_with_rotations_is_told_by_its_six_motions(tmp_path: Path) -> None:
+    nodes = np.random.default_rng(3).uniform(0, 100, (12, 3))
+    write_part(tmp_path, "a", np.eye(72), nodes, dofs=[1, 2, 3, 4, 5, 6])
+    part = scene_from([write_part(tmp_path, "a", np.eye(72), nodes, dofs=[1, 2, 3, 4, 5, 6])]).joint.parts[0]
+    Q, _ = np.linalg.qr(part.rigid)
+    free = write_part(tmp_path, "b", 1e4 * (np.eye(72) - Q @ Q.T), nodes, dofs=[1, 2, 3, 4, 5, 6])
+    with pytest.raises(InputError) as error:
+        prepared(scene_from([free]))
+    (fault,) = error.value.faults
+    assert str(fault.value).count("translation along") == str(fault.value).count("rotation about") == 3
+    assert not part.free.size
+
+
+def test_a_scene_travels_to_another_process(tmp_path: Path) -> None:
+    scene = scene_from(plates(tmp_path), *EFFECTS)
+    _ = load_case(scene).g
+    again = pickle.loads(pickle.dumps(scene))
+    assert again.key == scene.key
+    np.testing.assert_array_equal(load_case(again).f, load_case(scene).f)
