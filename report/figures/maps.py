@@ -32,7 +32,7 @@ Marks = dict[str, list[list[float]]]  # places (x, y) by the kind of effect
 SHAPES = {"fasteners": "o", "installed_fasteners": "s", "clamps": "^"}
 MANY = 60
 MARK, CLOSED, LARGER, RIM = "#111111", "#FFFFFF", "#E8112D", "#444444"
-DOTS, DOT = 4000.0, (4.0, 40.0)  # points² of all dots of a map, and of one
+DOTS, DOT, RING = 4000.0, (4.0, 40.0), 8.0  # points² of all dots of a map, of one; points of a ring around it
 THINNEST = 0.02  # a map's shorter side over its longer one
 NARROW, UPRIGHT = 0.5, 2.0  # height over width of a junction: maps stacked, all side by side
 # inches
@@ -131,10 +131,10 @@ def _outlined(axes: Axes, nodes: Array, inside: NDArray[np.bool_], colour: str, 
     """The border of some contacts, or a ring around each off a grid, dark-rimmed to show on any colour."""
     grid = grid_of(nodes)
     if grid is None and inside.any():
-        ring: dict[str, Any] = {"s": 1.5 * DOT[1], "facecolors": "none", "linewidths": 0.9}
+        ring: dict[str, Any] = {"marker": "o", "markersize": RING, "linestyle": "", "markerfacecolor": "none"}
         if colour != RIM:
-            axes.scatter(*nodes[inside].T, **(ring | {"linewidths": 1.7}), edgecolors=RIM)
-        axes.scatter(*nodes[inside].T, **ring, edgecolors=colour, label=label)
+            ring["path_effects"] = [withStroke(linewidth=1.7, foreground=RIM)]
+        axes.plot(*nodes[inside].T, markeredgecolor=colour, markeredgewidth=0.9, label=label, **ring)
     if grid and inside.any():
         look: dict[str, Any] = {"linewidth": 0.9}
         if colour != RIM:
