@@ -28,9 +28,10 @@ from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded import Positive
 
 from .joint import TOOL, Faults, Pair, Table, wrong_contacts
+from .nodes import listed
 from .pairing import Face, Pairing, paired, with_tool
 from .plate import Plate
-from .superelement import Superelement, SuperelementTable, listed
+from .superelement import Superelement, SuperelementTable
 from .surface import surface_of
 
 LEVEL = np.cos(np.radians(10.0))
