@@ -67,9 +67,12 @@ def recorded(found: GridError | None) -> dict[str, Any]:
     """What solution.json holds of it, with a sentence."""
     if found is None:
         return {"said": "What the grid leaves out is not known here"}
-    how = "estimated from" if found.grids > 2 else "roughly, by"
-    said = f"The grid leaves out about {found.error_mm:.1g} mm of a gap, {how} {found.grids} grids"
-    said += "" if found.order is None else f", of observed order {found.order:.1f}"
+    said = f"The grid leaves out about {found.error_mm:.1g} mm of a gap, "
+    if found.grids == 2:
+        said += "a rough figure from two grids (--refine: three)"
+    else:
+        order = "" if found.order is None else f", of observed order {found.order:.1f}"
+        said += f"estimated from three grids{order}"
     return asdict(found) | {"said": said}
 
 
