@@ -28,7 +28,7 @@ class Pattern(Table):
     columns: Annotated[int, Field(ge=1, le=10_000)]
     rows: Annotated[int, Field(ge=1, le=10_000)]
     edge: Annotated[NotNegative, "mm"] = 0.0
-    on_nodes: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
+    on_nodes: bool = False
 
 
 class Positions(ForceEffect):

@@ -199,5 +199,8 @@ def _made(make: Callable[[], ManufacturedProblem]) -> ManufacturedProblem:
 
 
 def plain(table: Table) -> dict[str, Any]:
-    """The table as JSON, for keys."""
-    return table.model_dump(mode="json")
+    """The table as JSON, for keys. A pattern on nodes has the key that it had when all were."""
+    data = table.model_dump(mode="json")
+    if (data.get("pattern") or {}).get("on_nodes"):
+        del data["pattern"]["on_nodes"]
+    return data

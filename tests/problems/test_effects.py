@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joints import make_joint
+from joints import make_joint, make_scene
 from pydantic import ValidationError
 
 from problems.effects.clamps import Clamps
@@ -67,6 +67,20 @@ def test_pattern_spreads_evenly_up_to_the_edge() -> None:
     expected = [(x, y) for y in (20.0, 60.0, 100.0) for x in (20.0, 140.0, 260.0, 380.0)]
     np.testing.assert_allclose(made.marks(JOINT), expected)
     np.testing.assert_allclose(patterned(columns=1, rows=1, edge=20.0).marks(JOINT), [(200.0, 60.0)])
+
+
+def test_a_pattern_on_nodes_has_the_nearest_of_each_axis() -> None:
+    free, moved = (patterned(columns=7, rows=3, edge=20.0, on_nodes=on) for on in (False, True))
+    x, y = (np.array(sorted(set(free.marks(JOINT)[:, axis]))) for axis in (0, 1))
+    nearest = [
+        [min(grid, key=lambda line: abs(line - at)) for at in own]
+        for own, grid in ((x, JOINT.x), (y, JOINT.y))
+    ]
+    np.testing.assert_array_equal(moved.marks(JOINT), [(a, b) for b in nearest[1] for a in nearest[0]])
+    assert set(moved.force(JOINT)[:45]) == {0.0, 1.0}
+    keys = {make_scene(JOINT, effect).key for effect in (free, moved)}
+    assert len(keys) == 2
+    assert Fasteners.model_validate(moved.model_dump()) == moved  # as `--sweep` makes it anew
 
 
 @pytest.mark.parametrize(
