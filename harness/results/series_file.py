@@ -84,7 +84,7 @@ def connected(directory: Path) -> Iterator[sqlite3.Connection]:
             if path.stat().st_size % connection.execute("PRAGMA page_size").fetchone()[0]:
                 raise InputError.one(path, "content", "cut off", AGAIN)
             yield connection
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # its message too
         if getattr(error, "sqlite_errorcode", 0) & 0xFF in DISK:  # text that is not UTF-8 has none
             raise OSError(f"{path}: {error}") from error
         raise InputError.one(path, "content", str(error), AGAIN) from error

@@ -4,6 +4,8 @@ import json
 import os
 import re
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +144,17 @@ def test_a_series_that_lacks_something_is_not_reported_on(statement: str, series
         with pytest.raises(InputError, match="gaps of case 3"):
             series_file.StoredGaps(series, 45)[[2, 3]]
     assert solve_series(series).exit_code in (0, 2)
+
+
+def test_a_series_whose_damage_sqlite_cannot_spell_is_named(tmp_path: Path) -> None:
+    """Its message quotes bytes that are no UTF-8."""
+    series_file.create(tmp_path)
+    with closing(sqlite3.connect(tmp_path / SERIES)) as connection, connection:
+        connection.execute("PRAGMA writable_schema = ON")
+        connection.execute("UPDATE sqlite_master SET name = CAST(X'FD90' AS TEXT) WHERE type = 'index'")
+        connection.execute("DELETE FROM sqlite_master WHERE name = 'facts'")
+    with pytest.raises(InputError, match=rf"{SERIES}: content"):
+        series_file.read_facts(tmp_path)
 
 
 def test_fewer_cases_than_before_are_reported_as_that_many(
