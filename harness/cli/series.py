@@ -120,8 +120,8 @@ def series(
             "--mean": mean,
             "--sd": sd,
             "--correlation-length": correlation_length,
+            "--around": around,
         }
-        random["--around"] = around
         drawn = [name for name, value in random.items() if value is not None]
         faults = []
         if (gaps and sweep) or (drawn and (gaps or sweep)):

@@ -21,10 +21,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import threadpoolctl
 
 from harness.scene.solution import Solution
 from harness.solving.session import candidates
 from problems.build import load_case, prepared
+from problems.errors import InputError
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.model.effect import GapEffect
 from problems.model.joint import Extension, Joint, Part
@@ -41,8 +43,8 @@ class GridError:
 
 
 def estimated(found: Solution, refine: bool = False) -> GridError | None:
-    """Of an answer; None for own matrices and superelements, whose grid is not known, and without contacts
-    or a coarser grid.
+    """Of an answer; None for own matrices and superelements, whose grid is not known, without contacts or a
+    coarser grid, and where another grid has no answer.
 
     r is that of the side of the junction where it is smaller, but above 1. refine : solve on a finer grid
     too, with four times the unknowns.
@@ -56,10 +58,14 @@ def estimated(found: Solution, refine: bool = False) -> GridError | None:
     ratios = [(fine - 1) / (few - 1) for fine, few in pairs if few < fine]
     if not ratios:
         return None
-    moved = _moved(found, coarse)
-    if not refine:
+    try:
+        with threadpoolctl.threadpool_limits(1):  # as for any sparse form
+            moved = _moved(found, coarse)
+            halved = _moved(found, regridded(joint, 2.0)) if refine else None
+    except InputError:  # the answer stands without
+        return None
+    if halved is None:
         return GridError(moved / (min(ratios) - 1), 2)
-    halved = _moved(found, regridded(joint, 2.0))
     return GridError(halved * 4 / 3, 3, float(np.log2(moved / halved)) if moved and halved else None)
 
 
@@ -93,14 +99,19 @@ def regridded(joint: Joint, factor: float) -> Joint:
 
 
 def _moved(found: Solution, joint: Joint) -> float:
-    """max |y_h − y| over the contacts of the coarser of the two grids, y the gaps on another one, mm."""
+    """max |y_h − y| over the contacts of the coarser of the two grids, y the gaps on another one, mm.
+
+    Raises InputError if that has no answer.
+    """
     scene: Any = found.problem.scene
     here, other = scene.joint, JointScene(scene.name, scene.title, joint, scene.effects)
     g = _at(here, found.problem.load.g, joint.nodes)
     rest = [effect for effect in scene.effects if not isinstance(effect, GapEffect)]
     data = prepared(other, form="sparse")
     load = LoadCase(load_case(other, "sparse", rest).f, g)
-    _, lam = next(candidates(data, load))
+    _, lam = next(candidates(data, load), ("", None))
+    if lam is None:
+        raise InputError.one(other.name, "grid", list(joint.junction.nodes), "one with an answer")
     A = data.assembly.A
     gap = g - A.T @ data.assembly.K.solve(load.f - A @ lam)
     nodes = min(here.nodes, joint.nodes, key=len)

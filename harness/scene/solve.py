@@ -42,7 +42,7 @@ from problems.scene import read_scene
 from . import allowed_gap, grid_error, solution
 from .atomic_output import atomic_output, write_record
 from .solution import Solution
-from .validate import digits_sentence
+from .validate import digits_sentence, print_unusual
 
 
 def solve(
@@ -66,8 +66,7 @@ def solve(
         raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
-    for sentence in scene.unusual if isinstance(scene, JointScene) else ():
-        console.print(Text(f"{sentence}.", style="yellow"))
+    print_unusual(scene, console)
     built: dict[str, float] = {}  # what the cache did not hold, and how far it is
     found = solution.solve(
         scene,

@@ -37,8 +37,7 @@ def validate(source: str, console: Console) -> None:
     assert size is not None
     form = chosen_form(scene, FORMS, None).form
     console.print(f"{scene.name}: {scene.title}. Fine.")
-    for sentence in scene.unusual:
-        console.print(Text(f"{sentence}.", style="yellow"))
+    print_unusual(scene, console)
     console.print(_contents(scene))
     console.print(f"n = {size.n} unknowns, m = {size.m} contacts; this machine has {physical} MiB.")
     cached = "; the assembly is in the cache" if model_of(scene).built else ""
@@ -84,12 +83,17 @@ def _superelements(scene: JointScene, console: Console) -> None:
         a, b = pair
         beyond = f", {found.beyond} nodes of {a} are beyond {b}" if found.beyond else ""
         table.add_row(f"contact {a} – {b}", f"{len(found.nodes)} nodes of {a}{beyond}")
-    for sentence in scene.unusual:
-        console.print(Text(f"{sentence}.", style="yellow"))
+    print_unusual(scene, console)
     console.print(_with_effects(table, scene))
     x, y, normal = (", ".join(f"{each:.4g}" for each in axis) for axis in joint.axes)
     console.print(f"Points are given along x = ({x}) and y = ({y}); the normal of their plane is ({normal}).")
     _matrices(scene, console)
+
+
+def print_unusual(scene: Scene, console: Console) -> None:
+    """Print what may be, but is rarely meant."""
+    for sentence in scene.unusual if isinstance(scene, JointScene) else ():
+        console.print(Text(f"{sentence}.", style="yellow"))
 
 
 def _contents(scene: JointScene) -> Table:

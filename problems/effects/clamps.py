@@ -7,7 +7,7 @@ import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Positive
-from problems.model.effect import ContactEffect, Pair, pressing_forces
+from problems.model.effect import ContactEffect, Pair, pressing_forces, sides
 from problems.model.interface import AnyJoint
 from problems.model.positions import Positions
 
@@ -31,7 +31,7 @@ class Clamps(Positions, ContactEffect):
         centres = self.marks(joint)
 
         def under(pair: Pair) -> Iterator[tuple[Matrix, float]]:
-            parts = tuple(part for part in pair if part in joint.names)
+            parts = tuple(part for part, _ in sides(pair))
             for centre in centres:
                 points = centre + self.radius * DISC
                 points = points[joint.covers(parts, points)]

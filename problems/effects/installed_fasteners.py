@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
 from problems.model.effect import ContactEffect, Effect, Pair, SpringEffect, sides
-from problems.model.interface import AnyJoint
+from problems.model.interface import AnyJoint, across
 from problems.model.joint import TOOL, Faults
 from problems.model.positions import Positions
 
@@ -46,9 +46,8 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
     def springs(self, joint: AnyJoint) -> tuple[sp.csc_array, Vector]:
         points, columns = self.marks(joint), []
         for pair in self.tied(joint):
-            rows = {part: sign * joint.deflection(part, points, pair[0]).T for part, sign in sides(pair)}
-            none = {part: sp.csc_array((_count(joint, part), len(points))) for part in joint.names}
-            columns.append(sp.vstack([(none | rows)[part] for part in joint.names]))
+            rows = {part: sign * joint.deflection(part, points, pair[0]) for part, sign in sides(pair)}
+            columns.append(across(joint, rows, len(points)).T)
         T = sp.csc_array(sp.hstack(columns))
         T.sort_indices()
         return T, np.full(T.shape[1], self.stiffness)
@@ -56,11 +55,6 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
     def force(self, joint: AnyJoint) -> Vector:
         T, k = self.springs(joint)
         return T @ (k * self.approach)
-
-
-def _count(joint: AnyJoint, part: str) -> int:
-    own = joint.unknowns(part)
-    return own.stop - own.start
 
 
 def _places(given: Positions, joint: AnyJoint) -> set[tuple[float, float]]:

@@ -30,16 +30,14 @@ NOISE = 1e-3  # ν
 def read_scan(path: Path, joint: Joint) -> Matrix:
     """(s, 3) x, y and gap in mm. Raises InputError with all faults, also of points off the junction."""
     read = read_columns(path, {name: name for name in ("x", "y", "gap")})
-    length, width = joint.junction.length, joint.junction.width
-    allowed = f"on the junction, 0 … {length:g} × 0 … {width:g} mm"
+    points = np.array(read.rows).reshape(-1, 3)
     outside = [
-        Fault(str(path), f"line {line}", [x, y], allowed)
-        for line, (x, y, _) in zip(read.lines, read.rows, strict=True)
-        if not (0 <= x <= length and 0 <= y <= width)
+        Fault(str(path), f"line {read.lines[k]}", points[k, :2].tolist(), joint.region)
+        for k in np.flatnonzero(~joint.covers(joint.names, points[:, :2]))
     ]
     if faults := [*read.faults, *outside]:
         raise InputError(faults)
-    return np.array(read.rows)
+    return points
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,8 @@ class Scan:
     @classmethod
     def of(cls, joint: Joint, points: Matrix, correlation_length: float) -> Scan:
         W = joint.weights(points[:, :2])
-        Lx, Ly = (square_root(grid.tobytes(), correlation_length) for grid in (joint.x, joint.y))
+        grid = joint.grid(correlation_length)
+        Lx, Ly = (square_root(lines.tobytes(), correlation_length) for lines in grid)
         Cx, Cy = Lx @ Lx, Ly @ Ly
         spread = (W @ _times(Cx, Cy, W[[k]].toarray()) for k in range(len(points)))
         S = np.array(list(spread)) + NOISE**2 * np.eye(len(points))

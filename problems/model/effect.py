@@ -195,6 +195,17 @@ def pressing_forces(
     return f
 
 
+def junction_load(effects: Iterable[Effect], joint: AnyJoint) -> tuple[Vector, Vector]:
+    """f (n,) N, the forces in the junction, and g (m,) mm, the gaps, of some effects."""
+    f, g = (np.zeros(size) for size in joint.size)
+    for effect in effects:
+        if isinstance(effect, ForceEffect):
+            f += effect.force(joint)
+        elif isinstance(effect, GapEffect):
+            g += effect.gap(joint)
+    return f, g
+
+
 def sides(pair: Pair) -> list[tuple[str, float]]:
     """The parts of a pair, without a tool, and their signs in a column of A."""
     return [(part, sign) for part, sign in zip(pair, (1.0, -1.0), strict=True) if part != TOOL]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import scipy.sparse as sp
@@ -103,3 +104,10 @@ class AnyJoint(Protocol):
 
     def unusual(self) -> Faults:
         """What may be, but is rarely meant: key, value, what is usual."""
+
+
+def across(joint: AnyJoint, rows: Mapping[str, sp.sparray], count: int) -> sp.csr_array:
+    """(count, n) of rows (count, unknowns of the part) on some parts, zero on the others."""
+    spans = {part: joint.unknowns(part) for part in joint.names}
+    none = {part: sp.csr_array((count, own.stop - own.start)) for part, own in spans.items()}
+    return sp.csr_array(sp.hstack([rows.get(part, none[part]) for part in joint.names]))

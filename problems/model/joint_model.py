@@ -26,7 +26,7 @@ from problems.stiffness.operator import Stiffness
 from problems.stiffness.sparse import sparse_block
 from problems.storage import fingerprint
 
-from .effect import Effect, ForceEffect, GapEffect
+from .effect import Effect, junction_load
 from .joint import Joint
 from .numbering import Numbering
 from .part import PartLoadEffect, PartModel, graded
@@ -75,16 +75,12 @@ class JointModel:
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f or f̂ (N,), generalised forces in N, N·mm and N·mm², and g (m,) in mm."""
         joint, given = self.joint, self.scene.effects if effects is None else tuple(effects)
-        f, g = np.zeros(self.numbering.size if sparse else joint.size[0]), np.zeros(joint.size[1])
-        here = self.junction if sparse else slice(None)
-        for effect in given:
-            if isinstance(effect, ForceEffect):
-                f[here] += effect.force(joint)
-            elif isinstance(effect, GapEffect):
-                g += effect.gap(joint)
-        names = [part.name for part in joint.part]
+        f, g = junction_load(given, joint)
+        if sparse:
+            at_junction, f = f, np.zeros(self.numbering.size)
+            f[self.junction] = at_junction
         for load in (effect for effect in given if isinstance(effect, PartLoadEffect)):
-            k = names.index(load.part)
+            k = joint.names.index(load.part)
             if sparse:
                 place, force = self.numbering.places[k], load.load(self.parts[k])
                 f[place[place >= 0]] += force[place >= 0]
@@ -126,14 +122,11 @@ class JointModel:
     def assembly(self) -> Assembly:
         """K̂, a sparse block for each part or for parts that springs join, and B (N, m)."""
         blocks = []
+        added = self._at_junction(self._at_junction(self.springs.added).T)
         ends = np.cumsum([0, *self.numbering.sizes])
         for parts, start, stop in zip(self.tied, ends[:-1], ends[1:], strict=True):
             K = self._block(parts, int(start), int(stop - start))
-            if self.springs:
-                T_here = self._at_junction(self.springs.T)[start:stop]
-                added = T_here @ sp.diags_array(self.springs.k) @ T_here.T
-                K = K + (added + added.T) / 2  # the order of products is another in K_ji: proofs see it
-            blocks.append(sp.csc_array(K))
+            blocks.append(sp.csc_array(K + added[start:stop, start:stop] if self.springs else K))
         B, nodes = self._at_junction(self.joint.contact_matrix()), self._nodes()
         names = self._names(self.tied)
         return Assembly(Stiffness.of(*blocks, nodes=nodes), B, nodes, names, junction=self.junction)
@@ -157,7 +150,7 @@ class JointModel:
         found.sort_indices()
         return found
 
-    def _at_junction(self, M: sp.csc_array) -> sp.csc_array:
+    def _at_junction(self, M: sp.sparray) -> sp.csc_array:
         """(N, k): the rows of M (n, k) at the junction's deflections, the others zero."""
         M = sp.csc_array(M)
         found = sp.csc_array(

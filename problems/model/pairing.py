@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Matrix, Vector
 
-from .surface import Surface
+from .surface import Surface, cross
 
 STEPS, SETTLED = 50, 1e-10  # of the search for a foot; mm
 
@@ -59,7 +59,7 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
     corners = a.surface.triangles
     corners = corners[near[corners].all(axis=1)]
     u, v = (foot[corners[:, k]] - foot[corners[:, 0]] for k in (1, 2))
-    turned = corners[u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] <= 0]
+    turned = corners[cross(u, v) <= 0]
     crossed = tuple(tuple(each) for each in turned.tolist())
     return Pairing(nodes, b.surface.weights(foot[nodes]), t[nodes], int((~on).sum()), far, crossed)
 

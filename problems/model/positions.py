@@ -57,7 +57,7 @@ class Positions(ForceEffect):
         if not self.pattern.on_nodes:
             return places
         nodes = joint.nodes_of(joint.names[0])
-        return nodes[((places[:, None] - nodes) ** 2).sum(axis=2).argmin(axis=1)]
+        return np.array([nodes[((nodes - place) ** 2).sum(axis=1).argmin()] for place in places])
 
     def unusual(self, joint: AnyJoint) -> Faults:
         thinnest = joint.thinnest

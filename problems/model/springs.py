@@ -71,8 +71,9 @@ class Springs:
 
     @cached_property
     def added(self) -> sp.csr_array:
-        """T diag(k) Tᵀ."""
-        return sp.csr_array(self.T @ sp.diags_array(self.k) @ self.T.T)
+        """T diag(k) Tᵀ (n, n), symmetric to the last bit: the order of products is another in K_ji."""
+        product = self.T @ sp.diags_array(self.k) @ self.T.T
+        return sp.csr_array((product + product.T) / 2)
 
     def rows(self, group: Sequence[int]) -> slice:
         """The unknowns of consecutive parts."""

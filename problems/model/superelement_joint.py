@@ -27,6 +27,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded import Positive
 
+from .interface import across
 from .joint import TOOL, Faults, Pair, Table, wrong_contacts
 from .nodes import listed
 from .pairing import Face, Pairing, paired, with_tool
@@ -290,8 +291,7 @@ class SuperelementJoint:
             rows = {pair[0]: self._along(pair[0], own, normals)}
             if pair[1] != TOOL:
                 rows[pair[1]] = -self._along(pair[1], found.W, normals)
-            none = {part.name: sp.csr_array((len(found.nodes), part.size)) for part in self.parts}
-            columns.append(sp.hstack([(none | rows)[name] for name in self.names]))
+            columns.append(across(self, rows, len(found.nodes)))
         if not columns:
             return sp.csc_array((self.size[0], 0))
         A = sp.csc_array(sp.vstack(columns).T)

@@ -29,7 +29,7 @@ from problems.input.user_matrices import SMALL, refuse_dependent
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
 
-from .effect import Effect, ForceEffect, GapEffect
+from .effect import Effect, junction_load
 from .scene import JointScene
 from .springs import Springs
 from .superelement_joint import SuperelementJoint
@@ -75,7 +75,7 @@ class SuperelementModel:
                 allowed = f"at most {DENSEST:.0%} of its entries nonzero: use --form dual or primal"
                 raise InputError.one(part.file, "K", "dense", allowed)
         given = [sp.csc_array(part.stiffness) for part in self.joint.parts]
-        added, blocks = (self.springs.added + self.springs.added.T) / 2, []
+        added, blocks = self.springs.added, []
         for group in self.springs.ranges:
             rows = self.springs.rows(group)
             K = sp.block_diag([given[part] for part in group], format="csc")
@@ -99,14 +99,7 @@ class SuperelementModel:
 
     def load_case(self, sparse: bool, effects: Iterable[Effect] | None = None) -> LoadCase:
         """f (n,), N and N·mm, and g (m,) mm."""
-        joint, given = self.joint, self.scene.effects if effects is None else tuple(effects)
-        f, g = (np.zeros(size) for size in joint.size)
-        for effect in given:
-            if isinstance(effect, ForceEffect):
-                f += effect.force(joint)
-            elif isinstance(effect, GapEffect):
-                g += effect.gap(joint)
-        return LoadCase(f, g)
+        return LoadCase(*junction_load(self.scene.effects if effects is None else effects, self.joint))
 
     @property
     def _key(self) -> str:

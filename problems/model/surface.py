@@ -164,7 +164,7 @@ class Triangles(Surface):
         """(k, 3) of each point in its triangle, by the areas that it spans with the edges."""
         corners = self.nodes[self.mesh.simplices[np.asarray(triangles, dtype=np.intp)]]
         a, b, c = (corners[:, j] - points for j in range(3))
-        shares = np.column_stack([_cross(b, c), _cross(c, a), _cross(a, b)])
+        shares = np.column_stack([cross(b, c), cross(c, a), cross(a, b)])
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
@@ -222,14 +222,15 @@ def _tributary_lengths(grid: Vector) -> Vector:
     return 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
 
 
-def _cross(u: Matrix, v: Matrix) -> Vector:
+def cross(u: Matrix, v: Matrix) -> Vector:
+    """(k,) u × v of vectors (k, 2)."""
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
 def _areas(nodes: Matrix, triangles: Indices) -> Vector:
     """Signed, mm²."""
     a, b, c = (nodes[triangles[:, j]] for j in range(3))
-    return _cross(b - a, c - a) / 2
+    return cross(b - a, c - a) / 2
 
 
 def _no_bridges(nodes: Matrix, triangles: Indices) -> Mask:

@@ -77,3 +77,9 @@ def test_gaps_that_no_grid_moves_leave_nothing_out() -> None:
     assert isinstance(found.problem.scene, JointScene)
     assert estimated(found).error_mm < 1e-12
     assert estimated(found, refine=True).error_mm < 1e-12
+
+
+def test_a_grid_without_an_answer_costs_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = strips(*PLANS["pressure"])
+    monkeypatch.setattr("harness.scene.grid_error.candidates", lambda *_: iter(()))
+    assert estimated(found) is None

@@ -53,6 +53,15 @@ def test_blocks_are_those_of_the_dense_sum() -> None:
         np.testing.assert_allclose(K @ made.assembly.K.solve(b), b, atol=1e-7)
 
 
+def test_springs_between_nodes_leave_K_symmetric_to_the_last_bit() -> None:
+    """The order of a sum is another in K_ji; a proof takes K as it is."""
+    places = np.random.default_rng(1).uniform((0, 0), (400, 120), (40, 2))
+    scene = make_scene(FOUR, fastener(*map(tuple, places.tolist())))
+    for form in ("dual", "sparse"):
+        for K in prepared(scene, form=form).assembly.K.matrices:
+            assert abs(K - K.T).max() == 0
+
+
 def test_installing_a_fastener_condenses_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     effect = Supports(kind="supports", part="a", points=((0.0, 0.0),), stiffness_per_point=123.0)
     prepared(make_scene(TWO, effect))
