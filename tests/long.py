@@ -34,8 +34,11 @@ def seeds(short: int, long: int) -> range:
     return range(long if ASKED else short)
 
 
-class Fault(Exception):
-    """What a fuzzer exists to find. kind : hang, traceback, lost, wrong or words."""
+class Fault(BaseException):
+    """What a fuzzer exists to find; no `except Exception` of the code under test catches it.
+
+    kind : hang, traceback, lost, wrong or words.
+    """
 
     def __init__(self, kind: str, what: object) -> None:
         super().__init__(kind, what)

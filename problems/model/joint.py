@@ -27,6 +27,7 @@ from .surface import Grid
 MOST = 100_000  # grid lines; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]
 SHORT = 20.0  # mm, a junction that may have been given in metres
+SLENDER = 50.0  # an element's longer side to its shorter: K then loses as many digits as its square has
 SOFT, STIFF = 1e3, 1e6  # N/mm², around the moduli of plastics and metals
 TOOL = "tool"  # the second of a contact pair: a rigid surface
 Pair = tuple[str, str]
@@ -234,6 +235,10 @@ class Joint(Table):
         length, width = self.junction.length, self.junction.width
         if max(length, width) < SHORT:
             yield "junction.length", length, f"at least {SHORT:g} mm: are these metres?"
+        hx, hy = self.x[1], self.y[1]
+        if max(hx, hy) > SLENDER * min(hx, hy):
+            sides = f"elements about as long as wide, not {hx:.3g} x {hy:.3g} mm"
+            yield "junction.nodes", list(self.junction.nodes), sides
         for part in self.part:
             y = self.plate(part).y
             if part.thickness > (side := min(length, y[-1] - y[0])):

@@ -102,9 +102,10 @@ class JointScene(Scene):
         found = [("joint", self.joint.unusual())]
         found += [(effect.kind, effect.unusual(self.joint)) for effect in self.effects]
         return [
-            f"{where}.{key} = {value:g} is unusual; usual is {usual}"
+            f"{where}.{key} = {shown} is unusual; usual is {usual}"
             for where, some in found
             for key, value, usual in some
+            for shown in [value if isinstance(value, list) else f"{value:g}"]
         ]
 
     def marks(self) -> Matrix:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +21,9 @@ class BandedBlock(SparseBlock):
     def __init__(self, matrix: sp.csc_array, width: int, order: Indices | None = None) -> None:
         super().__init__(matrix)
         self.width, self.order = width, order
+
+    def replaced(self, matrix: sp.csc_array) -> Self:
+        return type(self)(matrix, self.width, self.order)
 
     @cached_property
     def L(self) -> Matrix:

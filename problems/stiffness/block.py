@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -104,6 +104,10 @@ class SparseBlock(Block):
             matrix = matrix.copy()
             matrix.sum_duplicates()
         self.matrix = matrix
+
+    @abstractmethod
+    def replaced(self, matrix: sp.csc_array) -> Self:
+        """Another matrix, zero wherever this one is, in the same numbering."""
 
     @property
     def arrays(self) -> list[NDArray[Any]]:

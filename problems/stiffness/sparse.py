@@ -6,7 +6,7 @@ first that is narrow enough is taken.
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,6 +54,9 @@ class GeneralBlock(SparseBlock):
     def __init__(self, matrix: sp.csc_array, width: int) -> None:
         super().__init__(matrix)
         self.width = width
+
+    def replaced(self, matrix: sp.csc_array) -> Self:
+        return type(self)(matrix, self.width)
 
     @cached_property
     def lu(self) -> Any:

@@ -28,7 +28,8 @@ import scipy.sparse as sp
 from problems.forms.assembly import Mask, Vector
 from problems.forms.banded_inverse import BandedInverse, BandFactor
 from problems.forms.prepared import Prepared
-from problems.stiffness.operator import Stiffness
+from problems.stiffness.block import SparseBlock
+from problems.stiffness.sparse import sparse_block
 from solvers.base import LoadCase
 
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
@@ -60,43 +61,48 @@ def banded_set(factor: OpenFactor, start: TrialSolution, C: Mask) -> TrialSoluti
     return TrialSolution(new, np.where(C, 0.0, y + z), SIGN_UNCERTAINTY * start.rounding)
 
 
-def factored_set(prepared: Prepared, start: TrialSolution, C: Mask) -> TrialSolution:
-    """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
-    A, lam, y = prepared.assembly.A, start.lam, start.y
-    rho = STIFFER * stiffest_contact(prepared)
-    K, change = with_springs(prepared, rho, C), np.zeros_like(lam)
-    for _ in range(PASSES):
-        closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))
-        change = np.where(C, change + rho * (closed - y), -lam)
-    return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
+class ContactSprings:
+    """K with springs at closed contacts, in place of Q⁻¹; vectors in the order of A.
 
-
-def penalty_continuation(prepared: Prepared, load: LoadCase) -> Mask:
-    """(m,) the contacts that overlap with springs as stiff as K: a first set. load : with p.
-
-    Springs alone, ever stiffer, one step of Newton's method per ρ from the stiffness of the body to that of
-    K: an edge of contact moves as far as they give way, however fine the mesh, where pivoting moves it by a
-    row of contacts per set (Hintermüller and Kunisch, SIAM J. Optim. 17:159–187, 2006).
+    K : one matrix. order : K with springs at all contacts, whose numbering serves those at any. stiffest :
+    N/mm, of the unknowns at contacts, as a spring at that contact.
     """
-    A, overlap = prepared.assembly.A, np.maximum(load.p, 0.0)
-    C = overlap > 0
-    if not C.any():
+
+    def __init__(self, prepared: Prepared) -> None:
+        assembly = prepared.assembly
+        self.compliance, self.A, self.K = prepared.compliance, assembly.A, assembly.K.matrix
+        self.order = sparse_block(sp.csc_array(self.K + self.A @ self.A.T), assembly.nodes)
+        stiffest = float(assembly.K.diagonal[self.A.indices].max(initial=0.0))
+        self.stiffest = stiffest / ((self.A.data**2).max(initial=0.0) or 1.0)
+
+    def block(self, rho: float, C: Mask) -> SparseBlock:
+        """K + ρ A_C A_Cᵀ."""
+        A_C = self.A[:, np.flatnonzero(C)]
+        return self.order.replaced(sp.csc_array(self.K + rho * (A_C @ A_C.T)))
+
+    def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
+        """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
+        A, lam, y = self.A, start.lam, start.y
+        rho = STIFFER * self.stiffest
+        K, change = self.block(rho, C), np.zeros_like(lam)
+        for _ in range(PASSES):
+            closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))
+            change = np.where(C, change + rho * (closed - y), -lam)
+        return TrialSolution(lam + change, np.where(C, 0.0, y - closed), SIGN_UNCERTAINTY * start.rounding)
+
+    def first_set(self, load: LoadCase) -> Mask:
+        """(m,) the contacts that overlap with springs as stiff as K. load : with p.
+
+        Springs alone, ever stiffer, one step of Newton's method per ρ from the stiffness of the body to that
+        of K: an edge of contact moves as far as they give way, however fine the mesh, where pivoting moves it
+        by a row of contacts per set (Hintermüller and Kunisch, SIAM J. Optim. 17:159–187, 2006).
+        """
+        A, overlap = self.A, np.maximum(load.p, 0.0)
+        C = overlap > 0
+        if not C.any():
+            return C
+        rho = float(overlap @ overlap / (overlap @ (self.compliance @ overlap)))
+        while rho < self.stiffest and C.any():
+            x = self.block(rho, C).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
+            C, rho = A.T @ x > load.g, GROWTH * rho
         return C
-    rho = float(overlap @ overlap / (overlap @ (prepared.compliance @ overlap)))
-    while rho < stiffest_contact(prepared) and C.any():
-        x = with_springs(prepared, rho, C).solve(load.f + A @ np.where(C, rho * load.g, 0.0))
-        C, rho = A.T @ x > load.g, GROWTH * rho
-    return C
-
-
-def with_springs(prepared: Prepared, rho: float, C: Mask) -> Stiffness:
-    """K + ρ A_C A_Cᵀ."""
-    assembly = prepared.assembly
-    A_C = assembly.A[:, np.flatnonzero(C)]
-    return Stiffness.of(sp.csc_array(assembly.K.matrix + rho * (A_C @ A_C.T)), nodes=assembly.nodes)
-
-
-def stiffest_contact(prepared: Prepared) -> float:
-    """The stiffness of the stiffest unknown at a contact, for a spring at that contact."""
-    K, A = prepared.assembly.K, prepared.assembly.A
-    return float(K.diagonal[A.indices].max(initial=0.0) / ((A.data**2).max(initial=0.0) or 1.0))

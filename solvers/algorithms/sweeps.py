@@ -19,7 +19,7 @@ corrects more than further sets; so the limit on the sets of a sweep grows with 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from solvers.base import Answer, LoadCase, Status, WarmStart
 from solvers.kkt import EPS, judged, kkt_residual, largest_rounding, rounding_of
 
 from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wrong_signs
-from .contact_sets import OpenFactor, banded_set, factored_set, penalty_continuation
+from .contact_sets import ContactSprings, OpenFactor, banded_set
 
 MAX_SWEEPS = 200
 FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
@@ -82,6 +82,11 @@ class Sweeps:
         self.order = np.arange(len(near.diagonal)) if near.M is None else near.M.order
         self.own = near.diagonal[self.order]
 
+    @cached_property
+    def springs(self) -> ContactSprings:
+        """In place of M."""
+        return ContactSprings(self.prepared)
+
     def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """An answer to each load, all with p, solved together from the nearest of the cases before them."""
         before = self.last or [self.solved(loads[0], tolerance)]
@@ -98,7 +103,7 @@ class Sweeps:
         order = self.order
         if start is None:
             y = -load.p[order]
-            first = y < 0 if self.M is not None else penalty_continuation(self.prepared, load)
+            first = y < 0 if self.M is not None else self.springs.first_set(load)
             case = Case(load, first, TrialSolution(np.zeros(len(y)), y, float(abs(y).max(initial=0.0))))
         else:
             lam, y = start.lam[order], start.gap[order]
@@ -174,7 +179,7 @@ class Sweeps:
         """
         at: Callable[[Mask], TrialSolution]
         if self.M is None:
-            at = partial(factored_set, self.prepared, case.trial)
+            at = partial(self.springs.set, case.trial)
         else:
             case.factor = case.factor or OpenFactor(self.M)
             at = partial(banded_set, case.factor, case.trial)

@@ -26,6 +26,10 @@ SOFT = {"part": [PART | {"young": 70.0}, PART | {"name": "b", "young": 70e9}]}
     ("found", "words"),
     [
         (lambda: unusual(junction={"length": 4.0, "width": 0.4, "nodes": [9, 5]}), ["length = 4", "metres"]),
+        (
+            lambda: unusual(junction={"length": 100.0, "width": 50.0, "nodes": [4, 1000]}),
+            ["junction.nodes = [4, 1000]", "33.3 x 0.0501 mm"],
+        ),
         (lambda: unusual(**SOFT), ["part.a.young = 70 ", "part.b.young = 7e+10"]),
         (lambda: unusual(part=[PART | {"thickness": 211.0}]), ["part.a.thickness = 211", "210 mm"]),
         (lambda: unusual({"kind": "initial_gap", "mean": -0.1}), ["initial_gap.mean = -0.1", "overlap"]),
