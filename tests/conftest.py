@@ -1,4 +1,5 @@
-"""What all tests share: a cache of their own, so that none reads or fills the user's; quick tests first."""
+"""What all tests share: a cache of their own, so that none reads or fills the user's; pictures of few pixels,
+drawn in a quarter of the time; quick tests first."""
 
 import os
 import shutil
@@ -14,18 +15,13 @@ if DISTRIBUTED:  # a thread for each process; read when numpy is loaded
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """One for all processes of pytest-xdist, so that an assembly is built once."""
     folder = tmp_path_factory.getbasetemp()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str((folder.parent if DISTRIBUTED else folder) / "cache"))
+        patch.setattr("report.figures.style.DPI", 40)
         yield
-
-
-@pytest.fixture
-def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drawn in a quarter of the time."""
-    monkeypatch.setattr("report.figures.style.DPI", 40)
 
 
 @pytest.fixture(scope="session")

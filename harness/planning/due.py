@@ -15,7 +15,7 @@ from math import inf
 from harness.results.records import Row
 from harness.results.schema import STEPS
 from problems.forms import DENSE_FORMS
-from problems.scene import read_scene
+from problems.ladders import LADDERS, prefix_of
 
 from .plan import DECADES, MOST_REPEATS, Measurement
 
@@ -133,7 +133,7 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     for row in looser:
         if row["status"] in OUT_OF_TIME and m.time_limit_s <= row["time_limit_s"]:
             return f"{m.scene} at {row['tolerance']:g}"
-    if read_scene(m.source).on_ladder:
+    if prefix_of(m.source) in LADDERS:
         return ""
     others = [row for row in own if row["scene"] != m.scene and row["tolerance"] == m.tolerance]
     largest = max((row["n"] for row in others if row["n"] < n), default=0)

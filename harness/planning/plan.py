@@ -13,6 +13,7 @@ from itertools import product
 from typing import Any
 
 from problems.errors import Fault, InputError
+from problems.model.scene import Scene
 from problems.scene import read_scene
 from solvers.base import FORMS, Form
 
@@ -96,7 +97,7 @@ def expand(suite: Suite) -> list[Measurement]:
 
     Raises InputError if nothing is left to measure or if two files have the same scene name.
     """
-    names: dict[str, str] = {}
+    scenes: dict[str, Scene] = {}
     faults: list[Fault] = []
     for source in suite.scenes:
         try:
@@ -104,23 +105,23 @@ def expand(suite: Suite) -> list[Measurement]:
         except InputError as error:
             faults += error.faults
             continue
-        if scene.name in names.values():
+        if scene.name in (other.name for other in scenes.values()):
             allowed = f"another is called {scene.name} too; rename it"
             faults.append(Fault(suite.name, "scenes", source, allowed))
         if not scene.refused:
-            names[source] = scene.name
+            scenes[source] = scene
     if faults:
         raise InputError(faults)
     plan: dict[str, Measurement] = {}
-    for source, name in names.items():
+    for source, scene in scenes.items():
         entries = [
-            (e, _rounds(e.repeats or suite.repeats)) for e in suite.solver if _applies(e, name, source)
+            (e, _rounds(e.repeats or suite.repeats)) for e in suite.solver if _applies(e, scene.name, source)
         ]
         rounds = max((repeats for _, repeats in entries), default=0)
         for repeat in range(rounds):
             due = [entry for entry, repeats in entries if repeat < repeats]
-            one_round = [made for entry in due for made in _of_entry(suite, entry, name, source, repeat)]
-            for measurement in _shuffled(one_round, f"{name} {repeat}") if repeat else one_round:
+            one_round = [made for entry in due for made in _of_entry(suite, entry, scene, source, repeat)]
+            for measurement in _shuffled(one_round, f"{scene.name} {repeat}") if repeat else one_round:
                 plan.setdefault(measurement.key, measurement)
     if not plan:
         restricted = {entry.name: entry.scenes for entry in suite.solver}
@@ -143,11 +144,11 @@ def _shuffled(one_round: list[Measurement], seed: str) -> list[Measurement]:
 
 
 def _of_entry(
-    suite: Suite, entry: SolverEntry, scene: str, source: str, repeat: int
+    suite: Suite, entry: SolverEntry, scene: Scene, source: str, repeat: int
 ) -> Iterator[Measurement]:
     asked = entry.tolerances or suite.tolerances
     tolerances = DECADES if asked == "auto" else asked
-    n, _ = read_scene(source).expected_size or (0, 0)
+    n, _ = scene.expected_size or (0, 0)
     threads_asked = entry.threads or suite.threads
     series = suite.series
     if series is not None and entry.cases is not None:
@@ -156,7 +157,7 @@ def _of_entry(
     for form, tolerance, threads, case in product(entry.forms or FORMS, tolerances, threads_asked, cases):
         yield Measurement(
             suite=suite.name,
-            scene=scene,
+            scene=scene.name,
             source=source,
             solver=entry.name,
             form=form,

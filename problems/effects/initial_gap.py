@@ -9,7 +9,7 @@ import numpy as np
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, Positive, Seed
 from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
-from problems.model.interface import AnyJoint
+from problems.model.interface import AnyJoint, Pair
 from problems.model.joint import Faults, Table
 
 #: Of the largest eigenvalue of a correlation matrix: how far L² may be from it, see `square_root`.
@@ -48,15 +48,22 @@ class InitialGap(ContactEffect, GapEffect):
             yield "mean", self.mean, "0 mm or more: the parts would overlap"
 
     def gap(self, joint: AnyJoint) -> Vector:
-        g = at_contacts(lambda pair: self.mean, self.pairs(joint), joint)
-        if self.random:
-            rng = np.random.default_rng(self.random.seed)
-            length = self.random.correlation_length
-            Lx, Ly = (square_root(grid.tobytes(), length) for grid in joint.grid(length))
-            for pair in self.pairs(joint):
-                Z = rng.standard_normal((len(Ly), len(Lx)))
-                g[joint.span(pair)] += self.random.sd * joint.from_grid(pair, Ly @ Z @ Lx)
-        return g
+        drawn = self.on_grid(joint)
+        return at_contacts(
+            lambda pair: joint.from_grid(pair, drawn[pair]) if drawn else self.mean, self.pairs(joint), joint
+        )
+
+    def on_grid(self, joint: AnyJoint) -> dict[Pair, Matrix]:
+        """mean + sd · Ly Z Lx, mm, of each pair, on the grid of the joint; none without a random field."""
+        if self.random is None:
+            return {}
+        rng = np.random.default_rng(self.random.seed)
+        length = self.random.correlation_length
+        Lx, Ly = (square_root(grid.tobytes(), length) for grid in joint.grid(length))
+        return {
+            pair: self.mean + self.random.sd * (Ly @ rng.standard_normal((len(Ly), len(Lx))) @ Lx)
+            for pair in self.pairs(joint)
+        }
 
 
 @lru_cache(maxsize=8)  # a series draws field after field on one grid

@@ -14,8 +14,8 @@ from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix
 from problems.input.bounded import validation_faults
+from problems.model.effect import at_contacts
 from problems.model.interface import AnyJoint
-from problems.model.joint import Joint
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
@@ -54,13 +54,12 @@ class RandomGaps(LoadCases):
     def load(self, k: int) -> LoadCase:
         assert self.field.random is not None
         seed, sd = self.parameters(k)["gap_seed"], self.field.random.sd
-        drawn = self.field.random.model_copy(update={"seed": seed})
-        gap = self.field.model_copy(update={"random": drawn}).gap(self.joint)
-        if self._scan is not None:
-            random = np.random.default_rng((seed, 1))
-            for pair in self.field.pairs(self.joint):
-                own = self.joint.span(pair)
-                gap[own] = self._scan.through(gap[own], sd, random)
+        field = self.field.model_copy(update={"random": self.field.random.model_copy(update={"seed": seed})})
+        if self._scan is None:
+            return LoadCase(self.rest.f, self.rest.g + field.gap(self.joint))
+        scan, random = self._scan, np.random.default_rng((seed, 1))
+        through = {pair: scan.through(z, sd, random) for pair, z in field.on_grid(self.joint).items()}
+        gap = at_contacts(lambda pair: self.joint.from_grid(pair, through[pair]), list(through), self.joint)
         return LoadCase(self.rest.f, self.rest.g + gap)
 
     @cached_property
@@ -68,7 +67,6 @@ class RandomGaps(LoadCases):
         if self.points is None:
             return None
         assert self.field.random is not None
-        assert isinstance(self.joint, Joint)
         return Scan.of(self.joint, self.points, self.field.random.correlation_length)
 
 
@@ -100,7 +98,7 @@ def random_gaps(
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
     options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    points = None if around is None else _scan_of(around, scene)
+    points = None if around is None else read_scan(around, scene.joint)
     usual = None if points is None else float(points[:, 2].mean())
     if any(effect.kind == "measured_gap" for effect in scene.effects):
         if around is not None:
@@ -118,12 +116,3 @@ def random_gaps(
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = [effect for effect in scene.effects if effect not in found]
     return RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)
-
-
-def _scan_of(path: Path, scene: JointScene) -> Matrix:
-    if not isinstance(scene.joint, Joint):
-        allowed = (
-            "needs a joint of plates; for superelements give a measured_gap, or a table of gaps (--gaps)"
-        )
-        raise InputError.one(f"scene {scene.name}", "--around", str(path), allowed)
-    return read_scan(path, scene.joint)

@@ -1,6 +1,6 @@
 """Random gaps that pass through a scan: a Gaussian field given its values at points.
 
-Of z ~ N(0, σ²C) at the junction nodes and a scan d = Wz + ε, with W the bilinear weights of its points and
+Of z ~ N(0, σ²C) on the joint's grid and a scan d = Wz + ε, with W the weights of its points on that grid and
 ε ~ N(0, (νσ)² I), a field given d is, exactly (Chilès, Delfiner, Geostatistics, 2012, section 7.3.1),
 
     z + CWᵀ (WCWᵀ + ν²I)⁻¹ (d − ε − Wz).
@@ -22,12 +22,12 @@ from problems.effects.initial_gap import square_root
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.model.effect_tables import read_columns
-from problems.model.joint import Joint
+from problems.model.interface import AnyJoint
 
 NOISE = 1e-3  # ν
 
 
-def read_scan(path: Path, joint: Joint) -> Matrix:
+def read_scan(path: Path, joint: AnyJoint) -> Matrix:
     """(s, 3) x, y and gap in mm. Raises InputError with all faults, also of points off the junction."""
     read = read_columns(path, {name: name for name in ("x", "y", "gap")})
     points = np.array(read.rows).reshape(-1, 3)
@@ -42,7 +42,9 @@ def read_scan(path: Path, joint: Joint) -> Matrix:
 
 @dataclass(frozen=True)
 class Scan:
-    """W (s, node_count), Cx and Cy with C = Cy ⊗ Cx, the Cholesky factor of WCWᵀ + ν²I, and d (s,) mm."""
+    """W (s, N) on the N crossings of the grid, Cx and Cy with C = Cy ⊗ Cx, the Cholesky factor of WCWᵀ + ν²I,
+    and d (s,) mm.
+    """
 
     W: sp.csr_array
     Cx: Matrix
@@ -51,8 +53,8 @@ class Scan:
     gaps: Vector
 
     @classmethod
-    def of(cls, joint: Joint, points: Matrix, correlation_length: float) -> Scan:
-        W = joint.weights(points[:, :2])
+    def of(cls, joint: AnyJoint, points: Matrix, correlation_length: float) -> Scan:
+        W = joint.grid_weights(points[:, :2], correlation_length)
         grid = joint.grid(correlation_length)
         Lx, Ly = (square_root(lines.tobytes(), correlation_length) for lines in grid)
         Cx, Cy = Lx @ Lx, Ly @ Ly
@@ -60,10 +62,11 @@ class Scan:
         S = np.array(list(spread)) + NOISE**2 * np.eye(len(points))
         return cls(W, Cx, Cy, sla.cho_factor((S + S.T) / 2), points[:, 2])
 
-    def through(self, gap: Vector, sd: float, random: np.random.Generator) -> Vector:
-        """The random gap (node_count,) mm of a pair, made to pass through the scan. sd : σ, mm."""
-        missed = self.gaps - NOISE * sd * random.standard_normal(len(self.gaps)) - self.W @ gap
-        return gap + _times(self.Cx, self.Cy, self.W.T @ sla.cho_solve(self.factor, missed))
+    def through(self, gap: Matrix, sd: float, random: np.random.Generator) -> Matrix:
+        """The random gap of a pair on the grid, mm, made to pass through the scan. sd : σ, mm."""
+        missed = self.gaps - NOISE * sd * random.standard_normal(len(self.gaps)) - self.W @ gap.ravel()
+        change = _times(self.Cx, self.Cy, self.W.T @ sla.cho_solve(self.factor, missed))
+        return gap + change.reshape(gap.shape)
 
 
 def _times(Cx: Matrix, Cy: Matrix, v: Vector) -> Vector:

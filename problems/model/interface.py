@@ -87,6 +87,9 @@ class AnyJoint(Protocol):
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         """x and y of a grid over the junction on which a random field of that length is drawn."""
 
+    def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
+        """W (k, len(y) len(x)): Wz are the values at points (k, 2), mm, of a field z on that grid."""
+
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
         """(c,) at the contacts of a pair, from values (len(y), len(x)) on that grid."""
 

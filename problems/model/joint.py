@@ -183,6 +183,9 @@ class Joint(Table):
     def grid(self, correlation_length: float) -> tuple[Vector, Vector]:
         return self.x, self.y
 
+    def grid_weights(self, points: Matrix, correlation_length: float) -> sp.csr_array:
+        return self.weights(points)
+
     def from_grid(self, pair: Pair, values: Matrix) -> Vector:
         return values.ravel()
 

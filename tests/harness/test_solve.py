@@ -154,7 +154,7 @@ def test_files_hold_the_answer(solved: tuple[dict[str, Any], Path]) -> None:
     for name in ("gap", "forces", "displacement"):
         assert f"]({name}.png)" in text
         height, width, *_ = imread(out / f"{name}.png").shape
-        assert min(height, width) > 300
+        assert min(height, width) > 100  # at 40 dpi
     assert len(text.splitlines()) < 90
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from joints import make_joint, make_scene
+from superelements import flat, scene_from, stiffnesses, write_part
 
 from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
@@ -44,6 +45,25 @@ def test_every_case_passes_through_the_scan(tmp_path: Path) -> None:
         assert abs(W @ found.load(k).g - SCAN[:, 2]).max() < 6 * NOISE * SD
     assert found.field.mean == pytest.approx(SCAN[:, 2].mean())  # of the scan, if no other is given
     assert cases(tmp_path, mean=0.1).field.mean == 0.1
+
+
+def test_on_superelements_too(tmp_path: Path) -> None:
+    """At contacts that are not on the grid of the field, by the splines that interpolate it."""
+    parts = [
+        write_part(tmp_path, name, K, flat(JOINT.nodes))
+        for name, K in zip("ab", stiffnesses(JOINT), strict=True)
+    ]
+    scene = scene_from(parts)
+    at = scene.joint.places(("a", "b"))[[3, 20, 22, 44]]
+    length = 130.0
+    assert abs(at[1, 0] - scene.joint.grid(length)[0]).min() > 1
+    (tmp_path / "scan.csv").write_text(
+        "x,y,gap\n" + "\n".join(f"{x!r},{y!r},{0.1 * k}" for k, (x, y) in enumerate(at.tolist()))
+    )
+    found = random_gaps(scene, 20, 7, sd=SD, correlation_length=length, around=tmp_path / "scan.csv")
+    gaps = np.array([found.load(k).g for k in range(20)])
+    assert abs(gaps[:, [3, 20, 22, 44]] - 0.1 * np.arange(4)).max() < 6 * NOISE * SD
+    assert gaps.std(axis=0).max() > SD / 4
 
 
 def test_the_cases_depend_on_the_scan_and_the_seed_alone(tmp_path: Path) -> None:

@@ -24,7 +24,6 @@ from report.results.series import read as read_series
 from report.writers import comparison
 from report.writers.series import write as write_series
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 PUBLISHED = Path(__file__).parents[2] / "results" / "published"
 DIRECTORIES = sorted(path.parent for path in PUBLISHED.glob("*/measurements.jsonl"))
 MOST_BYTES = 2_000_000

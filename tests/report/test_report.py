@@ -18,7 +18,6 @@ from report.sections.speed import contacts
 from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard
 from report.writers.markdown import write
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 LOW, HIGH = "4386/0100", "4386/1000"
 
 

@@ -13,8 +13,6 @@ from report.results.reader import Results
 from report.sections import accuracy, summary
 from report.writers.markdown import write
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
-
 
 def changed(rows: list[dict[str, Any]], solver: str, **figures: Any) -> list[dict[str, Any]]:
     return [r | figures if r["solver"] == solver else r for r in rows]

@@ -11,7 +11,6 @@ from report.document.blocks import Section
 from report.sections import drawn as drawn_scenes
 from report.writers.markdown import write
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 SECONDS = {
     **{("newton", "dual"): 0.05, ("mprgp", "dual"): 0.1},
     **{("newton", "sparse"): 0.3, ("mprgp", "sparse"): 0.4},

@@ -24,7 +24,6 @@ from report.sections.ladders import (
 from report.writers.markdown import write
 
 EASY, MIDDLE, HARD, ODD = "hard/steep/1e1", "hard/steep/1e5", "hard/steep/1e9", "hard/odd/one"
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 WRONG = {"verdict": "outside", "displacement_error_mm": 3e-3, "limit_mm": 1e-6}
 
 

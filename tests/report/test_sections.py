@@ -16,7 +16,6 @@ from report.results.reader import read
 from report.sections import SECTIONS, accuracy, drawn, roads, speed, summary
 from report.writers.markdown import contents, write
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 LOW, HIGH = "4386/0100", "4386/1000"
 SWEEP = [row(LOW, "a", tolerance=tolerance) for tolerance in (1e-6, 1e-9)]
 FORMS = {form: row(LOW, "newton", form) for form in ("dual", "primal", "sparse")}

@@ -32,8 +32,6 @@ from studies.paper import claims, printed
 from studies.paper.claims import EVIDENCE
 from studies.paper.figures5_7 import crossings
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
-
 
 def words(directory: Path, rows: Rows, *names: str) -> dict[str, str]:
     """Of each claim yes, no, part, open or not measured."""

@@ -56,7 +56,7 @@ def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
 def test_every_hostile_file_is_refused_or_right(
     targets: list[Target], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    log, count, save = Log(), draws(150, 20_000), Figure.savefig
+    log, count, save = Log(), draws(100, 20_000), Figure.savefig
     shares = np.array([target.share for target in targets])
     for index in range(count):
         random = np.random.default_rng([SEED, index])

@@ -30,7 +30,6 @@ from report.writers.solution import write as write_solution
 
 HOSTILE = "<b>x</b>|![i](http://e)`c`$a_b$ *e*\n# h\x1b[31m\u202e\ud800"
 LITERAL = r"&lt;b&gt;x&lt;/b&gt;\|\!\[i\](http://e)&#96;c&#96;\$a_b\$ \*e\* \# h�\[31m��"
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 FORMULAS = ["+1+1", "-2+3", "@SUM(A1)", " =1"]
 
 

@@ -24,7 +24,7 @@ from report.results.series import read as read_series
 from report.writers.series import write as write_series
 from report.writers.solution import write as write_solution
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_pictures")]
+pytestmark = pytest.mark.slow
 FLAGS = (
     *("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-sync"),
     *("disable-background-networking", "disable-component-update", "window-size=1400,1000"),
