@@ -12,6 +12,7 @@ from matplotlib.patches import Rectangle
 from report.results.answers import Answer, pair_name
 
 from . import style
+from .deformed import deformed_figure
 from .maps import CLOSED, LARGER, RIM, Array, Map, Scale, drawn, grid_of, rooted
 from .section import section_figure
 
@@ -19,8 +20,9 @@ from .section import section_figure
 def answer_figures(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Figure]:
     with style.applied():
         figures = {"gap": _gap(record, arrays)} if record["m"] else {}
-        if (section := section_figure(record, arrays)) is not None:
-            figures["section"] = section
+        for name, seen in (("section", section_figure), ("deformed", deformed_figure)):
+            if (figure := seen(record, arrays)) is not None:
+                figures[name] = figure
         if (arrays["lam"] > 0).any():
             figures["forces"] = _forces(record, arrays)
         return figures | {"displacement": _displacement(record, arrays)}

@@ -19,9 +19,8 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
     """Along both grid lines through the largest gap; None without contacts, or if they are on no grid."""
     if not record["m"] or not {"contact_nodes", "A_data"} <= set(arrays):
         return None
-    gap = arrays["gap_after"]
+    gap, pair = arrays["gap_after"], worst_pair(record, arrays)
     worst = int(gap.argmax())
-    pair = next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
     own = slice(pair["start"], pair["stop"])
     nodes = arrays["contact_nodes"][own]
     if (grid := grid_of(nodes)) is None:
@@ -47,6 +46,12 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
         labels = [f"{names[0]}, after", f"{names[1]}, after", "gap left", "before"]
         figure.legend(handles, labels, loc="outside lower left", ncols=4)
     return figure
+
+
+def worst_pair(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Any]:
+    """The pair of parts with the largest gap."""
+    worst = int(arrays["gap_after"].argmax())
+    return next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
 
 
 def first_faces(arrays: dict[str, Array]) -> Array:

@@ -24,6 +24,8 @@ from report.writers.pdf import write_pdf
 
 CAPTIONS = {
     "section": "*A section through the largest gap*, its height exaggerated: the faces of the parts.",
+    "deformed": "*The parts around the largest gap*, not to scale: the first grey, the second coloured by "
+    "the gap left.",
     "gap": "*The gap before and after*, on square-root scales; outlined: closed contacts.",
     "forces": "*The contact forces*, on a square-root scale; outlined: closed contacts.",
     "displacement": "*The displacements*, positive from the first part of a contact to the second; hatched: "
@@ -54,7 +56,7 @@ def write(directory: Path) -> Path:
         figures = answer_figures(record, arrays)
         vtu = write_vtu(directory / "solution.vtu", record, arrays)
     drawn = {name: Figure(name, CAPTIONS[name], drawing) for name, drawing in figures.items()}
-    blocks += [drawn.pop(name) for name in ("gap", "section") if name in drawn]
+    blocks += [drawn.pop(name) for name in ("gap", "section", "deformed") if name in drawn]
     blocks += [*_fields(record, arrays), *drawn.values()]
     known = pd.DataFrame(facts(record), columns=["what", "value"])
     of_grid = record["grid"]["said"]

@@ -1,4 +1,4 @@
-"""The section through the largest gap, and the page of PDF."""
+"""The section through the largest gap, the view of the parts around it, and the page of PDF."""
 
 import re
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from report.figures.deformed import deformed_figure
 from report.figures.section import section_figure
 from report.writers.pdf import LETTERS, write_pdf
 
@@ -65,6 +66,33 @@ def test_scattered_contacts_have_no_section() -> None:
     arrays["contact_nodes"] = arrays["contact_nodes"] + np.random.default_rng(0).normal(size=(42, 2))
     assert section_figure(record, arrays) is None
     assert section_figure({"m": 0, "pairs": []}, {}) is None
+
+
+@pytest.mark.parametrize("worst", [13, 30])
+@pytest.mark.parametrize("moved", [0.0, 1.0])
+def test_the_view_is_of_both_faces(worst: int, moved: float) -> None:
+    """Of the pair with the largest gap, its contacts on a grid or not."""
+    record, arrays = answer(worst)
+    arrays["contact_nodes"] = arrays["contact_nodes"] + moved * np.random.default_rng(0).normal(size=(42, 2))
+    figure = deformed_figure(record, arrays)
+    assert figure is not None
+    own = slice(0, 21) if worst < 21 else slice(21, 42)
+    first, second = arrays["x"][own], (arrays["x"] + arrays["gap_after"])[own]
+    view: Any = figure.axes[0]
+    bar = figure.axes[1]
+    assert view.get_title().endswith("at most 2.00 mm apart")
+    assert bar.get_ylim() == (0.0, 2.0)
+    low, high = view.get_zlim()
+    assert low <= min(first.min(), second.min()) + 0.5
+    assert high >= max(first.max(), second.max()) - 0.5
+    assert len(view.collections) == 2
+
+
+def test_what_has_no_area_is_not_drawn() -> None:
+    record, arrays = answer(3)
+    arrays["contact_nodes"] = arrays["contact_nodes"] * [1.0, 0.0]
+    assert deformed_figure(record, arrays) is None
+    assert deformed_figure({"m": 0, "pairs": []}, {}) is None
 
 
 @pytest.mark.parametrize("count", [0, 3, 400])

@@ -1,0 +1,54 @@
+"""The faces of the parts around the largest gap of an answer, seen obliquely, their distance exaggerated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from scipy.interpolate import LinearNDInterpolator
+
+from report.document.numbers import significant
+from report.results.answers import pair_name
+
+from . import style
+from .maps import Array
+from .section import first_faces, worst_pair
+
+LINES = 60  # of each face, along either side
+NARROWEST, HEIGHT = 0.4, 0.35  # of the view, to its longer side
+TINY = float(np.finfo(float).tiny)
+
+
+def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure | None:
+    """The second face coloured by the gap to the first, not to scale; None without contacts on an area."""
+    if not record["m"] or not {"contact_nodes", "A_data"} <= set(arrays):
+        return None
+    pair = worst_pair(record, arrays)
+    own = slice(pair["start"], pair["stop"])
+    nodes, gap, first = arrays["contact_nodes"][own], arrays["gap_after"][own], first_faces(arrays)[own]
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    if np.linalg.matrix_rank(nodes - low) < 2:
+        return None
+    X, Y = np.meshgrid(*(np.linspace(*ends, LINES) for ends in zip(low, high, strict=True)))
+    found = LinearNDInterpolator(nodes, np.column_stack([first, gap]), rescale=True)(X, Y)
+    colours = ScalarMappable(Normalize(0.0, max(float(gap.max()), TINY)), colormaps["viridis"])
+    look: dict[str, Any] = {"rcount": LINES, "ccount": LINES, "lw": 0.2, "clip_on": False}
+    with style.applied():
+        figure = style.figure(4.5)
+        figure.set_layout_engine("none")
+        axes: Any = figure.add_axes((0.0, 0.02, 0.85, 0.96), projection="3d")
+        sides = np.maximum((high - low) / (high - low).max(), NARROWEST)
+        axes.set_box_aspect((*sides, HEIGHT), zoom=1.25)
+        axes.plot_surface(X, Y, found[..., 0], color=style.GREY, **look)
+        axes.plot_surface(
+            X, Y, found.sum(axis=-1), facecolors=colours.to_rgba(found[..., 1]), alpha=0.8, **look
+        )
+        axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="normal, mm")
+        axes.locator_params(nbins=4)
+        axes.set_title(f"{pair_name(pair)}: at most {significant(gap.max())} mm apart", y=0.95)
+        figure.colorbar(colours, cax=figure.add_axes((0.88, 0.25, 0.02, 0.5)), label="gap left, mm")
+    return figure
