@@ -24,6 +24,7 @@ REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
 #: The statuses of a measurement that ran out of its time, or was not started because it would have.
 OUT_OF_TIME = ("time_limit", "not_run")
 FEWEST_SCENES = 2  # of a size, that predict another one of it
+TIMES_BEST_FORM = 3.0  # of a solver's seconds in its best form, after which another form of it is stopped
 LEAST_S = 10.0  # before what is left behind is stopped
 
 
@@ -100,22 +101,26 @@ def _seconds(row: Row) -> float:
 def stopped_at(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
     """The time limit of m, s, and why it is tighter than the suite's; "" if it is not.
 
-    max(10 s, k × the seconds of the fastest library other than m's within the limit on m's scene), by the
-    first of its repeats, with k = `stop_at_times_fastest` of the suite.
+    max(10 s, min(k × the seconds of the fastest library other than m's, 3 × those of m's solver in its best
+    other form)) of the answers within the limit on m's scene, by the first of their repeats, with k =
+    `stop_at_times_fastest` of the suite.
     """
-    others = [
-        (_seconds(row), f"{row['solver']} {row['form']}")
-        for row in rows
-        if row["scene"] == m.scene and row["owner"] == "library" and row["solver"] != m.solver
-        if row["verdict"] == "within" and row["repeat"] == 0
-    ]
-    if m.stop_at_times_fastest is None or not others:
+    k, limits = m.stop_at_times_fastest, []
+    if k is None:
         return m.time_limit_s, ""
-    seconds, name = min(others)
-    limit_s = max(LEAST_S, m.stop_at_times_fastest * seconds)
+    for row in rows:
+        if row["scene"] == m.scene and row["verdict"] == "within" and row["repeat"] == 0:
+            own = row["solver"] == m.solver
+            if (own and row["form"] != m.form) or (not own and row["owner"] == "library"):
+                times = TIMES_BEST_FORM if own else k
+                limits.append((times * _seconds(row), times, f"{row['solver']} {row['form']}"))
+    if not limits:
+        return m.time_limit_s, ""
+    seconds, times, name = min(limits)
+    limit_s = max(LEAST_S, seconds)
     if limit_s >= m.time_limit_s:
         return m.time_limit_s, ""
-    return limit_s, f"{m.stop_at_times_fastest:g} × {name} ({seconds:.2g} s), at least {LEAST_S:g} s"
+    return limit_s, f"{times:g} × {name} ({seconds / times:.2g} s), at least {LEAST_S:g} s"
 
 
 def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:

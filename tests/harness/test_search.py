@@ -118,15 +118,22 @@ def test_the_next_tolerance(tmp_path: Path, tried: dict[float, str], expected: f
         ([("piqp", "library", 2.0, "within"), ("osqp", "library", 1.5, "outside")], 20.0, "10 × piqp"),
         ([("piqp", "library", 0.2, "within")], 10.0, "at least 10 s"),
         ([("piqp", "library", 7.0, "within")], 60.0, ""),
-        ([("newton", "ours", 0.2, "within"), ("rough", "library", 1.0, "within")], 60.0, ""),
+        ([("newton", "ours", 0.2, "within"), ("rough sparse", "library", 1.0, "outside")], 60.0, ""),
+        (
+            [("piqp", "library", 5.0, "within"), ("rough sparse", "ours", 4.0, "within")],
+            12.0,
+            "3 × rough sparse",
+        ),
+        ([("piqp", "library", 1.5, "within"), ("rough", "library", 1.0, "within")], 15.0, "10 × piqp"),
     ],
 )
-def test_who_is_ten_times_slower_is_stopped(
+def test_who_is_far_behind_is_stopped(
     tmp_path: Path, others: list[tuple[str, str, float, str]], limit_s: float, stop: str
 ) -> None:
     m = replace(expand(suite_of(tmp_path))[0], time_limit_s=60.0, stop_at_times_fastest=10.0)
     rows = [
-        row_of(m, seconds, verdict) | {"solver": name, "owner": group}
+        row_of(m, seconds, verdict)
+        | {"solver": name.split()[0], "owner": group, "form": name.partition(" ")[2] or m.form}
         for name, group, seconds, verdict in others
     ]
     found, why = stopped_at(m, rows)
