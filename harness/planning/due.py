@@ -101,9 +101,9 @@ def _seconds(row: Row) -> float:
 def stopped_at(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
     """The time limit of m, s, and why it is tighter than the suite's; "" if it is not.
 
-    max(10 s, min(k × the seconds of the fastest library other than m's, 3 × those of m's solver in its best
-    other form)) of the answers within the limit on m's scene, by the first of their repeats, with k =
-    `stop_at_times_fastest` of the suite.
+    max(10 s, min(k × the seconds of the fastest library other than m's, 3 × those of m's solver with the
+    same settings in its best other form)) of the answers within the limit on m's scene, by the first of their
+    repeats, with k = `stop_at_times_fastest` of the suite.
     """
     k, limits = m.stop_at_times_fastest, []
     if k is None:
@@ -111,7 +111,8 @@ def stopped_at(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
     for row in rows:
         if row["scene"] == m.scene and row["verdict"] == "within" and row["repeat"] == 0:
             own = row["solver"] == m.solver
-            if (own and row["form"] != m.form) or (not own and row["owner"] == "library"):
+            another = row["form"] != m.form and row["variant"] == m.variant
+            if another if own else row["owner"] == "library":
                 times = TIMES_BEST_FORM if own else k
                 limits.append((times * _seconds(row), times, f"{row['solver']} {row['form']}"))
     if not limits:

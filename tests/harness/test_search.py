@@ -124,6 +124,11 @@ def test_the_next_tolerance(tmp_path: Path, tried: dict[float, str], expected: f
             12.0,
             "3 × rough sparse",
         ),
+        (
+            [("piqp", "library", 5.0, "within"), ("rough sparse other", "ours", 4.0, "within")],
+            50.0,
+            "10 × piqp",
+        ),
         ([("piqp", "library", 1.5, "within"), ("rough", "library", 1.0, "within")], 15.0, "10 × piqp"),
     ],
 )
@@ -133,7 +138,8 @@ def test_who_is_far_behind_is_stopped(
     m = replace(expand(suite_of(tmp_path))[0], time_limit_s=60.0, stop_at_times_fastest=10.0)
     rows = [
         row_of(m, seconds, verdict)
-        | {"solver": name.split()[0], "owner": group, "form": name.partition(" ")[2] or m.form}
+        | {"owner": group}
+        | dict(zip(("solver", "form", "variant"), name.split(), strict=False))
         for name, group, seconds, verdict in others
     ]
     found, why = stopped_at(m, rows)

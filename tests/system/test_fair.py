@@ -96,7 +96,11 @@ def test_stopped_only_when_far_behind() -> None:
             for other in rows_of("speed")
             if other["scene"] == row["scene"] and other["verdict"] == "within" and not other["repeat"]
         ]
-        own = [3 * seconds(o) for o in within if o["solver"] == row["solver"] and o["form"] != row["form"]]
+        own = [
+            3 * seconds(o)
+            for o in within
+            if (o["solver"], o["variant"]) == (row["solver"], row["variant"]) and o["form"] != row["form"]
+        ]
         others = [10 * seconds(o) for o in within if o["owner"] == "library" and o["solver"] != row["solver"]]
         if row["stop"]:
             assert row["time_limit_s"] >= max(10.0, min(own + others)), row["key"]
