@@ -197,10 +197,9 @@ def stored(path: Path) -> storage.Entry:
         n = given.shape[0]
         nothing = {"A": sp.csc_array((n, 0)), "f": np.zeros(n), "g": np.zeros(0)}
         sparse = sp.issparse(given) and n > SMALL and given.nnz <= DENSEST * n**2
-        assembly, _ = checked({"K": given} | nothing, dict.fromkeys("KAfg", str(path)), sparse)
-        blocks = assembly.K.matrices
-        K = blocks[0] if len(blocks) == 1 else assembly.K.matrix.toarray(order="F")
-        arrays = matrix_files.packed({"K": K})
+        assembly, _ = checked({"K": given} | nothing, dict.fromkeys("KAfg", str(path)), sparse=True)
+        K = assembly.K.matrix
+        arrays = matrix_files.packed({"K": K if sparse else K.toarray(order="F")})
         if labels is not None:
             arrays["labels"] = labels
         return arrays, {"notes": assembly.notes, "sparse": bool(sparse)}
