@@ -27,7 +27,7 @@ from .surface import Grid
 MOST = 100_000  # grid lines; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]
 SHORT = 20.0  # mm, a junction that may have been given in metres
-SLENDER = 50.0  # an element's longer side to its shorter: K then loses as many digits as its square has
+SLENDER = 50.0  # an element's longer side to its shorter
 SOFT, STIFF = 1e3, 1e6  # N/mm², around the moduli of plastics and metals
 TOOL = "tool"  # the second of a contact pair: a rigid surface
 Pair = tuple[str, str]

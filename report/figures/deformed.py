@@ -16,7 +16,7 @@ from report.results.answers import pair_name
 
 from . import style
 from .maps import Array
-from .section import first_faces, worst_pair
+from .section import around_worst
 
 LINES = 60  # of each face, along either side
 NARROWEST, HEIGHT = 0.4, 0.35  # of the view, to its longer side
@@ -25,16 +25,14 @@ TINY = float(np.finfo(float).tiny)
 
 def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure | None:
     """The second face coloured by the gap to the first, not to scale; None without contacts on an area."""
-    if not record["m"] or not {"contact_nodes", "A_data"} <= set(arrays):
+    if (seen := around_worst(record, arrays)) is None:
         return None
-    pair = worst_pair(record, arrays)
-    own = slice(pair["start"], pair["stop"])
-    nodes, gap, first = arrays["contact_nodes"][own], arrays["gap_after"][own], first_faces(arrays)[own]
+    nodes, gap = seen.nodes, seen.gap
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     if np.linalg.matrix_rank(nodes - low) < 2:
         return None
     X, Y = np.meshgrid(*(np.linspace(*ends, LINES) for ends in zip(low, high, strict=True)))
-    found = LinearNDInterpolator(nodes, np.column_stack([first, gap]), rescale=True)(X, Y)
+    found = LinearNDInterpolator(nodes, np.column_stack([seen.first, gap]), rescale=True)(X, Y)
     colours = ScalarMappable(Normalize(0.0, max(float(gap.max()), TINY)), colormaps["viridis"])
     look: dict[str, Any] = {"rcount": LINES, "ccount": LINES, "lw": 0.2, "clip_on": False}
     with style.applied():
@@ -49,6 +47,6 @@ def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure 
         )
         axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="normal, mm")
         axes.locator_params(nbins=4)
-        axes.set_title(f"{pair_name(pair)}: at most {significant(gap.max())} mm apart", y=0.95)
+        axes.set_title(f"{pair_name(seen.pair)}: at most {significant(gap.max())} mm apart", y=0.95)
         figure.colorbar(colours, cax=figure.add_axes((0.88, 0.25, 0.02, 0.5)), label="gap left, mm")
     return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,18 +18,13 @@ from .maps import Array, grid_of
 
 def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure | None:
     """Along both grid lines through the largest gap; None without contacts, or if they are on no grid."""
-    if not record["m"] or not {"contact_nodes", "A_data"} <= set(arrays):
+    seen = around_worst(record, arrays)
+    if seen is None or (grid := grid_of(seen.nodes)) is None:
         return None
-    gap, pair = arrays["gap_after"], worst_pair(record, arrays)
-    worst = int(gap.argmax())
-    own = slice(pair["start"], pair["stop"])
-    nodes = arrays["contact_nodes"][own]
-    if (grid := grid_of(nodes)) is None:
-        return None
+    pair, first, before = seen.pair, seen.first, arrays["gap_before"][seen.own]
     x, y, place = grid
-    row, column = divmod(int(place[worst - pair["start"]]), len(x))
-    first = first_faces(arrays)[own]
-    faces = {"before": (np.zeros(len(nodes)), arrays["gap_before"][own]), "after": (first, first + gap[own])}
+    row, column = divmod(int(place[seen.gap.argmax()]), len(x))
+    faces = {"before": (np.zeros(len(before)), before), "after": (first, first + seen.gap)}
     lines = {
         f"along x at y = {significant(y[row])} mm": ("x, mm", x, row * len(x) + np.arange(len(x))),
         f"along y at x = {significant(x[column])} mm": ("y, mm", y, np.arange(len(y)) * len(x) + column),
@@ -48,17 +44,30 @@ def section_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure |
     return figure
 
 
-def worst_pair(record: dict[str, Any], arrays: dict[str, Array]) -> dict[str, Any]:
-    """The pair of parts with the largest gap."""
-    worst = int(arrays["gap_after"].argmax())
-    return next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
+@dataclass(frozen=True)
+class Faces:
+    """Of the contacts `own` of a pair: nodes (c, 2), mm; the gap left, and how far the face of the first part
+    has moved, (c,) mm.
+    """
+
+    pair: dict[str, Any]
+    own: slice
+    nodes: Array
+    gap: Array
+    first: Array
 
 
-def first_faces(arrays: dict[str, Array]) -> Array:
-    """(m,) mm: how far the first part of each contact has moved, the positive part of A times x."""
-    shape = len(arrays["x"]), len(arrays["gap_after"])
-    A = sp.csc_array((arrays["A_data"], arrays["A_indices"], arrays["A_indptr"]), shape=shape)
-    return np.asarray(A.maximum(0).T @ arrays["x"])
+def around_worst(record: dict[str, Any], arrays: dict[str, Array]) -> Faces | None:
+    """Of the pair with the largest gap; None without contacts that have coordinates."""
+    if not record["m"] or not {"contact_nodes", "A_data"} <= set(arrays):
+        return None
+    x, gap, nodes = (arrays[name] for name in ("x", "gap_after", "contact_nodes"))
+    worst = int(gap.argmax())
+    pair = next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
+    own = slice(pair["start"], pair["stop"])
+    parts = arrays["A_data"], arrays["A_indices"], arrays["A_indptr"]
+    first = sp.csc_array(parts, shape=(len(x), len(gap))).maximum(0)[:, own].T @ x
+    return Faces(pair, own, nodes[own], gap[own], np.asarray(first))
 
 
 def _draw(axes: Axes, at: Array, faces: dict[str, list[Array]]) -> None:

@@ -118,6 +118,7 @@ def test_the_next_tolerance(tmp_path: Path, tried: dict[float, str], expected: f
         ([("piqp", "library", 2.0, "within"), ("osqp", "library", 1.5, "outside")], 20.0, "10 × piqp"),
         ([("piqp", "library", 0.2, "within")], 10.0, "at least 10 s"),
         ([("piqp", "library", 7.0, "within")], 60.0, ""),
+        ([("newton", "ours", 0.2, "within"), ("rough", "library", 1.0, "within")], 60.0, ""),
         ([("newton", "ours", 0.2, "within"), ("rough sparse", "library", 1.0, "outside")], 60.0, ""),
         (
             [("piqp", "library", 5.0, "within"), ("rough sparse", "ours", 4.0, "within")],

@@ -16,8 +16,6 @@ from hostile_targets import Target, all_targets, invoke
 from long import Fault, Log, draws
 from matplotlib.figure import Figure
 
-from report.figures import style
-
 SEED = 17
 TIME_LIMIT_S = 60  # per command
 DRAWN = 0.02  # of the inputs: pictures are saved, which takes a second
@@ -46,7 +44,6 @@ def targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Target]]:
     before = resource.getrlimit(resource.RLIMIT_AS)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RIVETBENCH_CACHE", str(root / "cache"))
-        patch.setattr(style, "DPI", 30)
         made = all_targets(root)
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, before[1]))
         yield made
