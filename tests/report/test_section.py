@@ -80,7 +80,7 @@ def test_the_view_is_of_both_faces(worst: int, moved: float) -> None:
     first, second = arrays["x"][own], (arrays["x"] + arrays["gap_after"])[own]
     view: Any = figure.axes[0]
     bar = figure.axes[1]
-    assert view.get_title().endswith("at most 2.00 mm apart")
+    assert figure.get_suptitle().endswith("at most 2.00 mm apart")
     assert bar.get_ylim() == (0.0, 2.0)
     low, high = view.get_zlim()
     assert low <= min(first.min(), second.min()) + 0.5
