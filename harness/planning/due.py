@@ -1,9 +1,10 @@
 """What of a plan is measured, and for how long, as the rows so far show.
 
 tolerances = "auto" searches, in decades, the loosest tolerance whose answer is within the limit on the scene,
-from the one found before; repeats = "auto" repeats what is quick: five times what takes under 2 s, three
-times what takes under 20 s. What is predicted to exceed its time limit is skipped. What is left far behind is
-stopped: a loss by more needs no figure.
+from the one found before. A looser one that missed on two scenes of the size, and sufficed on none, is not
+tried again. repeats = "auto" repeats what is quick: five times what takes under 2 s, three times what takes
+under 20 s. What is predicted to exceed its time limit is skipped. What is left far behind is stopped: a loss
+by more needs no figure.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
 #: The statuses of a measurement that ran out of its time, or was not started because it would have.
 OUT_OF_TIME = ("time_limit", "not_run")
 FEWEST_SCENES = 2  # of a size, that predict another one of it
+START = 1e-6  # of a search from nothing
 TIMES_BEST_FORM = 3.0  # of a solver's seconds in its best form, after which another form of it is stopped
 LEAST_S = 10.0  # before what is left behind is stopped
 
@@ -34,11 +36,12 @@ def due(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
         return m
     own = [row for row in rows if row["scene"] == m.scene and m.same_settings(row)]
     first = [row for row in own if row["repeat"] == 0 and row["tolerance"] in DECADES]
-    if m.searched and m.repeat == 0:
-        tolerance = _next(first, _start(m, rows))
-        return None if tolerance is None else replace(m, tolerance=tolerance)
-    if m.searched and found(first) != m.tolerance and _next(first, DECADES[0]) is None:
-        return None
+    if m.searched and (m.repeat == 0 or found(first) != m.tolerance):
+        tolerance = _next(first, _before(m, rows), _missed(m, rows))
+        if m.repeat == 0:
+            return None if tolerance is None else replace(m, tolerance=tolerance)
+        if tolerance is None:
+            return None
     same = [row for row in own if row["repeat"] == 0 and row["tolerance"] == m.tolerance]
     return None if m.paced and any(m.repeat >= _repeats(row) for row in same) else m
 
@@ -48,30 +51,40 @@ def found(rows: Sequence[Row]) -> float | None:
     return max((row["tolerance"] for row in rows if row["verdict"] == "within"), default=None)
 
 
-def _start(m: Measurement, rows: Sequence[Row]) -> float:
-    """The tolerance found last for this solver in this form, on another scene or by another variant; else the
-    loosest.
-    """
+def _before(m: Measurement, rows: Sequence[Row]) -> float | None:
+    """The tolerance found last for this solver in this form, on another scene or by another variant."""
     own = [row for row in rows if (row["solver"], row["form"]) == (m.solver, m.form)]
     before = [row for row in own if row["verdict"] == "within" and row["tolerance"] in DECADES]
     if not before:
-        return DECADES[0]
+        return None
     scene, variant = (before[-1][name] for name in ("scene", "variant"))
     return max(row["tolerance"] for row in before if (row["scene"], row["variant"]) == (scene, variant))
 
 
-def _next(tried: Sequence[Row], start: float) -> float | None:
-    """One decade looser than what is within the limit; one tighter than answers that are solved and outside;
-    one looser than what was not solved. None if that was tried, if there is no such decade, or after running
-    out of time twice.
+def _missed(m: Measurement, rows: Sequence[Row]) -> set[float]:
+    """The tolerances that missed on FEWEST_SCENES other scenes of the size of m's, and sufficed on none."""
+    n = next((row["n"] for row in rows if row["scene"] == m.scene), None)
+    others = [row for row in rows if row["n"] == n and row["scene"] != m.scene and m.same_settings(row)]
+    scenes: dict[float, set[str]] = {}
+    for row in others:
+        if row["status"] == "solved" and row["verdict"] == "outside":
+            scenes.setdefault(row["tolerance"], set()).add(row["scene"])
+    sufficed = {row["tolerance"] for row in others if row["verdict"] == "within"}
+    return {tolerance for tolerance, on in scenes.items() if len(on) >= FEWEST_SCENES} - sufficed
+
+
+def _next(tried: Sequence[Row], before: float | None, missed: set[float]) -> float | None:
+    """One decade looser than what is within the limit, unless it missed elsewhere; one tighter than answers
+    that are solved and outside; one looser than what was not solved. None if that was tried, if there is no
+    such decade, or after running out of time: twice, or where it was in time before.
     """
     if not tried:
-        return start
-    if len(tried) > 1 and all(row["status"] in OUT_OF_TIME for row in tried):
+        return before or START
+    if all(row["status"] in OUT_OF_TIME for row in tried) and (before is not None or len(tried) > 1):
         return None
     place, step = _place(tried)
     candidate = place + step
-    known = {row["tolerance"] for row in tried}
+    known = {row["tolerance"] for row in tried} | (missed if step < 0 and found(tried) else set())
     if not 0 <= candidate < len(DECADES) or DECADES[candidate] in known:
         return None
     return DECADES[candidate]

@@ -9,7 +9,7 @@ import tiny
 from runs import rows_of, said_by
 
 from harness.measurement.run import run
-from harness.planning.due import due, stopped_at
+from harness.planning.due import START, due, stopped_at
 from harness.planning.overrides import Overrides, overridden, tolerances_of
 from harness.planning.plan import DECADES, Measurement, expand
 from harness.planning.suite import read_suite, suite_from
@@ -48,26 +48,27 @@ def test_the_search_ends_at_the_first_tolerance_that_suffices(tmp_path: Path) ->
     suite = suite_of(tmp_path, LOOSE, repeats=2)
     rows = measured(suite, tmp_path / "out")
     first = [row for row in rows if row["repeat"] == 0]
-    *before, last = first
-    assert [row["tolerance"] for row in first] == DECADES[: len(first)]
-    assert before
-    assert {row["verdict"] for row in before} == {"outside"}
-    assert last["verdict"] == "within"
+    tried = {row["tolerance"]: row["verdict"] for row in first}
+    found = max(tolerance for tolerance, verdict in tried.items() if verdict == "within")
+    assert first[0]["tolerance"] == START
+    assert tried[DECADES[DECADES.index(found) - 1]] == "outside"
     # Only what was found is repeated; and nothing is left for the same command.
-    assert [row["tolerance"] for row in rows if row["repeat"] == 1] == [last["tolerance"]]
+    assert [row["tolerance"] for row in rows if row["repeat"] == 1] == [found]
     assert measured(suite, tmp_path / "out") == rows
 
     results = read(tmp_path / "out")
     (cell,) = results.cells.to_dict("records")
-    assert (cell["label"], cell["tolerance"], cell["repeats"]) == ("rough (dual)", last["tolerance"], 2)
+    assert (cell["label"], cell["tolerance"], cell["repeats"]) == ("rough (dual)", found, 2)
 
 
 def test_it_ends_where_the_solver_gives_up(tmp_path: Path) -> None:
     rows = measured(suite_of(tmp_path, options=("rough.least=1e-3",)), tmp_path / "out")
-    assert [row["tolerance"] for row in rows] == [1e-3, 1e-4]
-    assert rows[-1]["status"] == "inaccurate"
+    assert {row["tolerance"]: row["status"] for row in rows} == {
+        **dict.fromkeys((1e-6, 1e-5, 1e-4), "inaccurate"),
+        1e-3: "solved",
+    }
     (cell,) = read(tmp_path / "out").cells.to_dict("records")
-    assert cell["tolerance"] == 1e-4
+    assert cell["verdict"] == "outside"
 
 
 def test_the_search_starts_where_it_ended_on_the_scene_before(tmp_path: Path) -> None:
@@ -80,8 +81,9 @@ def test_the_search_starts_where_it_ended_on_the_scene_before(tmp_path: Path) ->
     rows = measured(
         suite_from(data | {"scenes": [first, str(second)]}, tmp_path / "s.toml"), tmp_path / "out"
     )
+    found = max(row["tolerance"] for row in rows if row["scene"] != "second" and row["verdict"] == "within")
     tried = [row["tolerance"] for row in rows if row["scene"] == "second"]
-    assert tried == [rows[len(rows) - len(tried) - 1]["tolerance"], 10 * tried[0]]
+    assert tried == [found, DECADES[DECADES.index(found) - 1]]
     cells = read(tmp_path / "out").cells
     assert cells["tolerance"].nunique() == 1
 
@@ -89,7 +91,7 @@ def test_the_search_starts_where_it_ended_on_the_scene_before(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("tried", "expected"),
     [
-        ({}, 1e-3),
+        ({}, 1e-6),
         ({1e-3: "outside"}, 1e-4),
         ({1e-3: "outside", 1e-4: "within"}, None),
         ({1e-6: "within"}, 1e-5),
@@ -107,6 +109,31 @@ def test_the_next_tolerance(tmp_path: Path, tried: dict[float, str], expected: f
     for tolerance, ended in tried.items():
         row = row_of(replace(m, tolerance=tolerance), 1.0, ended if ended == "within" else "outside")
         rows.append(row | ({"status": ended} if ended in ("time_limit", "inaccurate") else {}))
+    found = due(m, rows)
+    assert (None if found is None else found.tolerance) == expected
+
+
+@pytest.mark.parametrize(
+    ("elsewhere", "ended", "expected"),
+    [
+        ({"a": "outside"}, "within", 1e-5),
+        ({"a": "outside", "b": "outside"}, "within", None),
+        ({"a": "outside", "b": "outside"}, "outside", 1e-7),
+        ({"a": "outside", "b": "within", "c": "outside"}, "within", 1e-5),
+        ({"a": "outside", "b": "outside of another size"}, "within", 1e-5),
+        ({"a": "outside"}, "time_limit", None),
+    ],
+)
+def test_what_other_scenes_say(tmp_path: Path, elsewhere: dict[str, str], ended: str, expected: float) -> None:
+    """1e-6 sufficed on them; how 1e-5 ended there, and 1e-6 on this one."""
+    m = replace(expand(suite_of(tmp_path))[0], tolerance=1e-6)
+    rows = [row_of(m, 1.0, "no_answer" if ended == "time_limit" else ended)]
+    rows[0]["status"] = ended if ended == "time_limit" else "solved"
+    for scene, missed in elsewhere.items():
+        verdict, *size = missed.split(maxsplit=1)
+        of_size = {"scene": scene, "n": 9 if size else 4}
+        rows.append(row_of(m, 1.0) | of_size)
+        rows.append(row_of(replace(m, tolerance=1e-5), 1.0, verdict) | of_size)
     found = due(m, rows)
     assert (None if found is None else found.tolerance) == expected
 
@@ -153,7 +180,7 @@ def row_of(m: Measurement, seconds: float, verdict: str = "within") -> dict[str,
     names = ("scene", "solver", "form", "variant", "options", "tolerance", "repeat")
     steps = dict.fromkeys(("convert_s", "prepare_s", "setup_s", "form_s")) | {"solve_s": seconds}
     asked = {name: getattr(m, name) for name in names} | {"threads_asked": m.threads}
-    return asked | steps | {"verdict": verdict, "status": "solved"}
+    return asked | steps | {"verdict": verdict, "status": "solved", "n": 4}
 
 
 @pytest.mark.parametrize(("seconds", "repeats"), [(0.1, 5), (3.0, 3), (30.0, 1)])
