@@ -37,7 +37,8 @@ def due(m: Measurement, rows: Sequence[Row]) -> Measurement | None:
     own = [row for row in rows if row["scene"] == m.scene and m.same_settings(row)]
     first = [row for row in own if row["repeat"] == 0 and row["tolerance"] in DECADES]
     if m.searched and (m.repeat == 0 or found(first) != m.tolerance):
-        tolerance = _next(first, _before(m, rows), _missed(m, rows))
+        elsewhere = [row for row in rows if row["scene"] != m.scene or not m.same_settings(row)]
+        tolerance = _next(first, _before(m, elsewhere), _missed(m, rows))
         if m.repeat == 0:
             return None if tolerance is None else replace(m, tolerance=tolerance)
         if tolerance is None:
@@ -52,11 +53,15 @@ def found(rows: Sequence[Row]) -> float | None:
 
 
 def _before(m: Measurement, rows: Sequence[Row]) -> float | None:
-    """The tolerance found last for this solver in this form, on another scene or by another variant."""
+    """The tolerance found last for this solver in this form, on another scene or by another variant; if none
+    was, the tightest that missed, or else the loosest that was tried.
+    """
     own = [row for row in rows if (row["solver"], row["form"]) == (m.solver, m.form)]
-    before = [row for row in own if row["verdict"] == "within" and row["tolerance"] in DECADES]
+    tried = [row for row in own if row["tolerance"] in DECADES]
+    before = [row for row in tried if row["verdict"] == "within"]
     if not before:
-        return None
+        missed = [row["tolerance"] for row in tried if row["status"] == "solved"]
+        return min(missed) if missed else max((row["tolerance"] for row in tried), default=None)
     scene, variant = (before[-1][name] for name in ("scene", "variant"))
     return max(row["tolerance"] for row in before if (row["scene"], row["variant"]) == (scene, variant))
 
@@ -76,7 +81,7 @@ def _missed(m: Measurement, rows: Sequence[Row]) -> set[float]:
 def _next(tried: Sequence[Row], before: float | None, missed: set[float]) -> float | None:
     """One decade looser than what is within the limit, unless it missed elsewhere; one tighter than answers
     that are solved and outside; one looser than what was not solved. None if that was tried, if there is no
-    such decade, or after running out of time: twice, or where it was in time before.
+    such decade, or after running out of time: once from `before`, else twice.
     """
     if not tried:
         return before or START

@@ -122,9 +122,12 @@ def test_the_next_tolerance(tmp_path: Path, tried: dict[float, str], expected: f
         ({"a": "outside", "b": "within", "c": "outside"}, "within", 1e-5),
         ({"a": "outside", "b": "outside of another size"}, "within", 1e-5),
         ({"a": "outside"}, "time_limit", None),
+        ({}, "time_limit", 1e-5),
     ],
 )
-def test_what_other_scenes_say(tmp_path: Path, elsewhere: dict[str, str], ended: str, expected: float) -> None:
+def test_what_other_scenes_say(
+    tmp_path: Path, elsewhere: dict[str, str], ended: str, expected: float
+) -> None:
     """1e-6 sufficed on them; how 1e-5 ended there, and 1e-6 on this one."""
     m = replace(expand(suite_of(tmp_path))[0], tolerance=1e-6)
     rows = [row_of(m, 1.0, "no_answer" if ended == "time_limit" else ended)]
@@ -136,6 +139,16 @@ def test_what_other_scenes_say(tmp_path: Path, elsewhere: dict[str, str], ended:
         rows.append(row_of(replace(m, tolerance=1e-5), 1.0, verdict) | of_size)
     found = due(m, rows)
     assert (None if found is None else found.tolerance) == expected
+
+
+def test_what_ran_out_of_time_elsewhere_is_tried_once_at_its_loosest(tmp_path: Path) -> None:
+    m = expand(suite_of(tmp_path))[0]
+    late = {"status": "time_limit", "scene": "a"}
+    rows = [row_of(replace(m, tolerance=each), 1.0, "no_answer") | late for each in (1e-6, 1e-5)]
+    again = due(m, rows)
+    assert again is not None
+    assert again.tolerance == 1e-5
+    assert due(m, [*rows, rows[1] | {"scene": m.scene}]) is None
 
 
 @pytest.mark.parametrize(
