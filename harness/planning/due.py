@@ -4,7 +4,7 @@ tolerances = "auto" searches, in decades, the loosest tolerance whose answer is 
 from the one found before. A looser one that missed on two scenes of the size, and sufficed on none, is not
 tried again. repeats = "auto" repeats what is quick: five times what takes under 2 s, three times what takes
 under 20 s. What is predicted to exceed its time limit is skipped. What is left far behind is stopped: a loss
-by more needs no figure.
+by more needs no figure. What was behind by less on two scenes of a size is measured on these alone.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ REPEATS = ((2.0, MOST_REPEATS), (20.0, 3), (inf, 1))
 OUT_OF_TIME = ("time_limit", "not_run")
 FEWEST_SCENES = 2  # of a size, that predict another one of it
 START = 1e-6  # of a search from nothing
+TIMES_BEHIND = 3.0  # the fastest library: what takes longer on FEWEST_SCENES scenes is not run on others
 TIMES_BEST_FORM = 3.0  # of a solver's seconds in its best form, after which another form of it is stopped
 LEAST_S = 10.0  # before what is left behind is stopped
 
@@ -79,31 +80,32 @@ def _missed(m: Measurement, rows: Sequence[Row]) -> set[float]:
 
 
 def _next(tried: Sequence[Row], before: float | None, missed: set[float]) -> float | None:
-    """One decade looser than what is within the limit, unless it missed elsewhere; one tighter than answers
-    that are solved and outside; one looser than what was not solved. None if that was tried, if there is no
-    such decade, or after running out of time: once from `before`, else twice.
+    """Where to look next for a tolerance t that suffices, and 10 t that misses here or is in `missed`.
+
+    From one that suffices 1, 2, 4, … decades looser, from one that is solved and misses as many tighter, and
+    once both are known between them; one looser than what was not solved. None if that was tried, if there is
+    no such decade, or after running out of time: once from `before`, else twice.
     """
     if not tried:
         return before or START
     if all(row["status"] in OUT_OF_TIME for row in tried) and (before is not None or len(tried) > 1):
         return None
-    place, step = _place(tried)
-    candidate = place + step
-    known = {row["tolerance"] for row in tried} | (missed if step < 0 and found(tried) else set())
-    if not 0 <= candidate < len(DECADES) or DECADES[candidate] in known:
-        return None
-    return DECADES[candidate]
-
-
-def _place(tried: Sequence[Row]) -> tuple[int, int]:
-    """The decade, as an index, from which the search goes on, and where to: 1 tighter, −1 looser."""
-    loosest = found(tried)
-    if loosest is not None:
-        return DECADES.index(loosest), -1
-    outside = [row["tolerance"] for row in tried if row["status"] == "solved"]
-    if outside:
-        return DECADES.index(min(outside)), 1
-    return DECADES.index(max(row["tolerance"] for row in tried)), -1
+    places = {DECADES.index(row["tolerance"]): row for row in tried}
+    within = [k for k, row in places.items() if row["verdict"] == "within"]
+    outside = [k for k, row in places.items() if row["status"] == "solved" and k not in within]
+    if within:
+        k = min(within)
+        looser = [j for j in (*outside, *map(DECADES.index, missed)) if j < k]
+        candidate = (k + max(looser)) // 2 if looser else max(k - 2 ** (len(within) - 1), 0)
+        known = {*places, *looser}
+    elif outside:
+        k = max(outside)
+        tighter = [j for j in places if j > k]
+        candidate = (k + min(tighter)) // 2 if tighter else min(k + 2 ** (len(outside) - 1), len(DECADES) - 1)
+        known = {*places}
+    else:
+        candidate, known = min(places) - 1, {*places}
+    return None if candidate < 0 or candidate in known else DECADES[candidate]
 
 
 def _repeats(row: Row) -> int:
@@ -113,7 +115,7 @@ def _repeats(row: Row) -> int:
 
 def _seconds(row: Row) -> float:
     """Of all steps."""
-    return sum(row[name] or 0.0 for name in STEPS)
+    return sum(row.get(name) or 0.0 for name in STEPS)
 
 
 def stopped_at(m: Measurement, rows: Sequence[Row]) -> tuple[float, str]:
@@ -147,10 +149,10 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
 
     The scene of m itself, if the solver exceeded at least the same limit there at this tolerance or a looser
     one. Else all scenes of the next smaller size n' on which the same solver, form and settings were
-    measured, if it exceeded its limit T' on each and the limit of m is at most (n/n')² T', or (n/n') T' in
-    the sparse form: with dense matrices, time grows at least like n², with sparse ones like n. (Not on rungs
-    of ladders, where size is not what makes them hard.) Or else the other scenes of the size of m, if it was
-    left far behind (`stopped_at`) on two or more of them, and on all.
+    measured, if its seconds there, or the limit that they exceeded, times (n/n')² are beyond the limit of m,
+    or times n/n' in the sparse form: with dense matrices, time grows at least like n², with sparse ones like
+    n. (Not on rungs of ladders, where size is not what makes them hard.) Or else the other scenes of the size
+    of m, if it was left behind on two or more of them, and on all.
     """
     own = [row for row in rows if m.same_settings(row)]
     looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
@@ -159,21 +161,42 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
             return f"{m.scene} at {row['tolerance']:g}"
     if prefix_of(m.source) in LADDERS:
         return ""
-    others = [row for row in own if row["scene"] != m.scene and row["tolerance"] == m.tolerance]
-    largest = max((row["n"] for row in others if row["n"] < n), default=0)
+    smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
+    largest = max((row["n"] for row in smaller), default=0)
     growth = (n / largest) ** (2 if m.form in DENSE_FORMS else 1) if largest else 0.0
+    of_size = [row for row in smaller if row["n"] == largest]
 
-    def in_time(row: Row) -> bool:
-        """Or late only because its limit was too tight to tell."""
-        if row["status"] not in OUT_OF_TIME:
-            return True
-        if row["n"] < n:
-            return m.time_limit_s > growth * row["time_limit_s"]
-        return not (m.stop and row.get("stop"))
+    def least(row: Row) -> float:
+        """Seconds that m takes, if it grows no faster."""
+        return growth * float(row["time_limit_s"] if row["status"] in OUT_OF_TIME else _seconds(row))
 
-    for size, fewest in ((largest, 1), (n, FEWEST_SCENES)):
-        of_size = [row for row in others if row["n"] == size]
-        scenes = {row["scene"] for row in of_size}
-        if len(scenes) >= fewest and not any(map(in_time, of_size)):
-            return ", ".join(sorted(scenes))
-    return ""
+    if of_size and all(least(row) >= m.time_limit_s for row in of_size):
+        return _listed(of_size)
+    same = [row for row in own if row["n"] == n and row["scene"] != m.scene]
+    scenes = {row["scene"] for row in same}
+    if m.stop_at_times_fastest is None or len(scenes) < FEWEST_SCENES:
+        return ""
+    behind = all(_behind([row for row in same if row["scene"] == scene], rows) for scene in scenes)
+    return _listed(same) if behind else ""
+
+
+def _behind(cell: Sequence[Row], rows: Sequence[Row]) -> bool:
+    """Whether a cell took more than max(10 s, 3 × the fastest library other than its own) on its scene: the
+    fastest of its answers within the limit, if there are any.
+    """
+    first = cell[0]
+    others = [
+        _seconds(row)
+        for row in rows
+        if row["scene"] == first["scene"] and row["owner"] == "library" and row["solver"] != first["solver"]
+        if row["verdict"] == "within"
+    ]
+    within = [row for row in cell if row["verdict"] == "within"]
+    seconds = [
+        row["time_limit_s"] if row["status"] in OUT_OF_TIME else _seconds(row) for row in within or cell
+    ]
+    return bool(others) and min(seconds) >= max(LEAST_S, TIMES_BEHIND * min(others))
+
+
+def _listed(rows: Sequence[Row]) -> str:
+    return ", ".join(sorted({row["scene"] for row in rows}))

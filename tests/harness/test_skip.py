@@ -7,7 +7,7 @@ import pytest
 
 from harness.measurement.describe import Description, outdated
 from harness.measurement.row import Task, run_task
-from harness.planning.due import OUT_OF_TIME, predicted_timeout
+from harness.planning.due import predicted_timeout
 from harness.planning.plan import expand
 from harness.planning.suite import suite_from
 
@@ -59,18 +59,37 @@ def test_the_sparse_forms_time_may_grow_no_faster_than_the_size(form, limit, lat
     assert bool(predicted_timeout(m, 6112, [row("4386/0107", 4386, limit=limit, form=form)])) == late
 
 
-def test_what_is_left_far_behind_on_two_scenes_is_not_run_on_a_third_of_the_size(large):
-    behind = replace(large, stop="10 × scs")
-    one, two, fast = (
-        row(f"6112/{k}", 6112, status, limit=12.0, stop="10 × daqp")
-        for k, status in enumerate((*OUT_OF_TIME, "solved"))
+def test_what_is_left_behind_on_two_scenes_is_not_run_on_a_third_of_the_size(large):
+    """By more than 3 times the fastest other library, 10 s at least."""
+    behind = replace(large, stop_at_times_fastest=10.0)
+    one, two, three = (
+        [cell(f"6112/{k}", s), cell(f"6112/{k}", 9.0, solver="scs")] for k, s in enumerate((28.0, None, 26.0))
     )
-    assert predicted_timeout(behind, 6112, [one, two]) == "6112/0, 6112/1"
-    assert not predicted_timeout(behind, 6112, [one])
-    assert not predicted_timeout(behind, 6112, [one, two, fast])
-    assert not predicted_timeout(behind, 6112, [one, two | {"stop": None}])
-    assert not predicted_timeout(large, 6112, [one, two])
-    assert not predicted_timeout(behind, 6112, [each | {"n": 4386} for each in (one, two)])
+    assert predicted_timeout(behind, 6112, [*one, *two]) == "6112/0, 6112/1"
+    assert not predicted_timeout(behind, 6112, one)
+    assert not predicted_timeout(behind, 6112, [*one, *two, *three])
+    assert not predicted_timeout(behind, 6112, [*one, two[0]])  # nothing to compare with
+    assert not predicted_timeout(behind, 6112, [*one, two[0], two[1] | {"solver": "piqp", "form": "dual"}])
+    assert not predicted_timeout(large, 6112, [*one, *two])
+    assert not predicted_timeout(behind, 6112, [each | {"n": 11308} for each in (*one, *two)])
+    slow = [one[0] | {"tolerance": 1e-3, "verdict": "outside", "solve_s": 5.0}]  # not within: does not count
+    assert predicted_timeout(behind, 6112, [*one, *slow, *two]) == "6112/0, 6112/1"
+    quick = [each | {"solve_s": each["solve_s"] and each["solve_s"] / 3} for each in (*one, *two)]
+    assert not predicted_timeout(behind, 6112, [each | {"time_limit_s": 9.9} for each in quick])  # below 10 s
+
+
+def cell(scene, seconds, solver="piqp"):
+    """A row of this many seconds, within the limit; None: out of its time of 30 s."""
+    ended = {"status": "solved", "verdict": "within"} if seconds else {"verdict": "no_answer"}
+    return row(scene, 6112, solver=solver, solve_s=seconds, owner="library") | ended
+
+
+def test_seconds_at_a_smaller_size_grow_like_its_square(large):
+    ended = {"status": "solved", "verdict": "within"}
+    slow, fast = (row(f"4386/{s}", 4386, solve_s=s) | ended for s in (21.0, 20.0))  # times 1.94
+    assert predicted_timeout(large, 6112, [slow]) == "4386/21.0"
+    assert not predicted_timeout(large, 6112, [fast])
+    assert not predicted_timeout(large, 6112, [slow, fast])
 
 
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):

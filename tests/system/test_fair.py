@@ -114,6 +114,35 @@ def test_stopped_only_when_far_behind() -> None:
 
 
 @OLDER
+def test_not_run_only_after_two_losses() -> None:
+    rows = rows_of("speed")
+    late = [row for row in rows if row["status"] == "not_run"]
+    assert late
+    for row in late:
+        scenes = row["message"].removeprefix("too slow already on ").split(" at ")[0].split(", ")
+        same = ("solver", "form", "variant")
+        cell = [r for r in rows if all(r[name] == row[name] for name in same) and r["scene"] in scenes]
+        assert {r["scene"] for r in cell} == set(scenes), row["key"]
+        growth = row["n"] / cell[0]["n"]
+        growth *= growth if row["form"] != "sparse" else 1
+        if scenes == [row["scene"]] or all(growth * took(r) >= row["time_limit_s"] for r in cell):
+            continue  # it ran out of time here, or would by its growth
+        assert len(scenes) >= 2
+        assert {r["n"] for r in cell} == {row["n"]}
+        for scene in scenes:
+            here = [r for r in cell if r["scene"] == scene]
+            least = min(took(r) for r in [r for r in here if r["verdict"] == "within"] or here)
+            others = [r for r in rows if r["scene"] == scene and r["owner"] == "library"]
+            fastest = [took(r) for r in others if r["verdict"] == "within" and r["solver"] != row["solver"]]
+            assert least >= max(10.0, 3 * min(fastest)), row["key"]
+
+
+def took(row: Row) -> float:
+    """Seconds, or the limit that was not enough."""
+    return float(row["time_limit_s"]) if row["status"] in ("time_limit", "not_run") else seconds(row)
+
+
+@OLDER
 def test_scenes_are_drawn() -> None:
     drawn = {f"drawn/{n}/{k}" for n in SIZES for k in range(8)}
     assert {row["scene"] for row in rows_of("speed")} == drawn
