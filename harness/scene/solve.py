@@ -78,20 +78,24 @@ def solve(
         doing=lambda step: console.status(Text(step)),
         said=lambda sentence: console.print(Text(f"{sentence}.", style="yellow")),
     )
-    assembly = found.problem.prepared.assembly
+    assembly, record = found.problem.prepared.assembly, _record(found, list(built), solver)
+    _show(record, console)
     before = time.perf_counter()
     with console.status(Text("the same joint on another grid")):
         grid = grid_error.estimated(found, refine)
     if grid is not None:
         found.seconds["grid error"] = time.perf_counter() - before
-    record = _record(found, list(built), solver) | {"grid": grid_error.recorded(grid)}
+    record["grid"] = grid_error.recorded(grid)
+    console.print(f"{record['grid']['said']}.")
     if allow_gap_mm is not None:
         uncertainty = GapError.of(assembly)(found.problem.load.g, found.unknowns, found.error_bound_mm)
         check = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
         if grid is not None and abs(check["largest_mm"] - allow_gap_mm) <= grid.error_mm:
             check["closer_than_grid_mm"] = grid.error_mm
         record["allowed_gap"] = check
-    _show(record, console)
+    code = DONE if record["verdict"] == "within" else FAILED
+    if allow_gap_mm is not None:
+        code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
     try:
         with console.status(Text("pictures and files")), atomic_output(out, [Path(source)]) as new:
             from report.writers.solution import write  # slow to import: not before the answer is shown
@@ -104,9 +108,6 @@ def solve(
     except OSError as error:
         raise InputError.one("--out", "directory", str(out), f"cannot be written: {error}") from error
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
-    code = DONE if record["verdict"] == "within" else FAILED
-    if allow_gap_mm is not None:
-        code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
     return code
 
 
@@ -200,7 +201,6 @@ def _show(record: dict[str, Any], console: Console) -> None:
             f"{record['status']}, {error:.1e} mm from the answer {known}: {record['verdict']} {LIMIT_MM:g} mm"
         )
     console.print(f"{record['method']}: {text}.", style="green" if record["verdict"] == "within" else "red")
-    console.print(f"{record['grid']['said']}.")
 
 
 def layout(scene: Scene, assembly: Assembly) -> dict[str, Any]:
