@@ -16,7 +16,9 @@ import typer
 
 from .compare import compare
 from .exchange import export, import_, judge
+from .explore import explore
 from .options import MemoryLimit, Plugin, error_reporting, option
+from .place import place
 from .scene import init, solve, validate
 from .series import series
 from .suite import gate, report, run
@@ -46,6 +48,8 @@ def harness() -> None:
       python -m harness init joint.toml           a commented scene to start from
       python -m harness solve scene.toml --out d  one scene: gaps, displacements, forces, with pictures
       python -m harness series SCENE --out DIR    thousands of load cases on one assembly
+      python -m harness place SCENE --out DIR     the fewest fasteners that keep a gap
+      python -m harness explore SCENE             a page on which fasteners move
       python -m harness compare OLD NEW           what became worse between two runs
       python -m harness COMMAND --help            help on each command
 
@@ -99,7 +103,14 @@ def list_(what: Listed) -> None:
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    **{"init": init, "validate": validate, "solve": solve, "series": series},
+    **{
+        "init": init,
+        "validate": validate,
+        "solve": solve,
+        "series": series,
+        "place": place,
+        "explore": explore,
+    },
     **{"run": run, "report": report, "gate": gate, "compare": compare},
     **{"check": check, "list": list_, "export": export, "import": import_, "judge": judge},
 }

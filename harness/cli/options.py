@@ -46,6 +46,21 @@ ReferenceLimit = Annotated[
 AllowGap = Annotated[
     float | None, option("MM", "Fail if a remaining gap is larger than this, and say where.", min=0.0)
 ]
+Cases = Annotated[
+    int | None,
+    option("N", "Number of cases.  [default: 100 random ones; all of a table]", min=1, max=10**7),
+]
+Seed = Annotated[int | None, option("SEED", "Seed of the random gaps.  [default: 0]", min=0)]
+Mean = Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")]
+Spread = Annotated[float | None, option("MM", "Their standard deviation.  [default: the scene's]")]
+Length = Annotated[float | None, option("MM", "Their correlation length.  [default: the scene's]")]
+Around = Annotated[
+    Path | None, option("FILE", "A scan, CSV with x, y, gap in mm, that the random gaps pass through.")
+]
+Gaps = Annotated[
+    Path | None,
+    option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
+]
 Scheduler = Annotated[
     str | None, option("WHERE", "Dask: local:N for N local workers, or the address of a scheduler.")
 ]

@@ -11,11 +11,18 @@ import typer
 
 from .options import (
     AllowGap,
+    Around,
+    Cases,
     FormName,
+    Gaps,
+    Length,
+    Mean,
     MemoryLimit,
     Plugin,
     SceneName,
     Scheduler,
+    Seed,
+    Spread,
     error_reporting,
     option,
 )
@@ -23,29 +30,17 @@ from .options import (
 if TYPE_CHECKING:
     from problems.load_cases import LoadCases
 
-SEED = 0
-
 
 def series(
     scene: SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
-    cases: Annotated[
-        int | None,
-        option("N", "Number of cases.  [default: 100 random ones; all of a table]", min=1, max=10**7),
-    ] = None,
-    seed: Annotated[int | None, option("SEED", f"Seed of the random gaps.  [default: {SEED}]", min=0)] = None,
-    mean: Annotated[float | None, option("MM", "Mean of the random gaps.  [default: the scene's]")] = None,
-    sd: Annotated[float | None, option("MM", "Their standard deviation.  [default: the scene's]")] = None,
-    correlation_length: Annotated[
-        float | None, option("MM", "Their correlation length.  [default: the scene's]")
-    ] = None,
-    around: Annotated[
-        Path | None, option("FILE", "A scan, CSV with x, y, gap in mm, that the random gaps pass through.")
-    ] = None,
-    gaps: Annotated[
-        Path | None,
-        option("FILE", "Measured gaps, .csv .npz .npy: one row per case, one column per contact, mm."),
-    ] = None,
+    cases: Cases = None,
+    seed: Seed = None,
+    mean: Mean = None,
+    sd: Spread = None,
+    correlation_length: Length = None,
+    around: Around = None,
+    gaps: Gaps = None,
     sweep: Annotated[
         list[str] | None,
         option("KEY=VALUES", "A key of the scene and its values. Repeatable, for all combinations."),
@@ -153,7 +148,7 @@ def series(
         elif sweep:
             chosen = swept(read, sweep, taken)
         else:
-            chosen = random_gaps(read, count, seed or SEED, mean, sd, correlation_length, taken, around)
+            chosen = random_gaps(read, count, seed or 0, mean, sd, correlation_length, taken, around)
         limits = time_limit, memory_limit
         threads = threads or threads_per_worker(scheduler) or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)

@@ -191,9 +191,9 @@ def load_cases(scene: Scene, measurements: Sequence[Measurement]) -> Iterator[Lo
     if first.series is None:
         yield load_case(scene, first.form)
         return
-    from problems.load_cases.random_gaps import random_gaps
+    from problems.load_cases.stream import drawn_cases
 
-    cases = random_gaps(scene, **first.series.model_dump(), form=first.form)
+    cases = drawn_cases(scene, first.form, **first.series.model_dump())
     for each in measurements:
         assert each.case is not None
         yield cases.load(each.case)

@@ -107,7 +107,8 @@ class SolverEntry(BaseModel):
 class RandomCases(BaseModel):
     """[series]: each scene with `cases` random initial gaps, solved one after another in one process.
 
-    mean, sd and correlation_length, mm, are by default those of the scene's `initial_gap`.
+    mean, sd and correlation_length, mm, are by default those of the scene's `initial_gap`. fasteners : one of
+    the scene's is taken out or put back in between (problems/load_cases/stream.py).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -117,6 +118,7 @@ class RandomCases(BaseModel):
     mean: Finite | None = None
     sd: Positive | None = None
     correlation_length: Positive | None = None
+    fasteners: Annotated[bool, Field(exclude_if=lambda moved: not moved)] = False
 
 
 class Suite(BaseModel):

@@ -19,7 +19,6 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import Prepared
 from problems.forms.problem import Progress
-from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene
 
@@ -82,7 +81,9 @@ class ReferenceProblem:
         """The same for a load case of a series, with its own reference."""
         if series is None or case is None:
             return self
-        load = random_gaps(self.scene, **series, form=self.form).load(case)
+        from problems.load_cases.stream import drawn_cases  # of a series only
+
+        load = drawn_cases(self.scene, self.form, **series).load(case)
         return replace(self, load=load, case=case, given=[])
 
     def judged(self, x: Vector, lam: Vector, limit_mm: float) -> Judgement:

@@ -51,7 +51,7 @@ def pinned(file: str) -> dict[str, Version]:
 
 
 def test_the_oldest_versions_are_the_lower_bounds() -> None:
-    bounds = lower_bounds("more-solvers")
+    bounds = lower_bounds("more-solvers", "docs")
     assert pinned("constraints-oldest.txt") == {name: bounds[name] for name in bounds.keys() - LINTERS}
 
 

@@ -1,0 +1,72 @@
+"""The command `explore`: a page on which fasteners move."""
+
+from __future__ import annotations
+
+import webbrowser
+from typing import Annotated
+
+import typer
+
+from .options import SceneName, error_reporting, option
+
+LIMIT_MM = 0.05
+
+
+def explore(
+    scene: SceneName,
+    allow_gap: Annotated[float, option("MM", "The limit to begin with.", min=0.0)] = LIMIT_MM,
+    port: Annotated[
+        int, option("PORT", "Port on this machine.  [default: a free one]", min=0, max=65535)
+    ] = 0,
+    open_browser: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
+    ] = True,
+) -> None:
+    """Open a page on which fasteners are dragged, and the gap follows.
+
+    Fasteners move, come and go; preload, pressures, the mean gap and the limit are sliders. The page says
+    PASS or FAIL with the largest gap, its place and its proven error. A plan can be kept beside the next
+    one, and saved as a scene that `solve` answers alike. It is served to this machine only; Ctrl-C ends it.
+
+    \\b
+    Examples:
+      python -m harness explore joint.toml
+      python -m harness explore 4386/0107 --allow-gap 0.1 --no-open
+
+    \\b
+    Exit codes: 2 wrong usage or bad input, 130 ended.
+    """
+    with error_reporting("", "Ended.") as console:
+        from problems.errors import InputError
+
+        try:
+            from harness.explore.page import serve
+        except ImportError as error:
+            allowed = f"needs Bokeh: pip install 'rivetbench[explore]' ({error})"
+            raise InputError.one("explore", "bokeh", "not installed", allowed) from error
+        from rich.text import Text
+
+        from harness.explore.answers import Explorer, Settings
+        from harness.planning.form_choice import chosen_form
+        from harness.scene.allowed_gap import refuse_unusable
+        from problems.forms import FORMS
+        from problems.model.scene import JointScene
+        from problems.scene import read_scene
+
+        refuse_unusable(allow_gap)
+        read = read_scene(scene)
+        if not isinstance(read, JointScene):
+            raise InputError.one(
+                f"scene {scene}", "assembly", "own matrices", "fasteners move on a joint only"
+            )
+        settings = Settings.of(read)
+        with console.status(Text("matrices, and the first answer")):
+            explorer = Explorer(read, chosen_form(read, FORMS, None).form)
+            first = explorer.answer(settings)
+
+        def ready(address: str) -> None:
+            console.print(f"{address}  (Ctrl-C ends it)")
+            if open_browser:
+                webbrowser.open(address)
+
+        serve(explorer, scene, allow_gap, first, port, ready)

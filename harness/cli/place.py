@@ -1,0 +1,133 @@
+"""The command `place`: where fasteners go."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import (
+    Around,
+    Cases,
+    Gaps,
+    Length,
+    Mean,
+    SceneName,
+    Scheduler,
+    Seed,
+    Spread,
+    error_reporting,
+    option,
+)
+
+if TYPE_CHECKING:
+    from problems.load_cases import LoadCases
+    from problems.model.scene import Scene
+
+
+def place(
+    scene: SceneName,
+    out: Annotated[Path, option("DIR", "Output directory.")],
+    candidates: Annotated[
+        str | None,
+        option(
+            "HOLES",
+            "Rows x columns of the junction, as 4x32, or a CSV with x and y in mm.  [default: the "
+            "scene's own fasteners]",
+        ),
+    ] = None,
+    allow_gap: Annotated[
+        float | None, option("MM", "Find the fewest fasteners that leave no larger gap.", min=0.0)
+    ] = None,
+    count: Annotated[int | None, option("N", "Find the best N fasteners instead.", min=1)] = None,
+    share: Annotated[
+        float | None,
+        option(
+            "SHARE",
+            "Of the cases, in which the gap must be kept.  [default: 0.95; of one case, 1]",
+            min=0.0,
+            max=1.0,
+        ),
+    ] = None,
+    cases: Cases = None,
+    seed: Seed = None,
+    mean: Mean = None,
+    sd: Spread = None,
+    correlation_length: Length = None,
+    around: Around = None,
+    gaps: Gaps = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Find the fewest fasteners that keep a gap in most load cases, or the best N, and their order.
+
+    Fasteners of the scene's preload are chosen from candidate holes. The load cases are random or measured
+    gaps, as of `series`; a scene without random gaps is one case. Every plan in the report is proven in all
+    of them. DIR has the plan as a scene (plan.toml) and a table (plan.csv), and a report with the gap against
+    the number of fasteners. Stop with Ctrl-C, run the same command again, and it continues.
+
+    \\b
+    Examples:
+      python -m harness place joint.toml --allow-gap 0.05 --out results/fewer
+      python -m harness place joint.toml --candidates 4x32 --allow-gap 0.3 --cases 200 --out results/plan
+      python -m harness place joint.toml --candidates holes.csv --count 12 --scheduler local:2 --out results/b
+
+    \\b
+    Exit codes: 0 found, 2 wrong usage or bad input, 4 no plan keeps --allow-gap, 130 interrupted.
+    """
+    with error_reporting(
+        interrupted="Interrupted. What was tried is kept: run the same command again."
+    ) as console:
+        from harness.measurement.describe import described
+        from harness.placement.candidates import Movable
+        from harness.placement.run import Goal, run
+        from harness.placement.session import Study
+        from harness.planning.form_choice import chosen_form
+        from harness.scene.allowed_gap import refuse_unusable
+        from harness.terminal.console import waiting
+        from problems.build import load_case
+        from problems.effects.initial_gap import InitialGap
+        from problems.errors import Fault, InputError
+        from problems.load_cases import Listed
+        from problems.load_cases.measured_gaps import measured_gaps
+        from problems.load_cases.random_gaps import random_gaps
+        from problems.scene import read_scene
+
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        refuse_unusable(allow_gap)
+        read = read_scene(scene)
+        movable = Movable.of(read)
+        holes = movable.candidates(candidates)
+        random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
+        drawn = [name for name, value in (random | {"--around": around}).items() if value is not None]
+        faults = []
+        if allow_gap is None and count is None:
+            faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
+        if count is not None and count > len(holes):
+            faults.append(Fault("--count", "N", count, f"at most {len(holes)}, the candidates"))
+        if gaps and drawn:
+            faults.append(Fault("place", "cases", f"--gaps {' '.join(drawn)}", "random gaps or --gaps"))
+        if faults:
+            raise InputError(faults)
+        one = not (gaps or drawn or cases) and not any(
+            each.random for each in movable.bare.effects_of(InitialGap)
+        )
+        total = 1 if one else cases or 100
+        with waiting(console) as show:
+            (made,) = described([("newton", {})], None, "--solver", show)
+        choice = chosen_form(movable.bare, made.forms, None, total * len(holes))
+
+        def cases_of(of: Scene) -> LoadCases:
+            if one:
+                return Listed((load_case(of, choice.form),))
+            if gaps:
+                return measured_gaps(of, gaps, cases, choice.form)
+            return random_gaps(of, total, seed or 0, mean, sd, correlation_length, choice.form, around)
+
+        given = cases_of(movable.bare)
+        share = share if share is not None else (1.0 if given.count == 1 else 0.95)
+        study = Study(movable.bare, movable.fastener, given, choice.form, threads=1)
+        facts = {"solver_version": made.version, "solver_code": made.code}
+        goal = Goal(allow_gap, share, count)
+        raise typer.Exit(run(scene, movable, holes, goal, cases_of, study, facts, out, console, scheduler))

@@ -1,0 +1,1 @@
+"""A page on which fasteners move and the gap follows."""

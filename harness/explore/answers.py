@@ -1,0 +1,142 @@
+"""Answers while a scene's loads and gaps change: matrices are made once, each answer starts from the last.
+
+What moves, and how, is a change of the scene's effects: places and preload of its fasteners, the pressures,
+the mean of the initial gap. An effect's own forces and gaps are kept as long as it stays the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from harness.scene.edited import of_kind, with_fasteners
+from harness.verification.assess import GapError, assess
+from harness.verification.judge import LIMIT_MM
+from harness.verification.reference import proof_of
+from problems.build import load_case, prepared
+from problems.effects.fasteners import Fasteners
+from problems.effects.initial_gap import InitialGap
+from problems.effects.pressure import Pressure
+from problems.errors import Fault, InputError
+from problems.forms import Form
+from problems.forms.assembly import LoadCase, Vector
+from problems.input.bounded import validation_faults
+from problems.model.effect import Effect, StiffnessEffect
+from problems.model.scene import JointScene
+from solvers.algorithms.sweeps import Sweeps
+from solvers.base import WarmStart
+from solvers.kkt import with_p
+
+TOLERANCE_MM = 1e-7  # until it is proven
+PAGE = "page"  # where a wrong value was given
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Places of the fasteners, mm, and preload, N; the mean of the initial gap, mm, and the pressures, N/mm²,
+    in the order of the scene; a mean of None: there is no initial gap.
+    """
+
+    places: tuple[tuple[float, float], ...]
+    preload: float
+    mean: float | None
+    pressures: tuple[float, ...]
+
+    @classmethod
+    def of(cls, scene: JointScene) -> Settings:
+        """Raises InputError if the scene has no fasteners."""
+        found = list(scene.effects_of(Fasteners))
+        if not found:
+            allowed = 'an [[effect]] kind = "fasteners" to move'
+            raise InputError.one(f"scene {scene.name}", "effect", "no fasteners", allowed)
+        marks = np.concatenate([each.marks(scene.joint) for each in found])
+        gap = next(scene.effects_of(InitialGap), None)
+        pressures = tuple(each.value for each in scene.effects_of(Pressure))
+        places = tuple((x, y) for x, y in marks.tolist())
+        return cls(places, found[0].preload, None if gap is None else gap.mean, pressures)
+
+    def applied(self, scene: JointScene) -> tuple[Effect, ...]:
+        """The scene's effects with these values. Raises InputError, as `validate` does."""
+        pressures, faults, made = iter(self.pressures), list[Fault](), list[Effect]()
+        fasteners = False
+        for effect in scene.effects:
+            changes: dict[str, Any] = {}
+            if isinstance(effect, Fasteners):
+                if fasteners or not self.places:
+                    continue
+                fasteners, changes = True, {"points": self.places, "pattern": None, "preload": self.preload}
+            elif isinstance(effect, InitialGap):
+                changes = {"mean": self.mean}
+            elif isinstance(effect, Pressure):
+                changes = {"value": next(pressures)}
+            try:
+                new = type(effect).model_validate(effect.model_dump() | changes) if changes else effect
+            except ValidationError as error:
+                faults += validation_faults(PAGE, type(effect), error, effect.kind)
+                continue
+            others = [each for each in scene.effects if type(each) is not type(effect)]
+            if changes:
+                found = new.faults(scene.joint, others)
+                faults += [Fault(PAGE, f"{new.kind}.{key}", value, allowed) for key, value, allowed in found]
+            made.append(new)
+        if faults:
+            raise InputError(faults)
+        return tuple(made)
+
+    def write_to(self, document: Any) -> None:
+        """Change the document of the scene's file."""
+        with_fasteners(self.places)(document)
+        of_kind(document, "fasteners")[0]["preload"] = self.preload
+        for table in of_kind(document, "initial_gap"):
+            table["mean"] = self.mean
+        for table, value in zip(of_kind(document, "pressure"), self.pressures, strict=True):
+            table["value"] = value
+
+
+@dataclass(frozen=True)
+class Answer:
+    """λ (m,) N, gap (m,) mm, and the load case. error_mm : proven, of any gap; None while it is not known."""
+
+    settings: Settings
+    load: LoadCase
+    lam: Vector
+    gap: Vector
+    error_mm: float | None = None
+
+
+class Explorer:
+    """A scene's matrices, kept."""
+
+    def __init__(self, scene: JointScene, form: Form) -> None:
+        self.scene, self.form = scene, form
+        self.data = prepared(scene, form=form)
+        self.sweeps = Sweeps(self.data)
+        self.contribution = lru_cache(maxsize=256)(self._contribution)
+
+    def answer(self, settings: Settings, near: Answer | None = None) -> Answer:
+        """From the last one. Raises InputError if a setting is wrong."""
+        effects = settings.applied(self.scene)
+        parts = [self.contribution(each) for each in effects if not isinstance(each, StiffnessEffect)]
+        none = self.contribution(None)
+        f, g = sum((f for f, _ in parts), none[0]), sum((g for _, g in parts), none[1])
+        (load,) = with_p(self.data, [LoadCase(f, g)])
+        start = None if near is None else WarmStart(near.load, near.lam, near.gap)
+        case = self.sweeps.solved(load, TOLERANCE_MM, start)
+        lam, gap = np.empty(len(load.p)), np.empty(len(load.p))
+        lam[self.sweeps.order], gap[self.sweeps.order] = np.maximum(case.trial.lam, 0.0), case.trial.y
+        return Answer(settings, load, lam, gap)
+
+    def proven(self, answer: Answer) -> Answer:
+        """The same with the gaps and the error of the proven one."""
+        (found,) = assess(proof_of(self.data), [answer.load], [answer.lam], [None], LIMIT_MM / 2)
+        error = GapError.of(self.data.assembly)(answer.load.g, found.x, found.bound_mm)
+        return replace(answer, gap=found.gap, error_mm=float(error.max(initial=0.0)))
+
+    def _contribution(self, effect: Effect | None) -> tuple[Vector, Vector]:
+        """f and g of one effect; of None, zeros."""
+        load = load_case(self.scene, self.form, [] if effect is None else [effect])
+        return load.f, load.g

@@ -1,0 +1,248 @@
+"""The page in a browser: the gap map with its fasteners to drag, sliders, the outcome, a kept plan beside it.
+
+Bokeh's server calls `changed` when a fastener is let go or a slider stops; the answer is drawn at once and
+proven right after. An answer that is not of the settings on the page is shown grey.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bokeh.application import Application
+from bokeh.application.handlers.function import FunctionHandler
+from bokeh.layouts import column, row
+from bokeh.models import (
+    Button,
+    ColorBar,
+    ColumnDataSource,
+    Div,
+    LinearColorMapper,
+    PointDrawTool,
+    Slider,
+    TextInput,
+)
+from bokeh.plotting import figure
+from bokeh.server.server import Server
+
+from harness.explore.answers import Answer, Explorer, Settings
+from harness.results.records import replace_text
+from harness.scene.edited import edited
+from problems.effects.pressure import Pressure
+from problems.errors import InputError
+from problems.forms.assembly import Matrix
+
+OVER = "#D55E00"  # gaps above the limit
+STALE = 0.35  # opacity of an answer to other settings
+WIDE = 760  # pixels of a map
+TALLEST, LOWEST = 420, 150
+PROOF_MS = 50  # after the first change that is not proven: the map comes before
+SEAM = 1.02  # of a cell, so that none shows between two
+
+
+class Page:
+    """One tab."""
+
+    def __init__(
+        self, explorer: Explorer, source: str, limit_mm: float, first: Answer, document: Any
+    ) -> None:
+        self.explorer, self.source, self.document = explorer, source, document
+        self.answer, self.kept, self.pending = first, first, None
+        assembly = explorer.data.assembly
+        assert assembly.contact_nodes is not None  # of a joint
+        self.places: Matrix = assembly.contact_nodes
+        self.spacing = _spacing(self.places)
+        self.colours = LinearColorMapper(palette="Viridis256", low=0.0, high=limit_mm, high_color=OVER)
+        self.cells = ColumnDataSource({"x": self.places[:, 0], "y": self.places[:, 1], "gap": first.gap})
+        self.kept_cells = ColumnDataSource(dict(self.cells.data))
+        self.fasteners = ColumnDataSource(_columns(first.settings))
+        self.kept_fasteners = ColumnDataSource(_columns(first.settings))
+        self.said, self.kept_said, self.fault = Div(width=WIDE), Div(width=WIDE), Div(width=WIDE)
+        self.sliders = self._sliders(first.settings, limit_mm)
+        self.path = TextInput(title="scene file", value=str(Path(source).stem) + "-moved.toml")
+        self.fasteners.on_change("data", self.changed)
+        for slider in self.sliders.values():
+            slider.on_change("value_throttled", self.changed)
+        document.title = f"{explorer.scene.title}: where do the fasteners go?"
+        document.add_root(self._layout())
+        self.show()
+        self.keep()
+
+    def _sliders(self, settings: Settings, limit_mm: float) -> dict[str, Slider]:
+        found = {"limit": _slider("limit, mm", limit_mm), "preload": _slider("preload, N", settings.preload)}
+        if settings.mean is not None:
+            found["mean"] = _slider("mean gap, mm", settings.mean)
+        for k, effect in enumerate(self.explorer.scene.effects_of(Pressure)):
+            found[f"pressure {k}"] = _slider(f"pressure on {effect.part}, N/mm²", effect.value)
+        return found
+
+    def _layout(self) -> Any:
+        keep, save = Button(label="Keep this plan"), Button(label="Save as a scene")
+        keep.on_click(self.keep)
+        save.on_click(self.save)
+        hint = Div(text="Drag a fastener. Click on the map to add one; select and Backspace removes it.")
+        now = self._map("now", self.cells, self.fasteners, draws=True)
+        then = self._map("kept", self.kept_cells, self.kept_fasteners, draws=False)
+        dials = column(*self.sliders.values(), self.path, row(keep, save), hint)
+        maps = column(self.said, now, self.fault, self.kept_said, then)
+        return row(maps, dials)
+
+    def _map(self, title: str, cells: ColumnDataSource, fasteners: ColumnDataSource, draws: bool) -> Any:
+        low, high = self.places.min(axis=0) - self.spacing / 2, self.places.max(axis=0) + self.spacing / 2
+        ratio = (high[1] - low[1]) / (high[0] - low[0])
+        height = int(np.clip(WIDE * ratio + 60, LOWEST, TALLEST))
+        plot = figure(
+            title=title,
+            width=WIDE,
+            height=height,
+            x_range=(low[0], high[0]),
+            y_range=(low[1], high[1]),
+            x_axis_label="x, mm",
+            y_axis_label="y, mm",
+            tools="pan,wheel_zoom,reset",
+            tooltips=None,
+            output_backend="webgl",
+        )
+        plot.toolbar.logo = None
+        colour = {"field": "gap", "transform": self.colours}
+        width, height_mm = self.spacing
+        size = {"width": SEAM * width, "height": SEAM * height_mm}
+        made = plot.rect("x", "y", **size, source=cells, fill_color=colour, line_color=None)
+        if draws:
+            self.gaps = made
+        plot.add_layout(ColorBar(color_mapper=self.colours, title="gap, mm"), "right")
+        marks = plot.scatter("x", "y", source=fasteners, size=11, fill_color="white", line_color="black")
+        if draws:
+            tool = PointDrawTool(renderers=[marks], empty_value=0.0)
+            plot.add_tools(tool)
+            plot.toolbar.active_tap = tool
+        return plot
+
+    @property
+    def settings(self) -> Settings:
+        """What the page asks for."""
+        places = zip(self.fasteners.data["x"], self.fasteners.data["y"], strict=True)
+        values = {name: float(slider.value) for name, slider in self.sliders.items()}
+        pressures = tuple(value for name, value in values.items() if name.startswith("pressure"))
+        return Settings(
+            tuple((float(x), float(y)) for x, y in places), values["preload"], values.get("mean"), pressures
+        )
+
+    def changed(self, attr: str, old: object, new: object) -> None:
+        """Answer what the page asks for, or say what is wrong with it."""
+        self.colours.high = float(self.sliders["limit"].value)
+        try:
+            if self.settings != self.answer.settings:
+                self.answer = self.explorer.answer(self.settings, self.answer)
+                if self.pending is None:
+                    self.pending = self.document.add_timeout_callback(self.prove, PROOF_MS)
+        except InputError as error:
+            self.fault.text = "<br>".join(_escaped(str(fault)) for fault in error.faults)
+            self.gaps.glyph.fill_alpha = STALE
+            return
+        self.fault.text = ""
+        self.gaps.glyph.fill_alpha = 1.0
+        self.show()
+
+    def prove(self) -> None:
+        """Say how sure the answer is; in its map nothing would be seen to change."""
+        self.pending = None
+        self.answer = self.explorer.proven(self.answer)
+        self.say()
+
+    def show(self) -> None:
+        self.cells.data["gap"] = self.answer.gap.astype(np.float32)
+        self.say()
+
+    def say(self) -> None:
+        self.said.text = outcome(self.answer, self.places, float(self.sliders["limit"].value))
+
+    def keep(self) -> None:
+        """Show this plan beside those to come."""
+        if self.answer.error_mm is None:
+            self.prove()
+        self.kept = self.answer
+        self.kept_cells.data = dict(self.cells.data)
+        self.kept_fasteners.data = _columns(self.kept.settings)
+        self.kept_said.text = f"Kept: {outcome(self.kept, self.places, float(self.sliders['limit'].value))}"
+
+    def save(self) -> None:
+        """Write the settings as a scene, and say how to solve it."""
+        path = Path(self.path.value)
+        try:
+            if not self.settings.places:
+                raise InputError.one("page", "fasteners", 0, "at least one, in a scene that has them")
+            if path.suffix != ".toml":
+                raise InputError.one("page", "scene file", str(path), "a name that ends in .toml")
+            if path.exists():
+                raise InputError.one("page", "scene file", str(path), "exists: name another")
+            replace_text(path, edited(self.source, path.parent, self.settings.write_to))
+        except (InputError, OSError) as error:
+            faults = error.faults if isinstance(error, InputError) else [error]
+            self.fault.text = "<br>".join(_escaped(str(fault)) for fault in faults)
+            return
+        limit = self.sliders["limit"].value
+        said = f"python -m harness solve {path} --allow-gap {limit:g} --out results/{path.stem}"
+        self.fault.text = f"Saved. <code>{_escaped(said)}</code>"
+
+
+def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
+    """PASS or FAIL, the largest gap with its place, and how sure that is."""
+    k = int(answer.gap.argmax())
+    gap, (x, y) = float(answer.gap[k]), places[k]
+    e = answer.error_mm
+    sure = "…" if e is None else f"every gap within {e:.1e} mm, proven" if np.isfinite(e) else "not proven"
+    untold = e is not None and not abs(gap - limit_mm) > e
+    word = "cannot be told" if untold else "PASS" if gap <= limit_mm else "FAIL"
+    colour = {"PASS": "#009E73", "FAIL": OVER}.get(word, "#666666")
+    above = np.count_nonzero(answer.gap > limit_mm)
+    return (
+        f'<b style="color:{colour};font-size:130%">{word}</b> largest gap <b id="gap">{gap:.6g}</b> mm at '
+        f"({x:.4g}, {y:.4g}) mm; {above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
+        f"{len(answer.settings.places)} fasteners, {np.count_nonzero(answer.lam)} contacts closed, which "
+        f"carry {answer.lam.sum():.4g} N. {sure}"
+    )
+
+
+def serve(
+    explorer: Explorer, source: str, limit_mm: float, first: Answer, port: int, ready: Callable[[str], None]
+) -> None:
+    """Serve pages to this machine alone, under an address that nobody can guess, until interrupted."""
+    token = secrets.token_urlsafe(16)
+    application = Application(FunctionHandler(partial(_page, explorer, source, limit_mm, first)))
+    server = Server({f"/{token}": application}, address="127.0.0.1", port=port, use_index=False)
+    server.start()
+    ready(f"http://localhost:{server.port}/{token}")
+    try:
+        server.io_loop.start()
+    finally:
+        server.stop()
+
+
+def _page(explorer: Explorer, source: str, limit_mm: float, first: Answer, document: Any) -> None:
+    Page(explorer, source, limit_mm, first, document)
+
+
+def _slider(title: str, value: float) -> Slider:
+    """From 0 to three times the value, or to minus three times a negative one."""
+    end = 3 * value or 1.0
+    low, high = sorted((0.0, end))
+    return Slider(title=title, start=low, end=high, value=value, step=abs(end) / 300, format="0.[0000]")
+
+
+def _columns(settings: Settings) -> dict[str, list[float]]:
+    return {"x": [x for x, _ in settings.places], "y": [y for _, y in settings.places]}
+
+
+def _spacing(places: Matrix) -> Matrix:
+    """Of the nodes along x and along y, mm: the median distance of neighbours."""
+    lines = [np.unique(axis.round(6)) for axis in places.T]
+    return np.array([float(np.median(np.diff(line))) if len(line) > 1 else 1.0 for line in lines])
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

@@ -1,0 +1,97 @@
+"""The holes that fasteners may go into, and the scene without its fasteners."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from problems.effects.fasteners import Fasteners
+from problems.errors import Fault, InputError
+from problems.forms.assembly import Matrix
+from problems.model.effect_tables import read_columns
+from problems.model.scene import JointScene, Scene
+
+Place = tuple[float, float]  # mm
+Plan = tuple[Place, ...]  # sorted
+
+ROWS_AND_COLUMNS = re.compile(r"([1-9]\d{0,3})x([1-9]\d{0,3})")
+DIGITS = 6  # of a place in mm: to the nanometre
+
+
+@dataclass(frozen=True)
+class Movable:
+    """bare : the scene without its fasteners. fastener : one of them, for its preload and contact. own : the
+    places where the scene has them.
+    """
+
+    bare: JointScene
+    fastener: Fasteners
+    own: Plan
+
+    @classmethod
+    def of(cls, scene: Scene) -> Movable:
+        """Raises InputError if the scene has no fasteners with a preload, or some with different ones."""
+        where = f"scene {scene.name}"
+        if not isinstance(scene, JointScene):
+            raise InputError.one(where, "assembly", "own matrices", "fasteners move on a joint only")
+        found = list(scene.effects_of(Fasteners))
+        if not found:
+            allowed = 'an [[effect]] kind = "fasteners": its preload is that of each candidate'
+            raise InputError.one(where, "effect", "no fasteners", allowed)
+        for name in ("preload", "between"):
+            values = [getattr(each, name) for each in found]
+            if any(value != values[0] for value in values):
+                raise InputError.one(
+                    where, f"fasteners.{name}", values, "the same in all: they change places"
+                )
+        others = tuple(effect for effect in scene.effects if effect not in found)
+        marks = np.concatenate([each.marks(scene.joint) for each in found])
+        if twice := _twice(marks, where):
+            raise InputError(twice)
+        return cls(replace(scene, effects=others), found[0], plan_of(marks))
+
+    def candidates(self, asked: str | None) -> Plan:
+        """The places of a pattern `4x32`, rows × columns of the junction's cells, of a CSV with columns x and
+        y, or by default those of the scene. Raises InputError if one is off the parts, or there twice.
+        """
+        if asked is None:
+            return self.own
+        if pattern := ROWS_AND_COLUMNS.fullmatch(asked):
+            rows, columns = map(int, pattern.groups())
+            points, faults = grid(self.bare, rows, columns), []
+        else:
+            read = read_columns(Path(asked), {"x": "x", "y": "y"})
+            points, faults = np.array(read.rows).reshape(-1, 2), read.faults
+        faults = faults + self.faults(points, asked)
+        if faults:
+            raise InputError(faults)
+        return plan_of(points)
+
+    def faults(self, points: Matrix, source: str) -> list[Fault]:
+        """Of points off the parts, or there twice."""
+        joint = self.bare.joint
+        on = joint.covers(self.fastener.parts(joint), points)
+        found = [Fault(source, "x, y", points[k].tolist(), joint.region) for k in np.flatnonzero(~on)]
+        return found + _twice(points, source)
+
+
+def _twice(points: Matrix, source: str) -> list[Fault]:
+    places, counts = np.unique(points.round(DIGITS), axis=0, return_counts=True)
+    return [Fault(source, "x, y", place.tolist(), "is there twice") for place in places[counts > 1]]
+
+
+def plan_of(points: Matrix) -> Plan:
+    return tuple(sorted({(x, y) for x, y in points.round(DIGITS).tolist()}))
+
+
+def grid(scene: JointScene, rows: int, columns: int) -> Matrix:
+    """(rows columns, 2) the middles of equal cells of the junction."""
+    low, high = scene.joint.bounds
+    x, y = (
+        start + (np.arange(count) + 0.5) * (stop - start) / count
+        for start, stop, count in zip(low, high, (columns, rows), strict=True)
+    )
+    return np.column_stack([each.ravel() for each in np.meshgrid(x, y)])

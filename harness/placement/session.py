@@ -1,0 +1,173 @@
+"""What a plan of fasteners leaves open: the largest gap of each load case, in one process.
+
+A fastener at z adds f_z to the forces f₀ of the scene without any, and u_z = AᵀK⁻¹f_z to its overlap p₀:
+
+    f = f₀ + Σ f_z,   p = p₀ + Σ u_z,
+
+so that a plan costs no more than its contact problems. Each is solved by active-set Newton from the nearest
+answer to another plan, which most contacts share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from uuid import uuid4
+
+import numpy as np
+import threadpoolctl
+
+from harness.placement.candidates import Place, Plan
+from harness.verification.assess import GapError, assess
+from harness.verification.judge import LIMIT_MM
+from harness.verification.reference import proof_of
+from problems.build import load_case, prepared
+from problems.effects.fasteners import Fasteners
+from problems.forms import Form
+from problems.forms.assembly import LoadCase, Matrix, Vector
+from problems.load_cases import LoadCases
+from problems.model.scene import JointScene
+from solvers.algorithms.sweeps import Case, Sweeps
+from solvers.kkt import with_p
+
+TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-6
+ENOUGH_MM = LIMIT_MM / 2  # a proven bound that needs no further refinement
+POWER = 8  # of the mean of gaps that stands for the largest one where that does not change
+
+
+@dataclass(frozen=True)
+class Study:
+    """The scene without fasteners, one of its fasteners, and its load cases."""
+
+    bare: JointScene
+    fastener: Fasteners
+    cases: LoadCases
+    form: Form
+    threads: int
+    key: str = field(default_factory=lambda: uuid4().hex)
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a plan leaves in some cases. base : the plan from whose answers they are solved, as an estimate;
+    None: from nothing, and proven.
+    """
+
+    plan: Plan
+    cases: tuple[int, ...]
+    base: Plan | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of each case: its largest gap, mm, or of a proven answer the least that it is surely not above; the
+    contact where it is; and (Σ y⁸ / m)^⅛ of its gaps y, mm.
+    """
+
+    largest: tuple[float, ...]
+    contact: tuple[int, ...]
+    mean: tuple[float, ...]
+
+
+class PlanSession:
+    def __init__(self, study: Study) -> None:
+        threadpoolctl.threadpool_limits(study.threads)
+        self.study = study
+        self.data = prepared(study.bare, form=study.form)
+        self.sweeps = Sweeps(self.data)
+        self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
+        self.loads: dict[int, LoadCase] = {}
+        self.columns: dict[Place, tuple[Vector, Vector]] = {}
+        self.solved: tuple[Plan, tuple[int, ...], list[Case]] | None = None
+
+    def answer(self, question: Question) -> Outcome:
+        """The same to the last bit, whatever was asked before."""
+        loads = self._loads(question.plan, question.cases)
+        if question.base is None:
+            gaps, error = self._proven(loads, self._solve(loads, [], TOLERANCE_MM))
+        else:
+            if self.solved is None or self.solved[:2] != (question.base, question.cases):
+                before = self._solve(self._loads(question.base, question.cases), [], ESTIMATE_MM)
+                self.solved = question.base, question.cases, before
+            cases = self._solve(loads, self.solved[2], ESTIMATE_MM)
+            gaps, error = self._gaps(cases), np.zeros(len(loads))
+        largest = gaps.max(axis=0)
+        scale = np.where(largest > 0, largest, 1.0)
+        mean = scale * ((np.maximum(gaps, 0.0) / scale) ** POWER).mean(axis=0) ** (1 / POWER)
+        return Outcome(
+            tuple((largest + error).tolist()), tuple(gaps.argmax(axis=0).tolist()), tuple(mean.tolist())
+        )
+
+    def distances(self, places: Sequence[Place]) -> Matrix:
+        """(k, k) ‖f_a − f_b‖ in the norm of K⁻¹, √(N·mm): how different what two fasteners do is. On the
+        diagonal ‖f_a‖.
+        """
+        F = np.column_stack([self._column(place)[0] for place in places])
+        G = F.T @ self.data.assembly.K.solve(F)
+        square = np.diag(G)[:, None] + np.diag(G) - G - G.T + np.diag(np.diag(G))
+        root: Matrix = np.sqrt(np.maximum(square, 0.0))
+        return root
+
+    def _solve(self, loads: list[LoadCase], start: list[Case], tolerance: float) -> list[Case]:
+        self.sweeps.last = start
+        self.sweeps(loads, tolerance)
+        return self.sweeps.last
+
+    def _gaps(self, cases: list[Case]) -> Matrix:
+        """y (m, k), mm."""
+        y = np.empty((len(self.sweeps.order), len(cases)))
+        y[self.sweeps.order] = np.column_stack([case.trial.y for case in cases])
+        return y
+
+    def _proven(self, loads: list[LoadCase], cases: list[Case]) -> tuple[Matrix, Vector]:
+        """Gaps (m, k), and how far the largest may be off (k,), mm."""
+        lam = np.empty((len(self.sweeps.order), len(cases)))
+        lam[self.sweeps.order] = np.column_stack([np.maximum(case.trial.lam, 0.0) for case in cases])
+        found = assess(self.proof, loads, list(lam.T), [None] * len(loads), ENOUGH_MM)
+        errors = [
+            self.gap_error(load.g, each.x, each.bound_mm).max(initial=0.0)
+            for load, each in zip(loads, found, strict=True)
+        ]
+        return np.column_stack([each.gap for each in found]), np.array(errors)
+
+    def _loads(self, plan: Plan, numbers: Sequence[int]) -> list[LoadCase]:
+        new = [k for k in numbers if k not in self.loads]
+        if new:
+            made = with_p(self.data, [self.study.cases.load(k) for k in new])
+            self.loads |= dict(zip(new, made, strict=True))
+        f = self.loads[numbers[0]].f.copy()
+        u = np.zeros(self.data.assembly.m)
+        for place in plan:
+            force, overlap = self._column(place)
+            f, u = f + force, u + overlap
+        return [LoadCase(f, self.loads[k].g, self.loads[k].p + u) for k in numbers]
+
+    def _column(self, place: Place) -> tuple[Vector, Vector]:
+        """f_z (n,) N and u_z (m,) mm."""
+        if place not in self.columns:
+            study, assembly = self.study, self.data.assembly
+            given = {"points": (place,), "pattern": None}
+            f = load_case(study.bare, study.form, [study.fastener.model_copy(update=given)]).f
+            self.columns[place] = f, assembly.A.T @ assembly.K.solve(f)
+        return self.columns[place]
+
+
+_sessions: dict[str, PlanSession] = {}
+
+
+def _session_of(study: Study) -> PlanSession:
+    """The one that this process keeps: each worker opens the assembly once."""
+    if study.key not in _sessions:
+        _sessions.clear()
+        _sessions[study.key] = PlanSession(study)
+    return _sessions[study.key]
+
+
+def answer(task: tuple[Study, Question]) -> Outcome:
+    study, question = task
+    return _session_of(study).answer(question)
+
+
+def distances(task: tuple[Study, Plan]) -> Matrix:
+    study, places = task
+    return _session_of(study).distances(places)

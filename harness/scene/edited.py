@@ -1,0 +1,67 @@
+"""A scene's file with other values, its comments and order kept, for another folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from problems.drawn import drawn_table
+from problems.errors import InputError
+from problems.scene import SCENES
+
+FILES = ("assembly", "file", "superelement", "nodes")  # keys whose values may be paths, as seen from the file
+
+
+def edited(source: str, folder: Path, change: Callable[[Any], None]) -> str:
+    """The text of a scene's file, changed, whose other files are found from `folder`.
+
+    Raises InputError if the scene has no file: a rung of a ladder.
+    """
+    if table := drawn_table(source):
+        document, home = tomlkit.parse(tomlkit.dumps(table)), SCENES
+    else:
+        path = Path(source) if source.endswith(".toml") else SCENES / f"{source}.toml"
+        if not path.is_file():
+            raise InputError.one("scene", "name", source, "a scene in a file, so that its values can change")
+        document, home = tomlkit.parse(path.read_text("utf-8")), path.parent
+    change(document)
+    for inner in _tables(document):
+        for key in FILES:
+            if isinstance(value := inner.get(key), str) and (home / value).is_file():
+                inner[key] = Path(os.path.relpath(home / value, folder)).as_posix()
+    return tomlkit.dumps(document)
+
+
+def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], None]:
+    """The change that moves all fasteners of a scene to these places, mm."""
+
+    def change(document: Any) -> None:
+        found = of_kind(document, "fasteners")
+        if not found:
+            allowed = "in the scene itself, not in the file of its assembly"
+            raise InputError.one("scene", 'effect kind = "fasteners"', "none", allowed)
+        for key in ("pattern", "file", "columns", "points"):
+            found[0].pop(key, None)
+        found[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
+        for other in found[1:]:
+            document["effect"].remove(other)
+
+    return change
+
+
+def of_kind(document: Any, kind: str) -> list[Any]:
+    """The tables of the effects of a kind."""
+    return [table for table in document.get("effect", []) if table.get("kind") == kind]
+
+
+def _tables(value: Any) -> Iterator[Any]:
+    if isinstance(value, dict):
+        yield value
+        value = list(value.values())
+    if isinstance(value, list):
+        for inner in value:
+            yield from _tables(inner)

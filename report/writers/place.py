@@ -1,0 +1,157 @@
+"""Writes the report of a search for a plan of fasteners: report.md with pictures, and plan.csv, order.csv."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
+from report.document.escape import quoted
+from report.document.numbers import counted, significant, whole
+from report.figures import style
+from report.figures.maps import Map, drawn, rooted
+from report.results.series import read as read_series
+from report.writers.pages import emptied, written
+
+#: How a plan came about: what a line of the table and of the picture is called, and its look.
+FAMILIES = {
+    "all candidates": ("all candidates", style.BLACK, "o", ""),
+    "removal": ("removed one by one", style.BLUE, ".", "-"),
+    "exchange": ("after exchanges", style.BLACK, "*", ""),
+    "own": ("the scene's own", style.GREEN, "D", ""),
+    "uniform": ("uniform patterns", style.VERMILLION, "s", ""),
+    "farthest points": ("farthest points", style.PURPLE, "^", ""),
+}
+RECORD = "place.json"
+
+
+def write(directory: Path) -> Path:
+    """Write DIRECTORY/report/report.md from the record and the series in DIRECTORY. Returns its path."""
+    record = quoted(json.loads((directory / RECORD).read_text("utf-8")))
+    target = emptied(directory / "report")
+    steps = pd.DataFrame(record["steps"])
+    title = f"Where fasteners go: {record['title']}"
+    with style.applied():
+        sections = [Section("The plan", [_summary(record), _families(record, steps)])]
+        sections.append(Section("How many fasteners", [_curve(record, steps)]))
+        sections.append(Section("Where the gap is left", _maps(record, directory)))
+        if record["order"]:
+            sections.append(Section("In which order to set them", _order(record)))
+    return written(target / "report.md", title, sections)
+
+
+def _summary(record: dict[str, Any]) -> Table:
+    best, share = record["best"], f"{100 * record['share']:.4g} % of {counted(record['cases'], 'case')}"
+    limit = record["limit_mm"]
+    asked = f"the best {record['count']}" if record["count"] else f"the fewest that leave {limit:g} mm"
+    known = {
+        "asked for": f"{asked} in {share}",
+        "candidates": f"{len(record['candidates'])} holes, {significant(record['preload'])} N each",
+    }
+    if best is None:
+        worst = record["steps"][0]
+        x, y = worst["worst_at"]
+        known["found"] = (
+            f"none: all of them leave {significant(worst['gap_mm'])} mm; the worst case, "
+            f"{worst['worst_case']}, at ({x:.4g}, {y:.4g}) mm"
+        )
+    else:
+        known["found"] = (
+            f"{best['fasteners']} fasteners that leave at most {significant(best['gap_mm'])} mm, proven"
+        )
+        if limit is not None:
+            failing = ", ".join(map(str, best["failing"])) or "none"
+            known["cases beyond the limit"] = f"{len(best['failing'])} of {record['cases']}: {failing}"
+        known["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
+        known["lower bound"] = "none is known: this is the best plan found"
+    lines = pd.DataFrame(known.items(), columns=["what", "value"])
+    return Table("", "*The question and its answer.*", lines, [word("what", "what"), word("value", "value")])
+
+
+def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
+    """Of each family of plans, the smallest that keeps the limit; of one size, the best."""
+    limit = np.inf if record["limit_mm"] is None else record["limit_mm"]
+    lines = []
+    for name, (text, *_) in FAMILIES.items():
+        own = steps[steps["moved"] == name].sort_values(["fasteners", "gap_mm"])
+        if record["count"]:
+            own = own[(own["fasteners"] == record["count"]) | (name in ("own", "all candidates"))]
+        kept = own if record["count"] else own[own["gap_mm"] <= limit]
+        if len(own):
+            line = (kept if len(kept) else own.tail(1)).iloc[0]
+            lines.append({"family": text, **line[["fasteners", "gap_mm"]], "kept": line["gap_mm"] <= limit})
+    columns = [word("plan", "family"), number("fasteners", "fasteners", whole), number("gap, mm", "gap_mm")]
+    if record["limit_mm"] is not None:
+        columns.append(Column("within the limit", lambda line: "yes" if line["kept"] else "no", "left"))
+    caption = "*Beside plans that cost no search.* Of each kind the smallest within the limit, or its last."
+    return Table("families", caption, pd.DataFrame(lines), columns)
+
+
+def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
+    drawing = style.figure(3.4)
+    axes = drawing.subplots()
+    for name, (text, colour, marker, line) in FAMILIES.items():
+        own = steps[steps["moved"] == name].sort_values("fasteners")
+        if len(own):
+            axes.plot(
+                own["fasteners"], own["gap_mm"], marker=marker, linestyle=line, color=colour, label=text, ms=5
+            )
+    if record["limit_mm"] is not None:
+        axes.axhline(record["limit_mm"], color=style.GREY, linewidth=1, label="the limit")
+    axes.set(xlabel="fasteners", ylabel="largest gap, mm", xlim=(0, None), yscale="log")
+    style.plain_log(axes.yaxis)
+    drawing.legend(loc="outside right upper")
+    share = f"{100 * record['share']:.4g} %"
+    caption = (
+        f"*The gap against the number of fasteners*: the largest in the best {share} of the cases, proven."
+    )
+    return Figure("gap-against-fasteners", caption, drawing, steps.drop(columns=["plan", "failing"]))
+
+
+def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
+    """The gap that the share of the cases keeps at each contact, before and after."""
+    shown, share = [], record["share"]
+    names = {"own": f"the scene's own {len(record['own'])}"}
+    if record["best"]:
+        names["plan"] = f"the plan of {record['best']['fasteners']}"
+    for name, text in names.items():
+        series = read_series(directory / name)
+        if series.nodes is None or not len(series.cases):
+            return [Text("No picture: some cases have no answer.")]
+        pieces = [np.quantile(some, share, axis=0) for some in series.of_contacts()]
+        shown.append((text, series.nodes, np.concatenate(pieces), series.fasteners.tolist()))
+    scale = rooted("gap, mm", "viridis", *(values for _, _, values, _ in shown))
+    maps = [Map(text, nodes, gap, scale, (), {"fasteners": marks}) for text, nodes, gap, marks in shown]
+    caption = f"*The gap at each contact that {100 * share:.4g} % of the cases keep*, before and after."
+    table = pd.DataFrame({"x_mm": shown[0][1][:, 0], "y_mm": shown[0][1][:, 1]})
+    table = table.assign(**{f"{name}_mm": gap for name, (_, _, gap, _) in zip(names, shown, strict=True)})
+    return [Figure("before-and-after", caption, drawn(maps, 1)[0], table)]
+
+
+def _order(record: dict[str, Any]) -> list[Block]:
+    places: list[tuple[float, float]] = []
+    lines = []
+    for step in record["order"]:
+        new = [tuple(place) for place in step["plan"] if tuple(place) not in places]
+        places += new
+        x, y = new[0] if new else (np.nan, np.nan)
+        at = dict(zip(("at_x_mm", "at_y_mm"), step["worst_at"], strict=True))
+        lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]} | at)
+    table = pd.DataFrame(lines)
+    drawing = style.figure(3.0)
+    axes = drawing.subplots()
+    axes.plot(table["set"], table["gap_mm"], color=style.BLUE, marker="o", ms=4)
+    axes.set(xlabel="fasteners set", ylabel="largest gap, mm", ylim=(0, None))
+    columns = [number("set", "set", whole), number("x, mm", "x_mm"), number("y, mm", "y_mm")]
+    columns += [number("gap after it, mm", "gap_mm")]
+    caption = (
+        "*The order that keeps the gap small after each step*: the reverse of removing the least needed."
+    )
+    return [
+        Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),
+        Table("order", caption, table, columns),
+    ]

@@ -1,0 +1,132 @@
+"""Answers while fasteners move, against `solve` on the scene as it is saved; wrong values; words."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commands import harness
+from joints import two_parts
+from test_place import FASTENERS, GAP
+
+from harness import solve
+from harness.explore.answers import Explorer, Settings
+from harness.scene.edited import edited
+from problems.errors import InputError
+from problems.model.scene import JointScene
+from problems.scene import read_scene
+
+PRESSURE = """
+[[effect]]
+kind = "pressure"
+part = "a"
+value = 1e-4
+"""
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("explore") / "strip.toml"
+    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS + PRESSURE)
+    return path
+
+
+def scene_of(path: Path) -> JointScene:
+    read = read_scene(str(path))
+    assert isinstance(read, JointScene)
+    return read
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Path, form: Any) -> None:
+    """After moves, each from the answer before."""
+    explorer, settings = Explorer(scene_of(path), form), Settings.of(scene_of(path))
+    answer = explorer.answer(settings)
+    for k, change in enumerate(
+        (
+            {"places": (*settings.places[:2], (123.4, 40.0))},
+            {"places": settings.places[:1], "preload": 65.0},
+            {"mean": 0.08, "pressures": (-2e-4,)},
+            {"places": ()},
+        )
+    ):
+        settings = replace(settings, **change)  # type: ignore[arg-type]
+        answer = explorer.proven(explorer.answer(settings, answer))
+        if not settings.places:
+            break
+        saved = tmp_path / f"{k}.toml"
+        saved.write_text(edited(str(path), tmp_path, settings.write_to))
+        known = solve(str(saved), form=form)
+        assert answer.error_mm is not None
+        assert abs(answer.gap - known.gap).max() <= answer.error_mm + 1e-7
+        assert answer.error_mm <= 1e-6
+        assert Settings.of(scene_of(saved)) == settings
+        np.testing.assert_allclose(answer.load.f, known.problem.load.f, rtol=1e-12, atol=1e-12)
+    assert answer.gap.max() > 0.05  # with no fastener left
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"places": ((500.0, 10.0),)}, ["fasteners.points[0]", "[500.0, 10.0]", "on the junction"]),
+        ({"preload": 0.0}, ["fasteners.preload", "0.0", "greater than 0"]),
+        ({"mean": float("nan"), "preload": -1.0}, ["initial_gap.mean", "nan", "fasteners.preload", "-1.0"]),
+    ],
+)
+def test_wrong_values_are_refused_as_by_validate(path: Path, change: dict[str, Any], said: list[str]) -> None:
+    scene = scene_of(path)
+    with pytest.raises(InputError) as caught:
+        replace(Settings.of(scene), **change).applied(scene)
+    for word in said:
+        assert word in str(caught.value)
+
+
+def test_a_saved_scene_finds_its_files(tmp_path: Path) -> None:
+    """From another folder; comments and the title stay."""
+    home, there = tmp_path / "home", tmp_path / "there"
+    home.mkdir()
+    there.mkdir()
+    (home / "gap.csv").write_text("x,y,gap\n0,0,0.1\n100,50,0.2\n0,50,0.1\n100,0,0.1\n")
+    measured = '[[effect]]\nkind = "measured_gap"\nfile = "gap.csv"  # of the scan\n'
+    (home / "scene.toml").write_text(two_parts() + measured + FASTENERS)
+    settings = Settings.of(scene_of(home / "scene.toml"))
+    text = edited(str(home / "scene.toml"), there, replace(settings, preload=77.0).write_to)
+    (there / "scene.toml").write_text(text)
+    assert "# of the scan" in text
+    assert "../home/gap.csv" in text
+    assert Settings.of(scene_of(there / "scene.toml")).preload == 77.0
+
+
+@pytest.mark.parametrize("name", ["drawn/4386/3", "gallery/measured-gap"])
+def test_packaged_scenes_are_saved_too(name: str, tmp_path: Path) -> None:
+    scene = scene_of(Path(name)) if Path(name).suffix else read_scene(name)
+    assert isinstance(scene, JointScene)
+    if not any(effect.kind == "fasteners" for effect in scene.effects):
+        pytest.skip("it has no fasteners")
+    settings = Settings.of(scene)
+    (tmp_path / "scene.toml").write_text(edited(name, tmp_path, settings.write_to))
+    assert Settings.of(scene_of(tmp_path / "scene.toml")) == settings
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [("hard/duplicates/2e-05", "own matrices"), ("gallery/heavy-sheet-on-tool", "no fasteners")],
+)
+def test_scenes_without_fasteners(scene: str, said: str) -> None:
+    pytest.importorskip("bokeh")
+    done = harness("explore", scene, "--no-open")
+    assert done.exit_code == 2
+    assert said in done.output
+
+
+def test_the_outcome_in_words(path: Path) -> None:
+    page = pytest.importorskip("harness.explore.page")
+    explorer, settings = Explorer(scene_of(path), "dual"), Settings.of(scene_of(path))
+    answer = explorer.answer(settings)
+    places, largest = explorer.data.assembly.contact_nodes, float(answer.gap.max())
+    assert ">FAIL<" in page.outcome(answer, places, largest / 2)
+    assert ">PASS<" in page.outcome(answer, places, largest * 2)
+    proven = explorer.proven(answer)
+    assert "proven" in page.outcome(proven, places, largest * 2)
+    assert ">cannot be told<" in page.outcome(replace(proven, error_mm=largest), places, largest * 1.1)

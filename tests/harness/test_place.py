@@ -1,0 +1,319 @@
+"""Where fasteners go: plans against other answers and full enumeration; refused, resumed, on workers."""
+
+import json
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commands import harness
+from joints import two_parts
+
+from harness import solve
+from harness.placement import search as search_module
+from harness.placement.asked import PLANS, Asked
+from harness.placement.candidates import Movable, Plan, grid, plan_of
+from harness.placement.opponents import bisected, farthest_plans
+from harness.placement.run import Goal
+from harness.placement.search import Search
+from harness.placement.session import Outcome, PlanSession, Question, Study
+from problems.build import load_case
+from problems.errors import InputError
+from problems.load_cases import Listed
+from problems.load_cases.random_gaps import random_gaps
+from problems.scene import read_scene
+
+GAP = """
+[[effect]]
+kind = "initial_gap"
+mean = 0.05
+random = { sd = 0.02, correlation_length = 60.0, seed = 3 }
+"""
+FASTENERS = """
+# Where they are now.
+[[effect]]
+kind = "fasteners"
+preload = 40.0
+points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]
+"""
+
+
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("place") / "strip.toml"
+    path.write_text(two_parts(length=200.0, nodes=(21, 4)) + GAP + FASTENERS)
+    return path
+
+
+def study_of(path: Path, cases: int = 6) -> Study:
+    movable = Movable.of(read_scene(str(path)))
+    gaps = random_gaps(movable.bare, cases, 0)
+    return Study(movable.bare, movable.fastener, gaps, "dual", threads=1)
+
+
+def plans_of(path: Path, rows: int, columns: int) -> Plan:
+    return plan_of(grid(read_scene(str(path)), rows, columns))
+
+
+@pytest.fixture(scope="module")
+def session(strip: Path) -> PlanSession:
+    return PlanSession(study_of(strip))
+
+
+def test_a_plan_leaves_what_a_scene_with_its_fasteners_leaves(strip: Path, session: PlanSession) -> None:
+    """Against `solve` on the scene with these fasteners and each gap, by another way to the loads."""
+    plan = ((33.0, 12.5), (120.0, 40.0))
+    read = read_scene(str(strip))
+    found = session.answer(Question(plan, (0, 1, 2)))
+    estimated = session.answer(Question(plan, (0, 1, 2), base=((33.0, 12.5),)))
+    np.testing.assert_allclose(estimated.largest, found.largest, rtol=0, atol=1e-8)
+    text = strip.read_text().replace(
+        "[[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]", str([list(p) for p in plan])
+    )
+    for case, largest in enumerate(found.largest):
+        seed = session.study.cases.parameters(case)["gap_seed"]
+        path = strip.with_name(f"case{case}.toml")
+        path.write_text(text.replace("seed = 3", f"seed = {seed}"))
+        answer = solve(str(path))
+        assert answer.gap.max() <= largest <= answer.gap.max() + 1e-7
+        assert answer.gap.argmax() == found.contact[case]
+    assert read.joint.size[1] == len(answer.gap)
+
+
+def test_what_is_not_proven_counts_against_a_plan(
+    session: PlanSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its largest gap is no less than the proven upper bound of any."""
+    question = Question(((33.0, 12.5),), (0, 1))
+    sure = session.answer(question)
+    m = session.data.assembly.m
+    monkeypatch.setattr(session, "gap_error", lambda *_: np.linspace(0.0, 1e-3, m))
+    unsure = session.answer(question)
+    np.testing.assert_allclose(np.subtract(unsure.largest, sure.largest), 1e-3, rtol=0.01)
+
+
+def test_an_outcome_is_that_of_its_question_alone(strip: Path, session: PlanSession) -> None:
+    """To the last bit, whatever was asked before: so that workers agree."""
+    first, second = plans_of(strip, 1, 3), plans_of(strip, 1, 4)
+    asked = [
+        Question(second, (0, 3), base=first),
+        Question(first, (1, 2)),
+        Question(first, (0, 3), base=second),
+    ]
+    before = [session.answer(question) for question in asked]
+    fresh = [PlanSession(session.study).answer(question) for question in reversed(asked)]
+    assert before == fresh[::-1]
+
+
+def searched(session: PlanSession, limit: float, allowed: int = 0) -> Search:
+    nodes = session.data.assembly.contact_nodes
+    assert nodes is not None
+    cases = session.study.cases.count
+    return Search(lambda asked: [session.answer(q) for q in asked], nodes, cases, allowed, limit)
+
+
+@pytest.mark.parametrize("allowed", [0, 2])
+@pytest.mark.parametrize("limit", [0.03, 0.05])
+def test_the_fewest_are_the_optimum_or_one_more(
+    strip: Path, session: PlanSession, limit: float, allowed: int
+) -> None:
+    """Against all 2⁸ plans of eight candidates."""
+    candidates = plans_of(strip, 2, 4)
+    search = searched(session, limit, allowed)
+    gaps = {
+        plan: search.whole(plan).gap_mm
+        for count in range(len(candidates) + 1)
+        for plan in combinations(candidates, count)
+    }
+    optimum = min((len(plan) for plan, gap in gaps.items() if gap <= limit), default=None)
+    best = search.whole(candidates)
+    if best.gap_mm > limit:
+        pytest.skip("all candidates do not keep the limit")
+    best, _ = search.fewest(best, candidates, limit)
+    assert optimum is not None
+    assert gaps[best.plan] == best.gap_mm <= limit
+    assert optimum <= len(best.plan) <= optimum + 1
+
+
+def test_the_gap_is_that_of_the_share() -> None:
+    search = Search(lambda asked: [], np.zeros((1, 2)), 5, 1, 0.0)
+    assert search.gap(Outcome((0.1, 0.5, 0.3, 0.2, 0.0), (0,) * 5, (0.0,) * 5)) == 0.3
+
+
+def test_lazy_removal_asks_less_and_finds_the_same(
+    strip: Path, session: PlanSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if every fastener were tried in every step."""
+    monkeypatch.setattr(search_module, "AT_ONCE", 2)
+    search = searched(session, 0.0)
+    asked: list[Question] = []
+    lazy = Search(
+        lambda some: asked.extend(some) or [session.answer(q) for q in some],  # type: ignore[func-returns-value]
+        search.contacts,
+        search.cases,
+        0,
+        0.0,
+    )
+    start = search.whole(plans_of(strip, 2, 4))
+    found = [step.gap_mm for step in lazy.removal(start)]
+    step, greedy = start, []
+    while step.plan:
+        fresh = search._harm(step, {}, len(step.plan))
+        step = search.whole(search_module.without(step.plan, min(fresh, key=lambda p: (fresh[p], p))))
+        greedy.append(step.gap_mm)
+    tried = sum(question.base is not None for question in asked)
+    assert tried < 8 * 9 // 2
+    assert np.mean(found) <= 1.1 * np.mean(greedy)
+
+
+def test_uniform_patterns_and_farthest_points() -> None:
+    scene_like = [[((float(x), 0.0),) for x in range(1, 6)]]
+    gaps = {plan: 1.0 / (k + 1) for k, plan in enumerate(scene_like[0])}
+
+    def whole(plan: Plan) -> Any:
+        return search_module.Step(plan, gaps[plan], Outcome((), (), ()))
+
+    tried = bisected(scene_like[0], 0.3, whole)
+    assert min(step.gap_mm for step in tried if step.gap_mm <= 0.3) == 0.25
+    places = ((0.0, 0.0), (1.0, 0.0), (10.0, 0.0))
+    norms = np.array([5.0, 5.1, 6.0])
+    distances = np.array([[0, 1, 10], [1, 0, 9], [10, 9, 0]]) + np.diag(norms)
+    assert farthest_plans(places, distances) == [places[2:], (places[0], places[2]), places]
+
+
+def place(path: Path, out: Path, *words: object) -> Any:
+    return harness("place", path, "--candidates", "2x6", "--cases", 6, "--share", 1, "--out", out, *words)
+
+
+@pytest.mark.slow
+def test_the_command_finds_a_plan_that_solve_confirms(strip: Path, tmp_path: Path) -> None:
+    done = place(strip, tmp_path / "out", "--allow-gap", 0.05)
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "out" / "place.json").read_text())
+    best, plan = record["best"], tmp_path / "out" / "plan.toml"
+    assert best["fasteners"] < len(record["candidates"])
+    assert best["gap_mm"] <= 0.05
+    assert "# Where they are now." in plan.read_text()
+    assert [list(p) for p in Movable.of(read_scene(str(plan))).own] == best["plan"]
+    series = harness("series", plan, "--cases", 6, "--allow-gap", 0.05, "--out", tmp_path / "again")
+    assert series.exit_code == 0, series.output
+    assert [step["fasteners"] for step in record["order"]] == [*range(best["fasteners"] + 1)]
+    for name in ("report.md", "gap-against-fasteners.png", "before-and-after.png", "order.csv"):
+        assert (tmp_path / "out" / "report" / name).is_file()
+    # The same command again finds all answers, and says the same.
+    plans = (tmp_path / "out" / PLANS).read_text()
+    assert place(strip, tmp_path / "out", "--allow-gap", 0.05).exit_code == 0
+    assert (tmp_path / "out" / PLANS).read_text() == plans
+    other = place(strip, tmp_path / "out", "--allow-gap", 0.05, "--seed", 1)
+    assert other.exit_code == 2
+    assert "cases_key" in other.output
+
+
+@pytest.mark.slow
+def test_the_best_of_a_number(strip: Path, tmp_path: Path) -> None:
+    done = place(strip, tmp_path / "out", "--count", 4)
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "out" / "place.json").read_text())
+    same = [step for step in record["steps"] if step["fasteners"] == 4]
+    assert record["best"]["fasteners"] == 4
+    assert record["best"]["gap_mm"] <= min(step["gap_mm"] for step in same)
+    assert {"uniform", "farthest points"} <= {step["moved"] for step in same}
+
+
+@pytest.mark.slow
+def test_an_interrupted_search_ends_as_a_whole_one(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = place(strip, tmp_path / "whole", "--allow-gap", 0.05)
+    assert whole.exit_code == 0
+    keep, kept = Asked._keep, [0]
+
+    def interrupted(self: Asked, *given: Any) -> None:
+        keep(self, *given)
+        kept[0] += 1
+        if kept[0] == 17:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Asked, "_keep", interrupted)
+        assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 130
+    assert len((tmp_path / "parts" / PLANS).read_text().splitlines()) == 1 + 17
+    assert place(strip, tmp_path / "parts", "--allow-gap", 0.05).exit_code == 0
+    assert records_of(tmp_path / "whole") == records_of(tmp_path / "parts")
+
+
+@pytest.mark.slow
+def test_two_workers_find_the_same(strip: Path, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    assert place(strip, tmp_path / "one", "--allow-gap", 0.05).exit_code == 0
+    two = place(strip, tmp_path / "two", "--allow-gap", 0.05, "--scheduler", "local:2")
+    assert two.exit_code == 0, two.output
+    assert records_of(tmp_path / "one") == records_of(tmp_path / "two")
+
+
+def records_of(directory: Path) -> dict[str, Any]:
+    return dict(json.loads((directory / "place.json").read_text()))
+
+
+@pytest.mark.slow
+def test_a_limit_that_no_plan_keeps_says_where_and_by_how_much(strip: Path, tmp_path: Path) -> None:
+    done = place(strip, tmp_path / "out", "--allow-gap", 0.001)
+    assert done.exit_code == 4
+    for word in ("FAIL", "all of the 12 fasteners", "more than allowed", "is the worst, at ("):
+        assert word in done.output
+
+
+def test_a_share_needs_cases_to_show_it() -> None:
+    assert Goal(0.1, 0.95, None).allowed(200) == 10
+    assert Goal(0.1, 1.0, None).allowed(1) == 0
+    assert Goal(0.1, 0.95, None).allowed(59) == 2
+    with pytest.raises(InputError, match="take 59, or a share of 1"):
+        Goal(0.1, 0.95, None).allowed(58)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), ["goal", "--allow-gap MM, or --count N"]),
+        (("--count", 4), ["--count", "at most 3"]),
+        (("--candidates", "holes.csv", "--count", 1), ["holes.csv", "[900.0, 10.0]", "is there twice"]),
+        (("--candidates", "2by4", "--count", 1), ["2by4", "readable"]),
+        (("--count", 1, "--gaps", "g.csv", "--seed", 1), ["random gaps or --gaps"]),
+        (("--count", 1, "--cases", 10), ["--share", "take 59"]),
+        (("--allow-gap", "inf"), ["finite"]),
+    ],
+)
+def test_wrong_words(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[object, ...], said: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "holes.csv").write_text("x,y\n10,10\n900,10\n20,20\n20,20\n")
+    done = harness("place", strip, "--out", tmp_path / "out", *words)
+    assert done.exit_code == 2, done.output
+    for each in said:
+        assert each in done.output
+
+
+@pytest.mark.parametrize(
+    ("fasteners", "said"),
+    [
+        ("", "no fasteners"),
+        (FASTENERS + FASTENERS.replace("40.0\npoints", "50.0\npoints"), "fasteners.preload"),
+        (FASTENERS + FASTENERS, "is there twice"),
+    ],
+)
+def test_scenes_whose_fasteners_cannot_move(tmp_path: Path, fasteners: str, said: str) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(two_parts() + GAP.replace("60.0", "50.0") + fasteners)
+    with pytest.raises(InputError, match=said):
+        Movable.of(read_scene(str(path)))
+
+
+def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
+    movable = Movable.of(read_scene(str(path)))
+    study = Study(movable.bare, movable.fastener, Listed((load_case(movable.bare),)), "dual", 1)
+    found = PlanSession(study).answer(Question(movable.own, (0,)))
+    assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)

@@ -1,0 +1,25 @@
+"""The comparison of the search with other ways, on joints small enough for a test."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from studies import placement
+
+pytestmark = pytest.mark.slow
+
+
+def test_it_compares_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    small = placement.joint(200.0, 60.0, (11, 4), (2.0, 3.0))
+    monkeypatch.setattr(placement, "JOINTS", {"small": (small, 100.0, (1, 5))})
+    for name, value in (("CASES", 20), ("SMALL_CASES", 5), ("SMALL_JOINTS", 2), ("HOLES", ((1, 4),))):
+        monkeypatch.setattr(placement, name, value)
+    placement.main(tmp_path)
+    fewest, optimum, orders = (pd.read_csv(tmp_path / f"{n}.csv") for n in ("fewest", "optimum", "orders"))
+    assert len(fewest) == 2 * 5
+    found = fewest[fewest["method"] == "removal and exchange"].set_index("scatter")["fasteners"]
+    assert (fewest.set_index("scatter")["fasteners"] >= found.reindex(fewest["scatter"]).array).all()
+    assert (optimum["found"] >= optimum["optimum"]).all()
+    assert set(orders["order"]) == {"least needed last", "left to right", "centre outwards"}
+    assert "random plans" in (tmp_path / "placement.md").read_text()
