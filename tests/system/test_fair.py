@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 FAIR = (ROOT / "docs/fair.md").read_text("utf-8")
 MEASURED = [name for name in NAMES if (PUBLISHED / name / "suite.toml").is_file()]
 Row = dict[str, Any]
-#: What published rows are older than: rules of suite `speed`; ladders of `hard` that are gone.
+#: What published rows are older than: ladders of `hard` that are gone.
 OLDER = pytest.mark.xfail(strict=True, reason="the published rows are older than this rule")
 
 
@@ -66,7 +66,6 @@ def test_judged_by_displacements(suite: str) -> None:
             assert (row["verdict"] == "within") is (row["displacement_error_mm"] <= row["limit_mm"])
 
 
-@OLDER
 def test_no_empty_cell() -> None:
     found = cells(rows_of("speed"))
     for scene in {row["scene"] for row in rows_of("speed")}:
@@ -75,7 +74,6 @@ def test_no_empty_cell() -> None:
                 assert found[scene, name, form, ""], (scene, name, form)
 
 
-@OLDER
 def test_loosest_tolerance() -> None:
     measured = cells(rows_of("speed"))
     for cell, rows in measured.items():
@@ -91,7 +89,6 @@ def test_loosest_tolerance() -> None:
             assert here or (len(missed) >= 2 and len(missed) == len({row["scene"] for row in at})), cell
 
 
-@OLDER
 def test_stopped_only_when_far_behind() -> None:
     limits = read_written(PUBLISHED / "speed" / "suite.toml")
     assert limits.stop_at_times_fastest == 10
@@ -113,7 +110,6 @@ def test_stopped_only_when_far_behind() -> None:
             assert row["time_limit_s"] == limits.time_limit(row["n"]), row["key"]
 
 
-@OLDER
 def test_not_run_only_after_two_losses() -> None:
     rows = rows_of("speed")
     late = [row for row in rows if row["status"] == "not_run"]
@@ -142,7 +138,7 @@ def took(row: Row) -> float:
     return float(row["time_limit_s"]) if row["status"] in ("time_limit", "not_run") else seconds(row)
 
 
-@OLDER
+@pytest.mark.xfail(strict=True, reason="the first four of 24 scenes are measured so far")
 def test_scenes_are_drawn() -> None:
     drawn = {f"drawn/{n}/{k}" for n in SIZES for k in range(8)}
     assert {row["scene"] for row in rows_of("speed")} == drawn
