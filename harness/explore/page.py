@@ -105,7 +105,6 @@ class Page:
             y_axis_label="y, mm",
             tools="pan,wheel_zoom,reset",
             tooltips=None,
-            output_backend="webgl",
         )
         plot.toolbar.logo = None
         colour = {"field": "gap", "transform": self.colours}
