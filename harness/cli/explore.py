@@ -55,11 +55,8 @@ def explore(
 
         refuse_unusable(allow_gap)
         read = read_scene(scene)
-        if not isinstance(read, JointScene):
-            raise InputError.one(
-                f"scene {scene}", "assembly", "own matrices", "fasteners move on a joint only"
-            )
         settings = Settings.of(read)
+        assert isinstance(read, JointScene)
         with console.status(Text("matrices, and the first answer")):
             explorer = Explorer(read, chosen_form(read, FORMS, None).form)
             first = explorer.answer(settings)

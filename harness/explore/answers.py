@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from harness.placement.candidates import movable_fasteners
 from harness.scene.edited import of_kind, with_fasteners
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
@@ -26,7 +27,7 @@ from problems.forms import Form
 from problems.forms.assembly import LoadCase, Vector
 from problems.input.bounded import validation_faults
 from problems.model.effect import Effect, StiffnessEffect
-from problems.model.scene import JointScene
+from problems.model.scene import JointScene, Scene
 from solvers.algorithms.sweeps import Sweeps
 from solvers.base import WarmStart
 from solvers.kkt import with_p
@@ -47,12 +48,10 @@ class Settings:
     pressures: tuple[float, ...]
 
     @classmethod
-    def of(cls, scene: JointScene) -> Settings:
-        """Raises InputError if the scene has no fasteners."""
-        found = list(scene.effects_of(Fasteners))
-        if not found:
-            allowed = 'an [[effect]] kind = "fasteners" to move'
-            raise InputError.one(f"scene {scene.name}", "effect", "no fasteners", allowed)
+    def of(cls, scene: Scene) -> Settings:
+        """Raises InputError if the scene has no fasteners that can move."""
+        found = movable_fasteners(scene)
+        assert isinstance(scene, JointScene)
         marks = np.concatenate([each.marks(scene.joint) for each in found])
         gap = next(scene.effects_of(InitialGap), None)
         pressures = tuple(each.value for each in scene.effects_of(Pressure))
@@ -115,6 +114,7 @@ class Explorer:
         self.scene, self.form = scene, form
         self.data = prepared(scene, form=form)
         self.sweeps = Sweeps(self.data)
+        self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
         self.contribution = lru_cache(maxsize=256)(self._contribution)
 
     def answer(self, settings: Settings, near: Answer | None = None) -> Answer:
@@ -126,14 +126,12 @@ class Explorer:
         (load,) = with_p(self.data, [LoadCase(f, g)])
         start = None if near is None else WarmStart(near.load, near.lam, near.gap)
         case = self.sweeps.solved(load, TOLERANCE_MM, start)
-        lam, gap = np.empty(len(load.p)), np.empty(len(load.p))
-        lam[self.sweeps.order], gap[self.sweeps.order] = np.maximum(case.trial.lam, 0.0), case.trial.y
-        return Answer(settings, load, lam, gap)
+        return Answer(settings, load, *self.sweeps.vectors(case))
 
     def proven(self, answer: Answer) -> Answer:
         """The same with the gaps and the error of the proven one."""
-        (found,) = assess(proof_of(self.data), [answer.load], [answer.lam], [None], LIMIT_MM / 2)
-        error = GapError.of(self.data.assembly)(answer.load.g, found.x, found.bound_mm)
+        (found,) = assess(self.proof, [answer.load], [answer.lam], [None], LIMIT_MM / 2)
+        error = self.gap_error(answer.load.g, found.x, found.bound_mm)
         return replace(answer, gap=found.gap, error_mm=float(error.max(initial=0.0)))
 
     def _contribution(self, effect: Effect | None) -> tuple[Vector, Vector]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ class Page:
         self, explorer: Explorer, source: str, limit_mm: float, first: Answer, document: Any
     ) -> None:
         self.explorer, self.source, self.document = explorer, source, document
-        self.answer, self.kept, self.pending = first, first, None
+        self.answer, self.pending = first, None
         assembly = explorer.data.assembly
         assert assembly.contact_nodes is not None  # of a joint
         self.places: Matrix = assembly.contact_nodes
@@ -140,7 +141,7 @@ class Page:
                 if self.pending is None:
                     self.pending = self.document.add_timeout_callback(self.prove, PROOF_MS)
         except InputError as error:
-            self.fault.text = "<br>".join(_escaped(str(fault)) for fault in error.faults)
+            self.fault.text = "<br>".join(escape(str(fault)) for fault in error.faults)
             self.gaps.glyph.fill_alpha = STALE
             return
         self.fault.text = ""
@@ -164,10 +165,9 @@ class Page:
         """Show this plan beside those to come."""
         if self.answer.error_mm is None:
             self.prove()
-        self.kept = self.answer
         self.kept_cells.data = dict(self.cells.data)
-        self.kept_fasteners.data = _columns(self.kept.settings)
-        self.kept_said.text = f"Kept: {outcome(self.kept, self.places, float(self.sliders['limit'].value))}"
+        self.kept_fasteners.data = _columns(self.answer.settings)
+        self.kept_said.text = f"Kept: {self.said.text}"
 
     def save(self) -> None:
         """Write the settings as a scene, and say how to solve it."""
@@ -182,11 +182,11 @@ class Page:
             replace_text(path, edited(self.source, path.parent, self.settings.write_to))
         except (InputError, OSError) as error:
             faults = error.faults if isinstance(error, InputError) else [error]
-            self.fault.text = "<br>".join(_escaped(str(fault)) for fault in faults)
+            self.fault.text = "<br>".join(escape(str(fault)) for fault in faults)
             return
         limit = self.sliders["limit"].value
         said = f"python -m harness solve {path} --allow-gap {limit:g} --out results/{path.stem}"
-        self.fault.text = f"Saved. <code>{_escaped(said)}</code>"
+        self.fault.text = f"Saved. <code>{escape(said)}</code>"
 
 
 def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
@@ -241,7 +241,3 @@ def _spacing(places: Matrix) -> Matrix:
     """Of the nodes along x and along y, mm: the median distance of neighbours."""
     lines = [np.unique(axis.round(6)) for axis in places.T]
     return np.array([float(np.median(np.diff(line))) if len(line) > 1 else 1.0 for line in lines])
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

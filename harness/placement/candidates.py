@@ -33,23 +33,12 @@ class Movable:
 
     @classmethod
     def of(cls, scene: Scene) -> Movable:
-        """Raises InputError if the scene has no fasteners with a preload, or some with different ones."""
-        where = f"scene {scene.name}"
-        if not isinstance(scene, JointScene):
-            raise InputError.one(where, "assembly", "own matrices", "fasteners move on a joint only")
-        found = list(scene.effects_of(Fasteners))
-        if not found:
-            allowed = 'an [[effect]] kind = "fasteners": its preload is that of each candidate'
-            raise InputError.one(where, "effect", "no fasteners", allowed)
-        for name in ("preload", "between"):
-            values = [getattr(each, name) for each in found]
-            if any(value != values[0] for value in values):
-                raise InputError.one(
-                    where, f"fasteners.{name}", values, "the same in all: they change places"
-                )
+        """Raises InputError as `movable_fasteners` does, and if two are at one place."""
+        found = movable_fasteners(scene)
+        assert isinstance(scene, JointScene)
         others = tuple(effect for effect in scene.effects if effect not in found)
         marks = np.concatenate([each.marks(scene.joint) for each in found])
-        if twice := _twice(marks, where):
+        if twice := _twice(marks, f"scene {scene.name}"):
             raise InputError(twice)
         return cls(replace(scene, effects=others), found[0], plan_of(marks))
 
@@ -76,6 +65,22 @@ class Movable:
         on = joint.covers(self.fastener.parts(joint), points)
         found = [Fault(source, "x, y", points[k].tolist(), joint.region) for k in np.flatnonzero(~on)]
         return found + _twice(points, source)
+
+
+def movable_fasteners(scene: Scene) -> list[Fasteners]:
+    """The fasteners with a preload. Raises InputError if there are none, or if they are unlike."""
+    where = f"scene {scene.name}"
+    if not isinstance(scene, JointScene):
+        raise InputError.one(where, "assembly", "own matrices", "fasteners move on a joint only")
+    found = list(scene.effects_of(Fasteners))
+    if not found:
+        allowed = 'an [[effect]] kind = "fasteners": its preload is that of each one'
+        raise InputError.one(where, "effect", "no fasteners", allowed)
+    for name in ("preload", "between"):
+        values = [getattr(each, name) for each in found]
+        if any(value != values[0] for value in values):
+            raise InputError.one(where, f"fasteners.{name}", values, "the same in all: they change places")
+    return found
 
 
 def _twice(points: Matrix, source: str) -> list[Fault]:

@@ -15,6 +15,7 @@ from math import ceil, floor, log
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from rich.console import Console
 from rich.text import Text
 
@@ -105,6 +106,7 @@ def run(
             limits = SERIES_TOLERANCE, LIMIT_MM, 0, study.threads
             job = Job(scene, cases_of(scene), "newton", study.form, *limits)
             run_series(job, facts, directory / name, console)
+            pd.DataFrame(plan, columns=["x", "y"]).to_csv(directory / f"{name}.csv", index=False)
         record = _record(study, movable, candidates, goal, found, nodes)
         records.replace_object(directory / RECORD, record)
         from report.writers.place import write  # slow to import: not before the search
@@ -131,9 +133,11 @@ def searched(
         best, way = search.fewest(steps[0], candidates, limit)
         steps += way
     else:
-        steps += (step for step in search.removal(steps[0]) if len(step.plan) >= goal.count)
-        best = search.exchanged(steps[-1], candidates, limit or 0.0)
-        steps.append(best)
+        way, removal = [steps[0]], search.removal(steps[0])
+        while len(way[-1].plan) > goal.count:
+            way.append(next(removal))
+        best = search.exchanged(way[-1], candidates, limit or 0.0)
+        steps += [*way[1:], best]
     steps += _opponents(search, movable, candidates, goal, apart())
     order = [best, *search.removal(best)]
     return Found(steps, best, order[::-1])
@@ -171,14 +175,13 @@ def _record(
 ) -> dict[str, Any]:
     def step(each: Step) -> dict[str, Any]:
         limit = float("inf") if goal.limit_mm is None else goal.limit_mm
-        worst = max(range(study.cases.count), key=lambda k: each.outcome.largest[k])
         return {
             "moved": each.moved,
             "fasteners": len(each.plan),
             "gap_mm": each.gap_mm,
             "failing": [k for k, gap in enumerate(each.outcome.largest) if gap > limit],
-            "worst_case": worst,
-            "worst_at": nodes[each.outcome.contact[worst]].tolist(),
+            "worst_case": each.worst,
+            "worst_at": nodes[each.outcome.contact[each.worst]].tolist(),
             "plan": each.plan,
         }
 
@@ -208,12 +211,11 @@ def _show(found: Found, goal: Goal, nodes: Matrix, console: Console) -> int:
     if not fails:
         console.print(f"{left}.", style="green")
         return DONE
-    worst = max(range(len(step.outcome.largest)), key=lambda k: step.outcome.largest[k])
-    x, y = nodes[step.outcome.contact[worst]]
+    x, y = nodes[step.outcome.contact[step.worst]]
     all_set = "all of the " if found.best is None else ""
     console.print(
         f"FAIL: {all_set}{left}, {step.gap_mm - (goal.limit_mm or 0.0):.3g} mm more than allowed; case "
-        f"{worst} is the worst, at ({x:.4g}, {y:.4g}) mm.",
+        f"{step.worst} is the worst, at ({x:.4g}, {y:.4g}) mm.",
         style="red",
     )
     return GAP_EXCEEDED

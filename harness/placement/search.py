@@ -52,6 +52,11 @@ class Step:
     outcome: Outcome
     moved: str = ""
 
+    @property
+    def worst(self) -> int:
+        """The case with the largest gap."""
+        return max(range(len(self.outcome.largest)), key=lambda k: self.outcome.largest[k])
+
 
 class Search:
     """ask : answers questions. contacts : (m, 2) their places, mm. cases : K. allowed : ⌊(1 − share) K⌋.

@@ -90,7 +90,8 @@ class PlanSession:
                 before = self._solve(self._loads(question.base, question.cases), [], ESTIMATE_MM)
                 self.solved = question.base, question.cases, before
             cases = self._solve(loads, self.solved[2], ESTIMATE_MM)
-            gaps, error = self._gaps(cases), np.zeros(len(loads))
+            gaps = np.column_stack([self.sweeps.vectors(case)[1] for case in cases])
+            error = np.zeros(len(loads))
         largest = gaps.max(axis=0)
         scale = np.where(largest > 0, largest, 1.0)
         mean = scale * ((np.maximum(gaps, 0.0) / scale) ** POWER).mean(axis=0) ** (1 / POWER)
@@ -113,17 +114,10 @@ class PlanSession:
         self.sweeps(loads, tolerance)
         return self.sweeps.last
 
-    def _gaps(self, cases: list[Case]) -> Matrix:
-        """y (m, k), mm."""
-        y = np.empty((len(self.sweeps.order), len(cases)))
-        y[self.sweeps.order] = np.column_stack([case.trial.y for case in cases])
-        return y
-
     def _proven(self, loads: list[LoadCase], cases: list[Case]) -> tuple[Matrix, Vector]:
         """Gaps (m, k), and how far the largest may be off (k,), mm."""
-        lam = np.empty((len(self.sweeps.order), len(cases)))
-        lam[self.sweeps.order] = np.column_stack([np.maximum(case.trial.lam, 0.0) for case in cases])
-        found = assess(self.proof, loads, list(lam.T), [None] * len(loads), ENOUGH_MM)
+        lams = [self.sweeps.vectors(case)[0] for case in cases]
+        found = assess(self.proof, loads, lams, [None] * len(loads), ENOUGH_MM)
         errors = [
             self.gap_error(load.g, each.x, each.bound_mm).max(initial=0.0)
             for load, each in zip(loads, found, strict=True)

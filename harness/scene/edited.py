@@ -37,7 +37,7 @@ def edited(source: str, folder: Path, change: Callable[[Any], None]) -> str:
 
 
 def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], None]:
-    """The change that moves all fasteners of a scene to these places, mm."""
+    """The change that moves all fasteners of a scene to these places, mm; none leaves it without."""
 
     def change(document: Any) -> None:
         found = of_kind(document, "fasteners")
@@ -46,8 +46,9 @@ def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], Non
             raise InputError.one("scene", 'effect kind = "fasteners"', "none", allowed)
         for key in ("pattern", "file", "columns", "points"):
             found[0].pop(key, None)
-        found[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
-        for other in found[1:]:
+        if points:
+            found[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
+        for other in found[1 if points else 0 :]:
             document["effect"].remove(other)
 
     return change

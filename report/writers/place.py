@@ -125,7 +125,10 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
         pieces = [np.quantile(some, share, axis=0) for some in series.of_contacts()]
         shown.append((text, series.nodes, np.concatenate(pieces), series.fasteners.tolist()))
     scale = rooted("gap, mm", "viridis", *(values for _, _, values, _ in shown))
-    maps = [Map(text, nodes, gap, scale, (), {"fasteners": marks}) for text, nodes, gap, marks in shown]
+    maps = [
+        Map(text, nodes, gap, scale, (), {"fasteners": marks} if marks else {})
+        for text, nodes, gap, marks in shown
+    ]
     caption = f"*The gap at each contact that {100 * share:.4g} % of the cases keep*, before and after."
     table = pd.DataFrame({"x_mm": shown[0][1][:, 0], "y_mm": shown[0][1][:, 1]})
     table = table.assign(**{f"{name}_mm": gap for name, (_, _, gap, _) in zip(names, shown, strict=True)})

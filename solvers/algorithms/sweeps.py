@@ -120,9 +120,7 @@ class Sweeps:
         "solved" if max(max(−y), max_{λ>0} |y|), and that rounding where y is not, is at most max(tolerance,
         `kkt.largest_rounding`) mm.
         """
-        order = self.order
-        lam, y = np.empty(len(order)), np.empty(len(order))
-        lam[order], y[order] = np.maximum(case.trial.lam, 0.0), case.trial.y
+        lam, y = self.vectors(case)
         residual = kkt_residual(lam, y) + case.doubt
         if residual > tolerance or (case.trial.lam < 0).any():
             y = self.gaps(lam[:, None], [case.load])[:, 0]
@@ -139,6 +137,12 @@ class Sweeps:
             iterations=case.sweeps,
             inner_iterations=case.sets,
         )
+
+    def vectors(self, case: Case) -> tuple[Vector, Vector]:
+        """λ ≥ 0 (m,) N and y (m,) mm, in the order of A."""
+        lam, y = np.empty(len(self.order)), np.empty(len(self.order))
+        lam[self.order], y[self.order] = np.maximum(case.trial.lam, 0.0), case.trial.y
+        return lam, y
 
     def _from(self, solved: Case, load: LoadCase) -> Case:
         """A load case that starts from the solution of another one."""

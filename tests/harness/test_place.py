@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from commands import harness
 from joints import two_parts
@@ -195,6 +196,7 @@ def test_the_command_finds_a_plan_that_solve_confirms(strip: Path, tmp_path: Pat
     assert best["fasteners"] < len(record["candidates"])
     assert best["gap_mm"] <= 0.05
     assert "# Where they are now." in plan.read_text()
+    assert pd.read_csv(tmp_path / "out" / "plan.csv").to_numpy().tolist() == best["plan"]
     assert [list(p) for p in Movable.of(read_scene(str(plan))).own] == best["plan"]
     series = harness("series", plan, "--cases", 6, "--allow-gap", 0.05, "--out", tmp_path / "again")
     assert series.exit_code == 0, series.output
@@ -219,6 +221,20 @@ def test_the_best_of_a_number(strip: Path, tmp_path: Path) -> None:
     assert record["best"]["fasteners"] == 4
     assert record["best"]["gap_mm"] <= min(step["gap_mm"] for step in same)
     assert {"uniform", "farthest points"} <= {step["moved"] for step in same}
+
+
+@pytest.mark.slow
+def test_no_fastener_at_all_is_a_plan(strip: Path, tmp_path: Path) -> None:
+    """Where the limit is larger than the gap before; as many as there are candidates is one, too."""
+    done = place(strip, tmp_path / "none", "--allow-gap", 9.0)
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "none" / "place.json").read_text())["best"]["plan"] == []
+    assert not any(
+        effect.kind == "fasteners" for effect in read_scene(str(tmp_path / "none" / "plan.toml")).effects
+    )
+    assert place(strip, tmp_path / "all", "--count", 12).exit_code == 0
+    record = json.loads((tmp_path / "all" / "place.json").read_text())
+    assert record["best"]["plan"] == record["candidates"]
 
 
 @pytest.mark.slow
