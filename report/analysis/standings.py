@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -90,9 +90,9 @@ def best_tolerances(cells: pd.DataFrame) -> pd.DataFrame:
     return cells.loc[order.drop_duplicates(["method", "scene"]).index.sort_values()]
 
 
-def shown(cells: pd.DataFrame) -> pd.DataFrame:
-    """The cells that a chart shows; none if fewer than two methods are left to compare."""
-    cells = cells[~cells["status"].isin(NOT_RUN)]
+def shown(cells: pd.DataFrame, without: Collection[str] = NOT_RUN) -> pd.DataFrame:
+    """The cells that a chart shows, without some statuses; none if fewer than two methods are left."""
+    cells = cells[~cells["status"].isin(without)]
     often = cells.groupby("method")["scene"].nunique() >= SHOWN * cells["scene"].nunique()
     return cells[cells["method"].map(often).astype(bool)] if often.sum() > 1 else cells.iloc[:0]
 

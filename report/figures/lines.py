@@ -35,6 +35,7 @@ OUTSIDE: dict[str, Any] = {
     "zorder": 5,
 }
 HOLLOW: dict[str, Any] = {"linestyle": "", "markersize": 6, "markerfacecolor": "none", "zorder": 4}
+MOST_LIMITS = 3  # that are drawn; of more, each run has its own, at which its mark stands
 STEP = 0.018  # of the axes: between marks that would coincide
 #: What marks mean, for captions.
 MARKS = (
@@ -75,7 +76,8 @@ def _unfinished(axes: Axes, cells: pd.DataFrame, styles: dict[str, dict[str, Any
     """Marks of the runs without an answer; those of one scene stand side by side."""
     missed = cells[~cells["verdict"].isin(ANSWERED)]
     late = (missed["status"] == "time_limit") & missed["time_limit_s"].notna()
-    for limit in missed.loc[late, "time_limit_s"].unique():
+    limits = missed.loc[late, "time_limit_s"].unique()
+    for limit in limits if len(limits) <= MOST_LIMITS else ():
         axes.axhline(limit, **YARDSTICK)
         axes.annotate(f"limit {limit:g} s", (1, limit), (3, 0), xycoords=("axes fraction", "data"), **BESIDE)
     low, high = axes.get_xlim()

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from harness.results.schema import ANSWERED
+from report.analysis.standings import best_tolerances
 from report.document.blocks import Block, Column, Figure, Section, Table, number, word
 from report.document.numbers import power, whole
 from report.figures import style
@@ -18,17 +19,16 @@ PANEL = 3.0  # inches
 
 
 def section(results: Results) -> Section | None:
-    """Of each method at its usual tolerance: that of most scenes, then the tightest."""
+    """Of each method with the best of its tolerances on each scene."""
     cells = results.cells[results.cells["status"] != "unsupported"].dropna(subset=["n", "tolerance"])
     if cells.empty:
         return None
     seconds = (cells["setup_s"].fillna(0.0) + cells["solve_s"]).where(cells["verdict"].isin(ANSWERED))
     good = (cells["status"] == "solved") & (cells["verdict"] == "within")
-    cells = cells.assign(load_case_s=seconds, good=good)
-    runs = cells.groupby(["n", "method", "tolerance"]).size().reset_index(name="runs")
-    usual = runs.sort_values(["runs", "tolerance"], ascending=[False, True]).drop_duplicates(["n", "method"])
-    cells = cells.merge(usual[["n", "method", "tolerance"]])
-    blocks: list[Block] = [_figure(cells), _times(cells, results.limit)]
+    cells = best_tolerances(cells.assign(load_case_s=seconds, good=good))
+    run = cells[cells["status"] != "not_run"]
+    blocks: list[Block] = [_figure(run)] if len(run) else []
+    blocks.append(_times(cells, results.limit))
     if not cells["good"].all():
         blocks.append(_failures(cells[~cells["good"]]))
     return Section("Scenes drawn at random", blocks)

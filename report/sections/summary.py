@@ -72,7 +72,7 @@ def summary(results: Results) -> Section | None:
     table = standings(results.cells)
     if table.empty:
         return None
-    limit, drawn = results.limit, shown(best_tolerances(results.cells))
+    limit, drawn = results.limit, shown(best_tolerances(results.cells), ("unsupported",))
     columns = [
         word("solver (form)", "method"),
         Column(f"within {limit}", lambda line: f"{line['within']} of {line['scenes']}"),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.ticker import MaxNLocator
 
 from report.document.blocks import Block, Column, Figure, Section, Table, Text, number, word
 from report.document.escape import quoted
@@ -20,7 +21,7 @@ from report.writers.pages import emptied, written
 #: How a plan came about: what a line of the table and of the picture is called, and its look.
 FAMILIES = {
     "all candidates": ("all candidates", style.BLACK, "o", ""),
-    "removal": ("removed one by one", style.BLUE, ".", "-"),
+    "removal": ("after removal", style.BLUE, ".", "-"),
     "exchange": ("after exchanges", style.BLACK, "*", ""),
     "own": ("the scene's own", style.GREEN, "D", ""),
     "uniform": ("uniform patterns", style.VERMILLION, "s", ""),
@@ -103,6 +104,7 @@ def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
     if record["limit_mm"] is not None:
         axes.axhline(record["limit_mm"], color=style.GREY, linewidth=1, label="the limit")
     axes.set(xlabel="fasteners", ylabel="largest gap, mm", xlim=(0, None), yscale="log")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.plain_log(axes.yaxis)
     drawing.legend(loc="outside right upper")
     share = f"{100 * record['share']:.4g} %"
@@ -149,6 +151,7 @@ def _order(record: dict[str, Any]) -> list[Block]:
     axes = drawing.subplots()
     axes.plot(table["set"], table["gap_mm"], color=style.BLUE, marker="o", ms=4)
     axes.set(xlabel="fasteners set", ylabel="largest gap, mm", ylim=(0, None))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     columns = [number("set", "set", whole), number("x, mm", "x_mm"), number("y, mm", "y_mm")]
     columns += [number("gap after it, mm", "gap_mm")]
     caption = (

@@ -12,10 +12,11 @@ import pytest
 from synthetic_results import no_answer, results, row, table, write_rows
 
 from report.analysis.standings import shown, standings
+from report.document.blocks import Figure
 from report.document.numbers import significant
 from report.results.reader import Results, read
 from report.sections.speed import contacts
-from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard
+from report.sections.summary import EACH, PREPARED, advice, explained, scoreboard, summary
 from report.writers.markdown import write
 
 LOW, HIGH = "4386/0100", "4386/1000"
@@ -183,6 +184,20 @@ def test_charts_show_methods_run_on_half_of_the_scenes_and_name_the_others(tmp_p
     assert "Run on fewer than half of the scenes: c (dual)." in caption
     alone = results(tmp_path / "alone", [r for r in rows if r["solver"] != "b"]).cells
     assert shown(alone).empty
+
+
+def test_what_was_not_run_stands_in_the_picture_of_all_scenes(tmp_path: Path) -> None:
+    """A method that lost on one of four scenes, and was not run on the others."""
+    rows = [row(f"4386/{k:04d}", "a") for k in range(4)]
+    late = {"status": "not_run", "verdict": "no_answer", "displacement_error_mm": None}
+    rows += [row(f"4386/{k:04d}", "b") | (late if k else {}) for k in range(4)]
+    cells = results(tmp_path, rows).cells
+    assert shown(cells).empty  # too few runs for a line
+    section = summary(results(tmp_path, rows))
+    assert section is not None
+    (picture,) = [block for block in section.blocks if isinstance(block, Figure)]
+    texts = [text.get_text() for text in picture.drawing.axes[0].texts]
+    assert texts.count("not run") == 3
 
 
 def test_a_run_of_one_scene_is_titled_after_it(tmp_path: Path) -> None:
