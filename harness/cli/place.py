@@ -85,13 +85,12 @@ def place(
         from harness.placement.session import Study
         from harness.planning.form_choice import chosen_form
         from harness.scene.allowed_gap import refuse_unusable
+        from harness.series.given import RANDOM, GivenCases
         from harness.terminal.console import waiting
         from problems.build import load_case
         from problems.effects.initial_gap import InitialGap
         from problems.errors import Fault, InputError
         from problems.load_cases import Listed
-        from problems.load_cases.measured_gaps import measured_gaps
-        from problems.load_cases.random_gaps import random_gaps
         from problems.scene import read_scene
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -99,35 +98,31 @@ def place(
         read = read_scene(scene)
         movable = Movable.of(read)
         holes = movable.candidates(candidates)
-        random = {"--seed": seed, "--mean": mean, "--sd": sd, "--correlation-length": correlation_length}
-        drawn = [name for name, value in (random | {"--around": around}).items() if value is not None]
+        given = GivenCases(cases, seed, mean, sd, correlation_length, around, gaps)
         faults = []
         if allow_gap is None and count is None:
             faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
         if count is not None and count > len(holes):
             faults.append(Fault("--count", "N", count, f"at most {len(holes)}, the candidates"))
-        if gaps and drawn:
-            faults.append(Fault("place", "cases", f"--gaps {' '.join(drawn)}", "random gaps or --gaps"))
+        if gaps and given.drawn:
+            mixed = " ".join(["--gaps", *given.drawn])
+            faults.append(Fault("place", "cases", mixed, "random gaps or --gaps"))
         if faults:
             raise InputError(faults)
-        one = not (gaps or drawn or cases) and not any(
+        one = not (gaps or given.drawn or cases) and not any(
             each.random for each in movable.bare.effects_of(InitialGap)
         )
-        total = 1 if one else cases or 100
+        total = 1 if one else cases or RANDOM
         with waiting(console) as show:
             (made,) = described([("newton", {})], None, "--solver", show)
         choice = chosen_form(movable.bare, made.forms, None, total * len(holes))
 
         def cases_of(of: Scene) -> LoadCases:
-            if one:
-                return Listed((load_case(of, choice.form),))
-            if gaps:
-                return measured_gaps(of, gaps, cases, choice.form)
-            return random_gaps(of, total, seed or 0, mean, sd, correlation_length, choice.form, around)
+            return Listed((load_case(of, choice.form),)) if one else given.of(of, choice.form)
 
-        given = cases_of(movable.bare)
-        share = share if share is not None else (1.0 if given.count == 1 else 0.95)
-        study = Study(movable.bare, movable.fastener, given, choice.form, threads=1)
+        bare = cases_of(movable.bare)
+        share = share if share is not None else (1.0 if bare.count == 1 else 0.95)
+        study = Study(movable.bare, movable.fastener, bare, choice.form, threads=1)
         facts = {"solver_version": made.version, "solver_code": made.code}
         goal = Goal(allow_gap, share, count)
         raise typer.Exit(run(scene, movable, holes, goal, cases_of, study, facts, out, console, scheduler))

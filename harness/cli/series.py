@@ -99,29 +99,21 @@ def series(
         from harness.planning.form_choice import chosen_form
         from harness.results.series_file import read_facts
         from harness.scene.allowed_gap import refuse_unusable, show_series
+        from harness.series.given import RANDOM, GivenCases
         from harness.series.run import run
         from harness.series.session import Job
         from harness.terminal import DONE
         from harness.terminal.console import waiting
         from problems.errors import Fault, InputError
-        from problems.load_cases.measured_gaps import measured_gaps
-        from problems.load_cases.random_gaps import random_gaps
         from problems.load_cases.sweep import sweep as swept
         from problems.scene import read_scene
 
         refuse_unusable(allow_gap)
-        random: dict[str, Any] = {
-            "--seed": seed,
-            "--mean": mean,
-            "--sd": sd,
-            "--correlation-length": correlation_length,
-            "--around": around,
-        }
-        drawn = [name for name, value in random.items() if value is not None]
+        given = GivenCases(cases, seed, mean, sd, correlation_length, around, gaps)
         faults = []
-        if (gaps and sweep) or (drawn and (gaps or sweep)):
-            given = [*(["--gaps"] if gaps else []), *(["--sweep"] if sweep else []), *drawn]
-            faults.append(Fault("series", "cases", " ".join(given), "random gaps, --gaps or --sweep"))
+        if (gaps and sweep) or (given.drawn and (gaps or sweep)):
+            mixed = [*(["--gaps"] if gaps else []), *(["--sweep"] if sweep else []), *given.drawn]
+            faults.append(Fault("series", "cases", " ".join(mixed), "random gaps, --gaps or --sweep"))
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -137,18 +129,12 @@ def series(
         read = read_scene(scene)
         before = (read_facts(out) or {}).get("identity", {}).get("form")
         asked: Any = form.value if form else before if before in made.forms else None
-        count = swept(read, sweep).count if sweep else cases or 100
+        count = swept(read, sweep).count if sweep else cases or RANDOM
         choice = chosen_form(read, made.forms, asked, count)
         if choice.why:
             console.print(f"In the sparse form, without condensation: {choice.why}.", style="dim")
         taken: Any = choice.form
-        chosen: LoadCases
-        if gaps:
-            chosen = measured_gaps(read, gaps, cases, taken)
-        elif sweep:
-            chosen = swept(read, sweep, taken)
-        else:
-            chosen = random_gaps(read, count, seed or 0, mean, sd, correlation_length, taken, around)
+        chosen: LoadCases = swept(read, sweep, taken) if sweep else given.of(read, taken)
         limits = time_limit, memory_limit
         threads = threads or threads_per_worker(scheduler) or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)
