@@ -122,6 +122,18 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 @each_page
+def test_no_sentence_has_more_than_thirty_words(page: Path) -> None:
+    """Of what a user reads: words with letters, code in a sentence as one, a colon or semicolon ends one."""
+    if page.name == "CHANGELOG.md":
+        return
+    text = re.sub(r"(?s:```.*?```)|^ {4}.*$", "", page.read_text("utf-8"), flags=re.MULTILINE)
+    text = re.sub(r"!?\[([^]]*)\]\([^)]*\)", r"\1", text)
+    for block in re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.)\s|#)|\|", text):
+        for sentence in re.split(r"(?<=[.!?:;])\s+", re.sub(r"`[^`]*`", "code", " ".join(block.split()))):
+            assert len(re.findall(r"\S*[^\W\d_]\S*", sentence)) <= 30, sentence
+
+
+@each_page
 def test_paths_of_code_exist(page: Path) -> None:
     """`harness/….py`, `problems/effects/`; not those with a <name> to fill in."""
     folders = "harness|problems|solvers|report|tests|examples"
