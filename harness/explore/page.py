@@ -31,18 +31,19 @@ from bokeh.plotting import figure
 from bokeh.server.server import Server
 
 from harness.explore.answers import Answer, Explorer, Settings
+from harness.explore.raster import Raster
 from harness.results.records import replace_text
 from harness.scene.edited import edited
 from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
 
+NOTHING = "rgba(0, 0, 0, 0)"
 OVER = "#D55E00"  # gaps above the limit
 STALE = 0.35  # opacity of an answer to other settings
 WIDE = 760  # pixels of a map
 TALLEST, LOWEST = 420, 150
 PROOF_MS = 50  # after the first change that is not proven: the map comes before
-SEAM = 1.02  # of a cell, so that none shows between two
 
 
 class Page:
@@ -56,9 +57,11 @@ class Page:
         assembly = explorer.data.assembly
         assert assembly.contact_nodes is not None  # of a joint
         self.places: Matrix = assembly.contact_nodes
-        self.spacing = _spacing(self.places)
-        self.colours = LinearColorMapper(palette="Viridis256", low=0.0, high=limit_mm, high_color=OVER)
-        self.cells = ColumnDataSource({"x": self.places[:, 0], "y": self.places[:, 1], "gap": first.gap})
+        self.raster = Raster.of(self.places)
+        self.colours = LinearColorMapper(
+            palette="Viridis256", low=0.0, high=limit_mm, high_color=OVER, nan_color=NOTHING
+        )
+        self.cells = ColumnDataSource({"gap": [self.raster.image(first.gap)]})
         self.kept_cells = ColumnDataSource(dict(self.cells.data))
         self.fasteners = ColumnDataSource(_columns(first.settings))
         self.kept_fasteners = ColumnDataSource(_columns(first.settings))
@@ -93,7 +96,7 @@ class Page:
         return row(maps, dials)
 
     def _map(self, title: str, cells: ColumnDataSource, fasteners: ColumnDataSource, draws: bool) -> Any:
-        low, high = self.places.min(axis=0) - self.spacing / 2, self.places.max(axis=0) + self.spacing / 2
+        low, high = self.raster.low, self.raster.high
         ratio = (high[1] - low[1]) / (high[0] - low[0])
         height = int(np.clip(WIDE * ratio + 60, LOWEST, TALLEST))
         plot = figure(
@@ -108,10 +111,8 @@ class Page:
             tooltips=None,
         )
         plot.toolbar.logo = None
-        colour = {"field": "gap", "transform": self.colours}
-        width, height_mm = self.spacing
-        size = {"width": SEAM * width, "height": SEAM * height_mm}
-        made = plot.rect("x", "y", **size, source=cells, fill_color=colour, line_color=None)
+        place = {"x": low[0], "y": low[1], "dw": high[0] - low[0], "dh": high[1] - low[1]}
+        made = plot.image("gap", **place, source=cells, color_mapper=self.colours)
         if draws:
             self.gaps = made
         plot.add_layout(ColorBar(color_mapper=self.colours, title="gap, mm"), "right")
@@ -142,10 +143,10 @@ class Page:
                     self.pending = self.document.add_timeout_callback(self.prove, PROOF_MS)
         except InputError as error:
             self.fault.text = "<br>".join(escape(str(fault)) for fault in error.faults)
-            self.gaps.glyph.fill_alpha = STALE
+            self.gaps.glyph.global_alpha = STALE
             return
         self.fault.text = ""
-        self.gaps.glyph.fill_alpha = 1.0
+        self.gaps.glyph.global_alpha = 1.0
         self.show()
 
     def prove(self) -> None:
@@ -155,7 +156,7 @@ class Page:
         self.say()
 
     def show(self) -> None:
-        self.cells.data["gap"] = self.answer.gap.astype(np.float32)
+        self.cells.data = {"gap": [self.raster.image(self.answer.gap)]}
         self.say()
 
     def say(self) -> None:
@@ -235,9 +236,3 @@ def _slider(title: str, value: float) -> Slider:
 
 def _columns(settings: Settings) -> dict[str, list[float]]:
     return {"x": [x for x, _ in settings.places], "y": [y for _, y in settings.places]}
-
-
-def _spacing(places: Matrix) -> Matrix:
-    """Of the nodes along x and along y, mm: the median distance of neighbours."""
-    lines = [np.unique(axis.round(6)) for axis in places.T]
-    return np.array([float(np.median(np.diff(line))) if len(line) > 1 else 1.0 for line in lines])

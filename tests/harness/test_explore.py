@@ -12,6 +12,7 @@ from test_place import FASTENERS, GAP
 
 from harness import solve
 from harness.explore.answers import Explorer, Settings
+from harness.explore.raster import Raster
 from harness.scene.edited import edited
 from problems.errors import InputError
 from problems.model.scene import JointScene
@@ -130,3 +131,24 @@ def test_the_outcome_in_words(path: Path) -> None:
     proven = explorer.proven(answer)
     assert "proven" in page.outcome(proven, places, largest * 2)
     assert ">cannot be told<" in page.outcome(replace(proven, error_mm=largest), places, largest * 1.1)
+
+
+def test_the_raster_shows_every_contact_where_it_is() -> None:
+    """A full grid in any order has a pixel per contact; places all over keep theirs; a hole is left empty."""
+    random = np.random.default_rng(0)
+    grid = np.stack(np.meshgrid(np.arange(9) * 3.0, np.arange(4) * 5.0), axis=-1).reshape(-1, 2)
+    order = random.permutation(len(grid))
+    gap = np.arange(36.0)
+    raster = Raster.of(grid[order])
+    np.testing.assert_array_equal(raster.image(gap[order]), gap.reshape(4, 9))
+    np.testing.assert_array_equal([raster.low, raster.high], [[-1.5, -2.5], [25.5, 17.5]])
+    scattered = random.uniform(0, 100, (400, 2))
+    scattered = scattered[np.hypot(*(scattered - 50.0).T) > 25]
+    raster = Raster.of(scattered)
+    image = raster.image(np.arange(float(len(scattered))))
+    rows, columns = image.shape
+    shown = ((scattered - raster.low) / (raster.high - raster.low) * (columns, rows)).astype(int)
+    near = scattered[image[shown[:, 1], shown[:, 0]].astype(int)]
+    assert np.hypot(*(near - scattered).T).max() < 5.0
+    assert np.isnan(image[rows // 2, columns // 2])
+    assert image.size <= 4.5 * len(scattered) / (1 - np.pi / 16)

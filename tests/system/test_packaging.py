@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -26,6 +27,14 @@ def test_every_file_beside_the_code_is_in_a_package_that_is_installed() -> None:
         ["git", "check-ignore", "--stdin"], cwd=ROOT, input=names, capture_output=True, text=True
     )
     assert ignored.stdout == ""
+
+
+def test_the_command_is_the_module() -> None:
+    said = [
+        subprocess.run([*command, "list", "suites"], capture_output=True, text=True, check=True).stdout
+        for command in ([str(Path(sys.executable).with_name("rivetbench"))], [sys.executable, "-m", "harness"])
+    ]
+    assert said[0] == said[1] != ""
 
 
 def lower_bounds(*without: str) -> dict[str, Version]:
