@@ -32,7 +32,7 @@ from solvers.algorithms.sweeps import Sweeps
 from solvers.base import WarmStart
 from solvers.kkt import with_p
 
-TOLERANCE_MM = 1e-7  # until it is proven
+TOLERANCE_MM = 1e-5  # until it is proven
 PAGE = "page"  # where a wrong value was given
 
 

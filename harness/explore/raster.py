@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from problems.forms.assembly import Indices, Matrix, Vector
@@ -39,5 +40,5 @@ class Raster:
         low, high = centres[0, 0] - pixel / 2, centres[-1, -1] + pixel / 2
         return cls(low, high, cKDTree(places).query(centres, distance_upper_bound=reach)[1])
 
-    def image(self, gap: Vector) -> Matrix:
+    def image(self, gap: Vector) -> NDArray[np.float32]:
         return np.append(gap, np.nan).astype(np.float32)[self.nearest]

@@ -6,7 +6,10 @@ worker are done by others; a task that keeps killing workers fails alone. Only t
 
 from __future__ import annotations
 
+import logging
 import platform
+import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
@@ -39,11 +42,19 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
         allowed = "needs Dask: pip install 'rivetbench[distributed]'"
         raise InputError.one("--scheduler", "scheduler", scheduler, f"{allowed} ({error})") from error
     if count := local_workers(scheduler):
-        cluster = LocalCluster(
-            n_workers=count, threads_per_worker=1, memory_limit=None, dashboard_address=":0"
-        )
-        with cluster, Client(cluster) as client:
-            yield _connected(client, scheduler)
+        with _uninterrupted():
+            cluster = LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                memory_limit=None,
+                dashboard_address=":0",
+                silence_logs=logging.ERROR,
+            )
+        try:
+            with cluster, Client(cluster) as client, _silent_if_interrupted():
+                yield _connected(client, scheduler)
+        finally:
+            logging.disable(logging.NOTSET)
         return
     try:
         client = Client(scheduler, timeout=CONNECT_TIMEOUT)
@@ -51,6 +62,29 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
         raise InputError.one("--scheduler", "scheduler", scheduler, f"does not answer: {error}") from error
     with client:
         yield _connected(client, scheduler)
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Processes that begin here ignore Ctrl-C, and say nothing of it: the one that began them ends them."""
+    if threading.current_thread() is not threading.main_thread():  # only that one can
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _silent_if_interrupted() -> Iterator[None]:
+    """Dask logs each task that an interrupt cuts off, while it closes: not after one."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        logging.disable()
+        raise
 
 
 def local_workers(scheduler: str | None) -> int | None:

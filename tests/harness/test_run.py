@@ -16,7 +16,7 @@ import psutil
 import pytest
 import tiny
 from commands import harness
-from runs import moved, rows_of, said_by, wait_for
+from runs import heed_interrupts, moved, rows_of, said_by, wait_for
 
 from harness.measurement.run import run
 from harness.planning.plan import expand, of_key
@@ -230,11 +230,6 @@ def test_bad_input_is_one_line_a_fault_and_exit_code_2(copy: Path, folder: Path)
         done = harness(name, copy)
         assert done.exit_code == 2
         assert "measurements.jsonl: line 5" in done.stderr
-
-
-def heed_interrupts() -> None:
-    """As in a terminal: a shell starts what it puts in the background with SIGINT ignored."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_an_interrupted_run_keeps_its_rows_and_goes_on(folder: Path) -> None:

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -17,10 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 import tiny
 from rich.console import Console
-from runs import rows_of, said_by, series_rows
+from runs import heed_interrupts, rows_of, said_by, series_rows, wait_for
 from strip import write_strip
 
 from harness.measurement import scheduler
@@ -44,6 +46,7 @@ from problems.scene import read_scene
 pytestmark = pytest.mark.slow
 
 CASES = 24
+ROOT = Path(__file__).parents[2]
 VERSIONS = versions()
 DASK = importlib.util.find_spec("distributed") is not None
 needs_dask = pytest.mark.skipif(not DASK, reason="needs Dask")
@@ -192,6 +195,31 @@ def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
             time.sleep(0.05)
         with pytest.raises(InputError, match="has no worker"), workers(cluster.scheduler_address):
             pass
+
+
+@needs_dask
+def test_ctrl_c_in_a_terminal_ends_workers_without_a_word_of_theirs(tmp_path: Path) -> None:
+    """The signal goes to the whole group of processes, and every one of them ends."""
+    out = tmp_path / "out"
+    command = ["series", write_strip(tmp_path), "--cases", 100_000, "--scheduler", "local:2", "--out", out]
+    going = subprocess.Popen(
+        [sys.executable, "-m", "harness", *map(str, command)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        preexec_fn=heed_interrupts,
+    )
+    wait_for(lambda: series_rows(out))
+    begun = psutil.Process(going.pid).children(recursive=True)
+    os.killpg(going.pid, signal.SIGINT)
+    said, _ = going.communicate(timeout=30)
+    assert going.returncode == 130
+    assert "Interrupted" in said
+    assert "Traceback" not in said
+    assert "distributed" not in said
+    wait_for(lambda: not any(each.is_running() and each.status() != "zombie" for each in begun))
 
 
 @needs_dask

@@ -6,14 +6,13 @@ import signal
 import subprocess
 import sys
 import time
-from functools import partial
 from io import StringIO
 from pathlib import Path
 
 import pytest
 import tiny
 from rich.console import Console
-from runs import all_end, processes, rows_of, wait_for
+from runs import all_end, heed_interrupts, processes, rows_of, wait_for
 
 import harness.conformance.isolated as isolated
 import harness.measurement.describe as describing
@@ -152,8 +151,7 @@ def interrupt(arguments: list[str], folder: Path, begun: Path, sent: int) -> Non
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        # What started the tests may ignore it, as a shell does for a command in the background.
-        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
+        preexec_fn=heed_interrupts,
     )
     wait_for(begun.exists)
     start = time.monotonic()

@@ -32,7 +32,10 @@ def test_every_file_beside_the_code_is_in_a_package_that_is_installed() -> None:
 def test_the_command_is_the_module() -> None:
     said = [
         subprocess.run([*command, "list", "suites"], capture_output=True, text=True, check=True).stdout
-        for command in ([str(Path(sys.executable).with_name("rivetbench"))], [sys.executable, "-m", "harness"])
+        for command in (
+            [str(Path(sys.executable).with_name("rivetbench"))],
+            [sys.executable, "-m", "harness"],
+        )
     ]
     assert said[0] == said[1] != ""
 
