@@ -47,7 +47,7 @@ def place(
         option(
             "SHARE",
             "Of the cases, in which the gap must be kept.  [default: 0.95; of one case, 1]",
-            min=0.0,
+            min=0.01,
             max=1.0,
         ),
     ] = None,

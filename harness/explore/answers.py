@@ -32,7 +32,7 @@ from solvers.algorithms.sweeps import Sweeps
 from solvers.base import WarmStart
 from solvers.kkt import with_p
 
-TOLERANCE_MM = 1e-5  # until it is proven
+TOLERANCE_MM, PROVEN_MM = 1e-5, 1e-9  # until it is proven, and to be
 PAGE = "page"  # where a wrong value was given
 
 
@@ -124,12 +124,15 @@ class Explorer:
         none = self.contribution(None)
         f, g = sum((f for f, _ in parts), none[0]), sum((g for _, g in parts), none[1])
         (load,) = with_p(self.data, [LoadCase(f, g)])
+        return self._solved(settings, load, TOLERANCE_MM, near)
+
+    def _solved(self, settings: Settings, load: LoadCase, tolerance: float, near: Answer | None) -> Answer:
         start = None if near is None else WarmStart(near.load, near.lam, near.gap)
-        case = self.sweeps.solved(load, TOLERANCE_MM, start)
-        return Answer(settings, load, *self.sweeps.vectors(case))
+        return Answer(settings, load, *self.sweeps.vectors(self.sweeps.solved(load, tolerance, start)))
 
     def proven(self, answer: Answer) -> Answer:
-        """The same with the gaps and the error of the proven one."""
+        """The same to more digits, with the gaps and the error of the proven one."""
+        answer = self._solved(answer.settings, answer.load, PROVEN_MM, answer)
         (found,) = assess(self.proof, [answer.load], [answer.lam], [None], LIMIT_MM / 2)
         error = self.gap_error(answer.load.g, found.x, found.bound_mm)
         return replace(answer, gap=found.gap, error_mm=float(error.max(initial=0.0)))

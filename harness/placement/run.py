@@ -60,7 +60,7 @@ class Goal:
             least = ceil(log(1 - CONFIDENCE) / log(self.share))
             allowed = f"{cases} cases cannot show it: take {least}, or a share of 1"
             raise InputError.one("--share", "share", self.share, allowed)
-        return floor((1 - self.share) * cases + 1e-9)
+        return min(floor((1 - self.share) * cases + 1e-9), cases - 1)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """The data of a riveting problem: what load cases share, and each load case's own. Units: mm and N."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -84,6 +85,10 @@ class LoadCase:
     g: Vector
     p: Vector = field(default_factory=lambda: np.zeros(0))
     energy: float = 1.0
+
+    def __sub__(self, other: Self) -> Self:
+        """What changes from the other one to this."""
+        return replace(self, f=self.f - other.f, g=self.g - other.g, p=self.p - other.p)
 
 
 def stacked(cases: Sequence[LoadCase]) -> LoadCase:

@@ -13,6 +13,10 @@ follows by its change Q(λ⁺ − λ), whose rounding shrinks with it: that of Q
 sweep, M's error carrying it into soft modes, up to √cond(Q) times as large. But where y was last computed at
 far larger forces, it is computed anew.
 
+A case starts from λ + αw, w = D⁻¹Aᵀδf, D = diag(AᵀA), δf its load less that of the case before, or all of it.
+What fasteners press on two parts is a sum of columns of A: δf = Aw, α = 1 leaves x as it was. What contacts
+cannot carry is left to correct. α in [0, 1] makes ½λᵀQλ − pᵀλ least.
+
 An edge of contact creeps by about a row of contacts per set. As long as λ is far from the solution, a product
 corrects more than further sets; so the limit on the sets of a sweep grows with the sweeps.
 """
@@ -46,7 +50,7 @@ class Case:
     C : its contact set. trial : λ (m,) N, y (m,) mm, and |y_C|. factor : of M on the open contacts. before :
     the last step and Q times it, if the set was the one before. residual : max(|y_C|, max(−y)). stalled :
     sweeps in succession that did not halve it. settled : no sign is wrong, and it is small enough. doubt :
-    the rounding that y has brought along since it was last computed anew, mm.
+    the rounding that y has brought along since it was last computed anew, mm; infinite if y is not known.
     """
 
     load: LoadCase
@@ -81,6 +85,8 @@ class Sweeps:
         self.M, self.diagonal, self.gaps = near.M, near.diagonal, self.prepared.gaps
         self.order = np.arange(len(near.diagonal)) if near.M is None else near.M.order
         self.own = near.diagonal[self.order]
+        self.A = self.prepared.assembly.A
+        self.squares = np.asarray(self.A.power(2).sum(axis=0)).ravel()
 
     @cached_property
     def springs(self) -> ContactSprings:
@@ -90,7 +96,7 @@ class Sweeps:
     def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
         """An answer to each load, all with p, solved together from the nearest of the cases before them."""
         before = self.last or [self.solved(loads[0], tolerance)]
-        self.last = self._sweep([self._from(_nearest(before, each), each) for each in loads], tolerance)
+        self.last = self._sweep(self._begun([_nearest(before, each) for each in loads], loads), tolerance)
         for case in self.last:
             if case.factor is not None:
                 case.factor.last = None  # as large as M for each; the next cases have other sets
@@ -102,13 +108,14 @@ class Sweeps:
         """The case of a load with p, from nothing or from a solved one. C : its first set, if it is known."""
         order = self.order
         if start is None:
-            y = -load.p[order]
-            first = y < 0 if self.M is not None else self.springs.first_set(load)
-            case = Case(load, first, TrialSolution(np.zeros(len(y)), y, float(abs(y).max(initial=0.0))))
+            zero = np.zeros(len(order))
+            nothing = Case(load - load, zero > 0, TrialSolution(zero, zero, 0.0), doubt=0.0)
+            (case,) = self._begun([nothing], [load])
+            case.C = case.C | (case.trial.y < 0) if self.M is not None else self.springs.first_set(load)
         else:
             lam, y = start.lam[order], start.gap[order]
-            closed = self.own * lam > y
-            case = self._from(Case(start.load, closed, TrialSolution(lam, y, 0.0)), load)
+            solved = Case(start.load, self.own * lam > y, TrialSolution(lam, y, 0.0))
+            (case,) = self._begun([solved], [load])
         if C is not None:
             case.C = C[order]
         return self._sweep([case], tolerance)[0]
@@ -144,11 +151,26 @@ class Sweeps:
         lam[self.order], y[self.order] = np.maximum(case.trial.lam, 0.0), case.trial.y
         return lam, y
 
-    def _from(self, solved: Case, load: LoadCase) -> Case:
-        """A load case that starts from the solution of another one."""
-        y = solved.trial.y + (solved.load.p - load.p)[self.order]
-        trial = TrialSolution(solved.trial.lam, y, float(abs(y).max(initial=0.0)))
-        return Case(load, solved.C, trial, None if solved.factor is None else replace(solved.factor))
+    def _begun(self, solved: Sequence[Case], loads: Sequence[LoadCase]) -> list[Case]:
+        """Load cases that start from the solutions of others, and from the forces αw of a change of f."""
+        changes = [load - case.load for case, load in zip(solved, loads, strict=True)]
+        w = np.column_stack([self.A.T @ change.f / self.squares for change in changes])
+        if self.M is None:  # a set with springs gives the same from anywhere
+            w[:] = 0.0
+        Qw, some = np.zeros_like(w), np.flatnonzero(w.any(axis=0))
+        if len(some):
+            Qw[:, some] = self.gaps(np.asfortranarray(w[:, some]), [changes[k] - changes[k] for k in some])
+        begun = []
+        for k, (case, load) in enumerate(zip(solved, loads, strict=True)):
+            force, moved, y = w[self.order, k], Qw[self.order, k], case.trial.y - changes[k].p[self.order]
+            share = float(np.clip(-force @ y / (force @ moved or 1.0), 0.0, 1.0))
+            lam, y = case.trial.lam + share * force, y + share * moved
+            C = np.where(share * force == 0, case.C, lam > 0)
+            factor = None if case.factor is None else replace(case.factor)
+            trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
+            doubt = case.doubt + rounding_of(load.p, y)
+            begun.append(Case(load, C, trial, factor, doubt=doubt))
+        return begun
 
     def _sweep(self, cases: list[Case], tolerance: float) -> list[Case]:
         order = self.order
@@ -166,9 +188,10 @@ class Sweeps:
                     for case, (lam, _), k in zip(left, found, kept, strict=True)
                 ]
             )
-            loads = [_none(case.load) if k else case.load for case, k in zip(left, kept, strict=True)]
+            loads = [case.load - case.load if k else case.load for case, k in zip(left, kept, strict=True)]
             y = self.gaps(moved, loads)[order].T
             for case, (lam, same), gap, k in zip(left, found, y, kept, strict=True):
+                same &= np.isfinite(case.doubt)  # λ and y of a start from outside need not belong together
                 if not k:
                     case.doubt = rounding_of(case.load.p[order], gap)
                 self._take(case, lam, case.trial.y + gap if k else gap, same, tolerance)
@@ -221,11 +244,6 @@ class Sweeps:
         if case.stalled >= STALLED:
             enough = max(enough, STALLED_MM)
         case.settled = right and residual <= enough
-
-
-def _none(load: LoadCase) -> LoadCase:
-    """No load and no gap: what `gaps` then gives is Qλ."""
-    return replace(load, f=np.zeros_like(load.f), g=np.zeros_like(load.g), p=np.zeros_like(load.p))
 
 
 def _nearest(cases: Sequence[Case], load: LoadCase) -> Case:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.algorithms import sweeps
 from solvers.algorithms.sweeps import Sweeps
-from solvers.base import Answer
+from solvers.base import Answer, WarmStart
+from solvers.kkt import with_p
 from solvers.registry import make_solver
 
 TOLERANCE = 1e-10
@@ -171,6 +173,37 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     one, two = (own([load], TOLERANCE)[0] for load in (first, second))
     assert two.iterations <= 2
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
+
+
+@pytest.mark.parametrize("form", ["dual", "sparse"])
+def test_forces_at_contacts_go_into_the_contacts_below(tmp_path: Path, form: Any) -> None:
+    """δf = Aw: λ + w has the same x, which the start keeps; where a gap is too wide for w, it stays at λ."""
+    scene = read_scene(str(write_strip(tmp_path)))
+    data = prepared(scene, form=form)
+    (load,) = with_p(data, [load_case(scene, form)])
+    own = Sweeps(data)
+    case = own.solved(load, TOLERANCE)
+    w = np.where(own.vectors(case)[0] > 0, np.random.default_rng(0).uniform(1.0, 2.0, len(load.g)), 0.0)
+    near, far = with_p(data, [LoadCase(load.f + data.assembly.A @ w, load.g + gap) for gap in (0.0, 1e3)])
+    (begun,) = own._begun([case], [near])
+    np.testing.assert_allclose(begun.trial.lam, case.trial.lam + w[own.order], rtol=1e-9)
+    np.testing.assert_allclose(begun.trial.y, case.trial.y, atol=1e-9)
+    np.testing.assert_array_equal(begun.C, case.C)
+    (begun,) = own._begun([case], [far])
+    np.testing.assert_array_equal(begun.trial.lam, case.trial.lam)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.1])
+def test_a_start_whose_forces_and_gaps_do_not_belong_together_costs_sweeps_alone(scale: float) -> None:
+    Q, random = decaying(), np.random.default_rng(0)
+    own, p = Sweeps(dual_alone(Q)), random.standard_normal(len(Q))
+    load = LoadCase(p * 0, -p, p)
+    lam, gap = own.vectors(own.solved(load, TOLERANCE))
+    start = WarmStart(load, lam * (1 + scale * random.standard_normal(len(lam))), gap)
+    for now in (p, 1.001 * p):
+        answer = own.answer(own.solved(LoadCase(p * 0, -now, now), TOLERANCE, start), TOLERANCE)
+        assert answer.status == "solved"
+        assert residual(Q, now, answer.lam) <= TOLERANCE
 
 
 @pytest.mark.parametrize(("rung", "sweeps_needed"), [("conditioning/9e+13", 6), ("duplicates/2e-05", 6)])

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from harness.results.schema import DENSE_FORMS
-from report.analysis.roads import roads
 from report.document.blocks import Table
 from report.document.numbers import listed, power, significant
 from report.results.reader import Results, read
@@ -37,23 +35,13 @@ def by_size(values: list[float]) -> str:
     return listed([significant(value, 2) for value in values])
 
 
-def test_the_speed_of_the_readme_is_that_of_the_rows() -> None:
-    """From the scene to the first answer: the most seconds of `newton` in the sparse form on a scene of each
-    n, and how many times as long our methods on condensed matrices take, at least.
-    """
-    ways = roads(results("uncondensed"))
-    sizes = ways.groupby("scene")["n"].first()
-    own = ways[ways["method"] == "newton (sparse)"].groupby("scene")["total_1_s"].min()
-    most = by_size(own.groupby(sizes).max().tolist())
-    n = listed([f"{size:.0f}" for size in sorted(set(sizes))])
-    assert f"at most {most} s at n = {n}." in text("README.md")
-    condensed = (
-        ways[(ways["owner"] == "ours") & ways["form"].isin(DENSE_FORMS)].groupby("scene")["total_1_s"].min()
-        / own
-    )
-    for size, factor in condensed.groupby(sizes).min().items():
-        s = significant(own.groupby(sizes).max()[size], 2)
-        assert f"| {size:.0f} | {s} s | {significant(factor, 2)} times as long |" in text("docs/speed.md")
+def test_the_speed_of_the_readme_is_the_table_of_the_index() -> None:
+    """Which is that of the rows."""
+    index = (PUBLISHED / "index.md").read_text("utf-8")
+    table = index.partition("## How fast is it?\n\n")[2].strip()
+    assert table.startswith("| question ")
+    for page in ("README.md", "docs/speed.md"):
+        assert f"\n\n{table}\n\n" in (ROOT / page).read_text("utf-8"), page
 
 
 def test_the_rates_of_a_series_are_those_of_the_rows() -> None:
