@@ -39,7 +39,7 @@ AT_ONCE = 8  # plans that are tried together
 SHARE_AT_ONCE = 8  # a plan's share that is taken out at once, as long as that keeps the limit
 NONE = (0.0, 0.0)  # less than any φ
 HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners needed least
-FURTHER = 2.0  # times what is enough: how far removal goes on
+FURTHER = 1.25  # times what is enough: how far removal goes on
 DIGITS = 6  # of mm: values closer than a nanometre are equal, whatever the rounding
 
 
@@ -75,6 +75,7 @@ class Search:
     ) -> None:
         self.ask, self.contacts, self.cases = ask, contacts, cases
         self.allowed, self.limit_mm, self.said = allowed, limit_mm, said
+        self.before: dict[Place, Value] = {}  # φ without a fastener, of an earlier step
 
     def gap(self, outcome: Outcome) -> float:
         """G, mm, of all cases, or of those in the outcome."""
@@ -98,13 +99,13 @@ class Search:
 
     def fewest(self, start: Step, candidates: Plan, enough_mm: float) -> tuple[Step, list[Step]]:
         """The smallest plan found whose gap is enough, as that of `start` is, and every plan on the way."""
-        best, steps, before = start, list[Step](), dict[Place, Value]()
+        best, steps = start, list[Step]()
         while (count := len(best.plan) // SHARE_AT_ONCE) > 1:
-            steps.append(step := self._without_least(best, before, count))
+            steps.append(step := self._without_least(best, count))
             if step.gap_mm > enough_mm:
                 break
             best = step
-        for step in self.removal(best, before):
+        for step in self.removal(best):
             steps.append(step)
             if step.gap_mm <= enough_mm:
                 best = step
@@ -117,16 +118,15 @@ class Search:
             steps.append(best := fewer)
         return best, steps
 
-    def removal(self, step: Step, before: dict[Place, Value] | None = None) -> Iterator[Step]:
-        """The plans with one fastener less each. before : values of earlier steps."""
-        before = {} if before is None else before
+    def removal(self, step: Step) -> Iterator[Step]:
+        """The plans with one fastener less each."""
         while step.plan:
-            yield (step := self._without_least(step, before, 1))
+            yield (step := self._without_least(step, 1))
 
-    def _without_least(self, step: Step, before: dict[Place, Value], count: int) -> Step:
+    def _without_least(self, step: Step, count: int) -> Step:
         """Without the fasteners that are needed least."""
-        fresh = self._harm(step, before, count)
-        before |= fresh
+        fresh = self._harm(step, self.before, count)
+        self.before |= fresh
         gone = sorted(fresh, key=lambda place: (fresh[place], place))[:count]
         return self.whole(tuple(place for place in step.plan if place not in gone), "removal")
 

@@ -39,7 +39,7 @@ class _State(State):
 
 
 class ActiveSetNewton(Method):
-    """Active-set Newton, from λ = 0 or a warm start; the stopping rule is that of `Sweeps`.
+    """Active-set Newton, from the forces of the fasteners or a warm start; it stops by the rule of `Sweeps`.
 
     Iterations are products with Q, inner iterations contact sets tried with M. "solved" as said in
     `Sweeps.answer`; in the sparse form, of the refined x (solvers/kkt.py).
