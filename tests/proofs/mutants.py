@@ -190,6 +190,11 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "harness/placement/search.py": {
         "reverse=True)[self.allowed]": ("reverse=True)[0]", "reverse=True)[self.allowed + 1]"),
     },
+    "solvers/algorithms/sweeps.py": {
+        "self.A.T @ change.f / self.squares": ("self.A.T @ change.f",),
+        "np.clip(-force @ y / (force @ moved or 1.0), 0.0, 1.0)": ("1.0",),
+        "same &= np.isfinite(case.doubt)": ("pass",),
+    },
     "solvers/kkt.py": {
         "max(float((-y).max(initial=0.0)), float(": ("max(float(",),
         "float(abs(y[lam > 0]).max(initial=0.0))": ("0.0", "float(y[lam > 0].min(initial=0.0))"),
@@ -225,5 +230,6 @@ TESTS = {
     "problems/stiffness/operator.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "harness/placement/session.py": ("harness/test_place.py",),
     "harness/placement/search.py": ("harness/test_place.py",),
+    "solvers/algorithms/sweeps.py": ("solvers/test_sweeps.py",),
     "solvers/kkt.py": ("proofs/test_terms_verdict.py",),
 }

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from joints import two_parts
 from small import definite, make_load, make_prepared, solve_by_nnls
 from strip import write_strip
 
@@ -30,6 +31,15 @@ from solvers.registry import make_solver
 
 TOLERANCE = 1e-10
 LINES, ACROSS = 110, 4
+PRESSED = """
+[[effect]]
+kind = "initial_gap"
+mean = 0.05
+[[effect]]
+kind = "fasteners"
+preload = 40.0
+points = [[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]
+"""
 
 
 def full(M: BandedInverse) -> np.ndarray:
@@ -178,7 +188,8 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_forces_at_contacts_go_into_the_contacts_below(tmp_path: Path, form: Any) -> None:
     """δf = Aw: λ + w has the same x, which the start keeps; where a gap is too wide for w, it stays at λ."""
-    scene = read_scene(str(write_strip(tmp_path)))
+    (tmp_path / "joint.toml").write_text(two_parts(length=200.0, nodes=(21, 4)) + PRESSED)
+    scene = read_scene(str(tmp_path / "joint.toml"))
     data = prepared(scene, form=form)
     (load,) = with_p(data, [load_case(scene, form)])
     own = Sweeps(data)
