@@ -204,6 +204,18 @@ def test_forces_at_contacts_go_into_the_contacts_below(tmp_path: Path, form: Any
     np.testing.assert_array_equal(begun.trial.lam, case.trial.lam)
 
 
+def test_forces_at_contacts_of_unlike_lengths_are_the_contacts_own() -> None:
+    """Aᵀ Aw / diag(AᵀA) = w, whatever the lengths of the columns."""
+    made = make_prepared(3, 12)
+    lengths = np.geomspace(0.1, 10.0, made.assembly.m)
+    data = Prepared(replace(made.assembly, A=sp.csc_array(made.assembly.A.multiply(lengths))))
+    w = np.random.default_rng(0).uniform(1.0, 2.0, len(lengths))
+    nothing, load = with_p(data, [LoadCase(data.assembly.A @ v, 0.0 * w) for v in (0.0 * w, w)])
+    own = Sweeps(data)
+    (begun,) = own._begun([own.solved(nothing, TOLERANCE)], [load])
+    np.testing.assert_allclose(begun.trial.lam, w[own.order], rtol=1e-9)
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.1])
 def test_a_start_whose_forces_and_gaps_do_not_belong_together_costs_sweeps_alone(scale: float) -> None:
     Q, random = decaying(), np.random.default_rng(0)
