@@ -168,7 +168,7 @@ class Sweeps:
             C = np.where(share * force == 0, case.C, lam > 0)
             factor = None if case.factor is None else replace(case.factor)
             trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
-            doubt = case.doubt + rounding_of(load.p, y)
+            doubt = case.doubt + largest_rounding(self.own, load.p[self.order], lam)
             begun.append(Case(load, C, trial, factor, doubt=doubt))
         return begun
 
@@ -191,7 +191,8 @@ class Sweeps:
             loads = [case.load - case.load if k else case.load for case, k in zip(left, kept, strict=True)]
             y = self.gaps(moved, loads)[order].T
             for case, (lam, same), gap, k in zip(left, found, y, kept, strict=True):
-                same &= np.isfinite(case.doubt)  # λ and y of a start from outside need not belong together
+                # λ and y of a start from outside need not belong together; a part of a step leaves λ off C.
+                same &= np.isfinite(case.doubt) and not case.trial.lam[~case.C].any()
                 if not k:
                     case.doubt = rounding_of(case.load.p[order], gap)
                 self._take(case, lam, case.trial.y + gap if k else gap, same, tolerance)

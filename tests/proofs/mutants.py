@@ -193,7 +193,8 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "solvers/algorithms/sweeps.py": {
         "self.A.T @ change.f / self.squares": ("self.A.T @ change.f",),
         "np.clip(-force @ y / (force @ moved or 1.0), 0.0, 1.0)": ("1.0",),
-        "same &= np.isfinite(case.doubt)": ("pass",),
+        "np.isfinite(case.doubt) and": ("True and",),
+        " and not case.trial.lam[~case.C].any()": ("",),
     },
     "solvers/kkt.py": {
         "max(float((-y).max(initial=0.0)), float(": ("max(float(",),
