@@ -43,6 +43,7 @@ OVER = "#D55E00"  # gaps above the limit
 STALE = 0.35  # opacity of an answer to other settings
 WIDE = 760  # pixels of a map
 TALLEST, LOWEST = 420, 150
+HERE = "127.0.0.1"
 PROOF_MS = 50  # after the first change that is not proven: the map comes before
 
 
@@ -214,7 +215,10 @@ def serve(
     """Serve pages to this machine alone, under an address that nobody can guess, until interrupted."""
     token = secrets.token_urlsafe(16)
     application = Application(FunctionHandler(partial(_page, explorer, source, limit_mm, first)))
-    server = Server({f"/{token}": application}, address="127.0.0.1", port=port, use_index=False)
+    try:
+        server = Server({f"/{token}": application}, address=HERE, port=port, use_index=False)
+    except OSError as error:
+        raise InputError.one("explore", "--port", port, f"a free one: {error}") from error
     server.start()
     ready(f"http://localhost:{server.port}/{token}")
     try:
