@@ -75,7 +75,6 @@ class Search:
     ) -> None:
         self.ask, self.contacts, self.cases = ask, contacts, cases
         self.allowed, self.limit_mm, self.said = allowed, limit_mm, said
-        self.before: dict[Place, Value] = {}  # φ without a fastener, of an earlier step
 
     def gap(self, outcome: Outcome) -> float:
         """G, mm, of all cases, or of those in the outcome."""
@@ -99,13 +98,13 @@ class Search:
 
     def fewest(self, start: Step, candidates: Plan, enough_mm: float) -> tuple[Step, list[Step]]:
         """The smallest plan found whose gap is enough, as that of `start` is, and every plan on the way."""
-        best, steps = start, list[Step]()
+        best, steps, before = start, list[Step](), dict[Place, Value]()
         while (count := len(best.plan) // SHARE_AT_ONCE) > 1:
-            steps.append(step := self._without_least(best, count))
+            steps.append(step := self._without_least(best, before, count))
             if step.gap_mm > enough_mm:
                 break
             best = step
-        for step in self.removal(best):
+        for step in self.removal(best, before):
             steps.append(step)
             if step.gap_mm <= enough_mm:
                 best = step
@@ -118,15 +117,16 @@ class Search:
             steps.append(best := fewer)
         return best, steps
 
-    def removal(self, step: Step) -> Iterator[Step]:
-        """The plans with one fastener less each."""
+    def removal(self, step: Step, before: dict[Place, Value] | None = None) -> Iterator[Step]:
+        """The plans with one fastener less each. before : values of earlier steps."""
+        before = {} if before is None else before
         while step.plan:
-            yield (step := self._without_least(step, 1))
+            yield (step := self._without_least(step, before, 1))
 
-    def _without_least(self, step: Step, count: int) -> Step:
+    def _without_least(self, step: Step, before: dict[Place, Value], count: int) -> Step:
         """Without the fasteners that are needed least."""
-        fresh = self._harm(step, self.before, count)
-        self.before |= fresh
+        fresh = self._harm(step, before, count)
+        before |= fresh
         gone = sorted(fresh, key=lambda place: (fresh[place], place))[:count]
         return self.whole(tuple(place for place in step.plan if place not in gone), "removal")
 

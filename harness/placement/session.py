@@ -30,7 +30,7 @@ from problems.model.scene import JointScene
 from solvers.algorithms.sweeps import Case, Sweeps
 from solvers.kkt import with_p
 
-TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-4
+TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-6
 ENOUGH_MM = LIMIT_MM / 2  # a proven bound that needs no further refinement
 POWER = 8  # of the mean of gaps that stands for the largest one where that does not change
 

@@ -155,8 +155,6 @@ class Sweeps:
         """Load cases that start from the solutions of others, and from the forces αw of a change of f."""
         changes = [load - case.load for case, load in zip(solved, loads, strict=True)]
         w = np.column_stack([self.A.T @ change.f / self.squares for change in changes])
-        if self.M is None:  # a set with springs gives the same from anywhere
-            w[:] = 0.0
         Qw, some = np.zeros_like(w), np.flatnonzero(w.any(axis=0))
         if len(some):
             Qw[:, some] = self.gaps(np.asfortranarray(w[:, some]), [changes[k] - changes[k] for k in some])
@@ -164,8 +162,9 @@ class Sweeps:
         for k, (case, load) in enumerate(zip(solved, loads, strict=True)):
             force, moved, y = w[self.order, k], Qw[self.order, k], case.trial.y - changes[k].p[self.order]
             share = float(np.clip(-force @ y / (force @ moved or 1.0), 0.0, 1.0))
-            lam, y = case.trial.lam + share * force, y + share * moved
-            C = np.where(share * force == 0, case.C, lam > 0)
+            force, y = share * force, y + share * moved
+            lam = case.trial.lam + force
+            C = np.where(force == 0, case.C, lam > 0)
             factor = None if case.factor is None else replace(case.factor)
             trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
             doubt = case.doubt + largest_rounding(self.own, load.p[self.order], lam)

@@ -121,11 +121,9 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert not anchor or anchor in anchors(linked), target
 
 
-@each_page
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "CHANGELOG.md"], ids=str)
 def test_no_sentence_has_more_than_thirty_words(page: Path) -> None:
     """Of what a user reads: words with letters, code in a sentence as one, a colon or semicolon ends one."""
-    if page.name == "CHANGELOG.md":
-        return
     text = re.sub(r"(?s:```.*?```)|^ {4}.*$", "", page.read_text("utf-8"), flags=re.MULTILINE)
     text = re.sub(r"!?\[([^]]*)\]\([^)]*\)", r"\1", text)
     for block in re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.)\s|#)|\|", text):
