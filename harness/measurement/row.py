@@ -53,7 +53,8 @@ def run_task(task: Task, answers: Path) -> TaskResult:
     """Measure; the answer files go into that directory."""
     start, batch, forms = time.monotonic(), task.batch, task.solver.forms
     if task.timed_out_on:
-        reports = [{"status": "not_run", "message": f"too slow already on {task.timed_out_on}"}] * len(batch)
+        why = f"too slow or too large already on {task.timed_out_on}"
+        reports = [{"status": "not_run", "message": why}] * len(batch)
     elif task.solver.failure:
         reports = [{"status": "failed", "message": task.solver.failure}] * len(batch)
     elif batch[0].form in forms:

@@ -152,7 +152,7 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     measured, if its seconds there, or the limit that they exceeded, times (n/n')² are beyond the limit of m,
     or times n/n' in the sparse form: with dense matrices, time grows at least like n², with sparse ones like
     n. (Not on rungs of ladders, where size is not what makes them hard.) Or else the other scenes of the size
-    of m, if it was left behind on two or more of them, and on all.
+    of m, if it was left behind on two or more of them, or on one and on all of n', and on none was not.
     """
     own = [row for row in rows if m.same_settings(row)]
     looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
@@ -161,28 +161,36 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
             return f"{m.scene} at {row['tolerance']:g}"
     if prefix_of(m.source) in LADDERS:
         return ""
-    smaller = [row for row in own if row["n"] < n and row["tolerance"] == m.tolerance]
-    largest = max((row["n"] for row in smaller), default=0)
-    growth = (n / largest) ** (2 if m.form in DENSE_FORMS else 1) if largest else 0.0
-    of_size = [row for row in smaller if row["n"] == largest]
-
-    def least(row: Row) -> float:
-        """Seconds that m takes, if it grows no faster."""
-        return growth * float(row["time_limit_s"] if row["status"] in OUT_OF_TIME else _seconds(row))
-
-    if of_size and all(least(row) >= m.time_limit_s for row in of_size):
-        return _listed(of_size)
-    same = [row for row in own if row["n"] == n and row["scene"] != m.scene]
-    scenes = {row["scene"] for row in same}
-    if m.stop_at_times_fastest is None or len(scenes) < FEWEST_SCENES:
+    smaller = [row for row in own if row["n"] < n]
+    alike = _of_largest([row for row in smaller if row["tolerance"] == m.tolerance])
+    growth = [(n / row["n"]) ** (2 if m.form in DENSE_FORMS else 1) for row in alike]
+    if alike and all(g * _least(row) >= m.time_limit_s for g, row in zip(growth, alike, strict=True)):
+        return _listed(alike)
+    if m.stop_at_times_fastest is None:
         return ""
-    behind = all(_behind([row for row in same if row["scene"] == scene], rows) for scene in scenes)
-    return _listed(same) if behind else ""
+    same = [row for row in own if row["n"] == n and row["scene"] != m.scene]
+    before = _of_largest(smaller)
+    if _lost(same, rows, 1) and _lost(before, rows, FEWEST_SCENES):
+        return _listed([*same, *before])
+    return _listed(same) if _lost(same, rows, FEWEST_SCENES) else ""
+
+
+def _of_largest(rows: Sequence[Row]) -> list[Row]:
+    """Those of the largest size."""
+    largest = max((row["n"] for row in rows), default=0)
+    return [row for row in rows if row["n"] == largest]
+
+
+def _lost(cells: Sequence[Row], rows: Sequence[Row], fewest: int) -> bool:
+    """Whether some cells were left behind on all their scenes, and on so many."""
+    scenes = {row["scene"] for row in cells}
+    behind = (_behind([row for row in cells if row["scene"] == scene], rows) for scene in scenes)
+    return len(scenes) >= fewest and all(behind)
 
 
 def _behind(cell: Sequence[Row], rows: Sequence[Row]) -> bool:
     """Whether a cell took more than max(10 s, 3 × the fastest library other than its own) on its scene: the
-    fastest of its answers within the limit, if there are any.
+    fastest of its answers within the limit, if there are any; or more than its memory limit.
     """
     first = cell[0]
     others = [
@@ -192,10 +200,14 @@ def _behind(cell: Sequence[Row], rows: Sequence[Row]) -> bool:
         if row["verdict"] == "within"
     ]
     within = [row for row in cell if row["verdict"] == "within"]
-    seconds = [
-        row["time_limit_s"] if row["status"] in OUT_OF_TIME else _seconds(row) for row in within or cell
-    ]
-    return bool(others) and min(seconds) >= max(LEAST_S, TIMES_BEHIND * min(others))
+    return bool(others) and min(map(_least, within or cell)) >= max(LEAST_S, TIMES_BEHIND * min(others))
+
+
+def _least(row: Row) -> float:
+    """Seconds, or the limit that was not enough; infinite if the memory was not."""
+    if row["status"] == "memory_limit":
+        return inf
+    return float(row["time_limit_s"]) if row["status"] in OUT_OF_TIME else _seconds(row)
 
 
 def _listed(rows: Sequence[Row]) -> str:

@@ -74,8 +74,26 @@ def test_what_is_left_behind_on_two_scenes_is_not_run_on_a_third_of_the_size(lar
     assert not predicted_timeout(behind, 6112, [each | {"n": 11308} for each in (*one, *two)])
     slow = [one[0] | {"tolerance": 1e-3, "verdict": "outside", "solve_s": 5.0}]  # not within: does not count
     assert predicted_timeout(behind, 6112, [*one, *slow, *two]) == "6112/0, 6112/1"
+    too_large = [*one[1:], one[0] | {"status": "memory_limit", "verdict": "no_answer", "solve_s": 1.0}]
+    assert predicted_timeout(behind, 6112, [*too_large, *two]) == "6112/0, 6112/1"
     quick = [each | {"solve_s": each["solve_s"] and each["solve_s"] / 3} for each in (*one, *two)]
     assert not predicted_timeout(behind, 6112, [each | {"time_limit_s": 9.9} for each in quick])  # below 10 s
+
+
+def test_of_what_is_left_behind_on_all_scenes_of_the_smaller_size_one_of_the_next_is_enough(large):
+    behind = replace(large, stop_at_times_fastest=10.0)
+
+    def pair(n, k, seconds):
+        other = {"n": n, "tolerance": 1e-9 if n == 6112 else 1e-8}
+        slow, fast = cell(f"{n}/{k}", seconds), cell(f"{n}/{k}", 9.0, solver="scs")
+        return [slow | other, fast | other]
+
+    small, first = [*pair(4386, 0, 28.0), *pair(4386, 1, 28.0)], pair(6112, 0, 28.0)
+    assert predicted_timeout(behind, 6112, [*small, *first]) == "4386/0, 4386/1, 6112/0"
+    assert not predicted_timeout(behind, 6112, small)
+    assert not predicted_timeout(behind, 6112, [*small[:2], *first])  # of one there
+    assert not predicted_timeout(behind, 6112, [*small, *first, *pair(6112, 1, 26.0)])
+    assert not predicted_timeout(behind, 6112, [*small[:2], *pair(4386, 1, 20.0), *first])
 
 
 def cell(scene, seconds, solver="piqp"):
@@ -94,7 +112,7 @@ def test_seconds_at_a_smaller_size_grow_like_its_square(large):
 
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
     (told,) = run_task(Task([large], Description(["primal"], "1.0", ""), "4386/0107"), tmp_path).reports
-    assert told == {"status": "not_run", "message": "too slow already on 4386/0107"}
+    assert told == {"status": "not_run", "message": "too slow or too large already on 4386/0107"}
     assert not list(tmp_path.iterdir())
     rows = [row("4386/0107", 4386), row("4386/1471", 4386, told["status"])]
     assert predicted_timeout(large, 6112, rows) == "4386/0107, 4386/1471"
