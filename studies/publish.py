@@ -46,7 +46,7 @@ SERIES = {
 }
 #: In the order of measurement; the other suites are for a user's own runs and for the CI.
 NAMES = (
-    *("default", "speed", "libraries", "series", "stream", *SERIES, "methods", "uncondensed", "scaling"),
+    *("default", "speed", "libraries", "series", "stream", *SERIES, "methods", "scaling"),
     *("hard", "hard-full", "drawn", "outside", "paper", "accuracy"),
 )
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened

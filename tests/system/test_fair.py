@@ -122,7 +122,8 @@ def test_not_run_only_after_two_losses() -> None:
         assert {r["scene"] for r in cell} == set(scenes), row["key"]
         growth = row["n"] / min(r["n"] for r in cell)
         growth *= growth if row["form"] != "sparse" else 1
-        if scenes == [row["scene"]] or all(growth * took(r) >= row["time_limit_s"] for r in cell):
+        alike = [r for r in cell if r["tolerance"] == row["tolerance"]] or cell
+        if scenes == [row["scene"]] or all(growth * took(r) >= row["time_limit_s"] for r in alike):
             continue  # it ran out of time here, or would by its growth
         here = {r["scene"] for r in cell if r["n"] == row["n"]}
         smaller = {r["scene"] for r in cell} - here
@@ -143,7 +144,7 @@ def took(row: Row) -> float:
     return float(row["time_limit_s"]) if row["status"] in ("time_limit", "not_run") else seconds(row)
 
 
-@pytest.mark.xfail(strict=True, reason="the first eight of 24 scenes are measured so far")
+@pytest.mark.xfail(strict=True, reason="the first seventeen of 24 scenes are measured so far")
 def test_scenes_are_drawn() -> None:
     drawn = {f"drawn/{n}/{k}" for n in SIZES for k in range(8)}
     assert {row["scene"] for row in rows_of("speed")} == drawn
