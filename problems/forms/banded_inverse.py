@@ -39,12 +39,17 @@ class BandedInverse:
         """M v."""
         return blas.dsbmv(len(self.band) - 1, 1.0, self.band, v, lower=1)
 
-    def factor(self, S: Mask) -> BandFactor:
-        """The Cholesky factor of M_SS. Raises LinAlgError if rounding makes it indefinite."""
+    def factor(self, S: Mask, room: Vector | None = None) -> BandFactor:
+        """The Cholesky factor of M_SS. Raises LinAlgError if rounding makes it indefinite.
+
+        room : where it is put, as many numbers as the band has; by default fresh memory.
+        """
         rows, width = np.flatnonzero(S), len(self.band) - 1
         nearer = np.arange(len(rows)) - np.searchsorted(rows, rows - width)
         deep = int(nearer.max(initial=0)) + 1
-        block, entries = np.empty((deep, len(rows)), order="F"), self.band.ravel(order="K")
+        room = np.empty(deep * len(rows)) if room is None else room[: deep * len(rows)]
+        block = room.reshape((deep, len(rows)), order="F")
+        entries = self.band.ravel(order="K")
         # Entry (i + d, i) of M_SS is entry (rows[i + d], rows[i]) of M, zero beyond the band.
         below = np.lib.stride_tricks.sliding_window_view(np.append(rows, np.full(deep, 2 * len(S))), deep)
         for start in range(0, len(rows), COLUMNS_AT_A_TIME):
@@ -56,7 +61,11 @@ class BandedInverse:
     def scaled(self, s: Vector) -> BandedInverse:
         """diag(s) M diag(s)."""
         below = np.lib.stride_tricks.sliding_window_view(np.pad(s, (0, len(self.band) - 1)), len(self.band))
-        return BandedInverse(self.order, np.asfortranarray(self.band * below.T * s))
+        band = np.empty_like(self.band)
+        for start in range(0, len(s), COLUMNS_AT_A_TIME):
+            some = slice(start, start + COLUMNS_AT_A_TIME)
+            np.multiply(self.band[:, some], below.T[:, some] * s[some], out=band[:, some])
+        return BandedInverse(self.order, band)
 
     def shifted_factor(self, s: Vector) -> BandFactor:
         """The Cholesky factor of I + diag(s) M diag(s)."""

@@ -12,13 +12,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-import scipy.linalg as sla
 import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from problems import storage
 from problems.forms.assembly import Indices, Matrix, Vector
 from problems.stiffness.block import NotPositiveDefinite, SparseBlock
+from problems.stiffness.dense import mirrored, panels
 from problems.storage import fingerprint
 
 from .part import PartLoadEffect, PartModel
@@ -44,7 +44,7 @@ def condense(
 
     Returns
     -------
-    (k, k) dense, its rows in the order in which the kept unknowns stand in `lines`.
+    (k, k) dense, symmetric to the last bit, in the order in which the kept unknowns stand in `lines`.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def condense(
     """
     size = int(keep.sum())
     S = np.zeros((size, size))
-    kept = 0  # S[:kept, :kept] is filled; later lines still update it
+    kept = 0  # the lower triangle of S[:kept, :kept] is filled; later lines still update it
     C = K[lines[0]][:, lines[0]].toarray()  # the current line
     B = np.zeros((0, len(lines[0])))  # its coupling to the kept unknowns behind it
     for step, line in enumerate(lines):
@@ -60,7 +60,6 @@ def condense(
         j, i = np.flatnonzero(keep[line]), np.flatnonzero(~keep[line])
         ahead = K[line][:, following].toarray()
         stop = kept + len(j)
-        S[:kept, kept:stop] = B[:, j]
         S[kept:stop, :kept] = B[:, j].T
         S[kept:stop, kept:stop] = C[np.ix_(j, j)]
 
@@ -68,15 +67,16 @@ def condense(
         L, info = lapack.dpotrf(C[np.ix_(i, i)], lower=1)
         if info:
             raise NotPositiveDefinite(int(line[i[info - 1]]))
-        rows = np.hstack([B[:, i].T, C[np.ix_(i, j)], ahead[i]])
-        W = sla.solve_triangular(L, rows, lower=True, check_finite=False)
+        rows = np.vstack([B[:, i], C[np.ix_(i, j)].T, ahead[i].T]).T  # by columns, not copied
+        W = lapack.dtrtrs(L, rows, lower=1, overwrite_b=1)[0]
         W_kept, W_ahead = W[:, :stop], W[:, stop:]
-        S[:stop, :stop] -= W_kept.T @ W_kept
+        for columns in panels(stop):
+            S[columns.start : stop, columns] -= W_kept[:, columns.start :].T @ W_kept[:, columns]
         B = np.vstack([np.zeros((kept, len(following))), ahead[j]]) - W_kept.T @ W_ahead
         C = K[following][:, following].toarray() - W_ahead.T @ W_ahead
         kept = stop
         progress((step + 1) / len(lines))
-    return S
+    return mirrored(S)
 
 
 def part_key(part: PartModel) -> str:
@@ -115,7 +115,7 @@ def _condensed(part: PartModel, progress: Callable[[float], None]) -> Matrix:
         nx = len(part.plate.x)
         ascending = np.arange(len(S)).reshape(-1, nx)[::-1].ravel()
         S = S[np.ix_(ascending, ascending)]
-    return np.asfortranarray((S + S.T) / 2)
+    return S.T  # by columns, and symmetric to the last bit
 
 
 def condensed_load(

@@ -21,6 +21,7 @@ DENSE_BLOCK = 512  # unknowns: smaller bodies are put together into one dense bl
 SMALL = 50  # unknowns below which eigenvalues are computed densely
 LEAST_ROWS = 16  # of a panel
 NORM_STEPS = 5  # of the power method, for v
+PANEL = 256  # columns
 
 
 class DenseBlock(Block):
@@ -102,8 +103,10 @@ class DenseBlock(Block):
         inverse, info = lapack.dpotri(self.U)
         if info != 0:
             raise np.linalg.LinAlgError(f"dpotri returned {info}")
-        inverse += np.triu(inverse, 1).T  # its lower triangle is that of U, zero
-        Q: Matrix = A.T @ (A.T @ inverse).T
+        inverse = mirrored(inverse.T)
+        Q = np.empty((A.shape[1],) * 2, order="F")
+        for columns in panels(len(Q)):
+            Q[:, columns] = A.T @ (A[:, columns].T @ inverse).T
         return Q
 
     def extreme_eigenvalues(self) -> tuple[float, float]:
@@ -168,6 +171,21 @@ def dense_slices(K: sp.csr_array) -> list[slice]:
             found.append(slice(begin, end))
             begin = end
     return found
+
+
+def panels(count: int) -> Iterator[slice]:
+    """Of consecutive columns, so few that no copy of them is as large as the matrix."""
+    return (slice(first, min(first + PANEL, count)) for first in range(0, count, PANEL))
+
+
+def mirrored(M: Matrix) -> Matrix:
+    """M (n, n) itself, with its lower triangle as the upper one, too."""
+    for own in panels(len(M)):
+        after = slice(own.stop, None)
+        square = np.tril(M[own, own])
+        M[own, own] = square + np.tril(square, -1).T
+        M[own, after] = M[after, own].T
+    return M
 
 
 def cholesky(K: Matrix) -> Matrix:

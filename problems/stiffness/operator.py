@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from . import Indices, Matrix, Vector, balanced_units
 from .block import Block, NotPositiveDefinite, scaled
-from .dense import DenseBlock, dense_blocks
+from .dense import DenseBlock, dense_blocks, mirrored
 from .selected_inverse import BlockPart
 from .sparse import sparse_block
 
@@ -98,6 +98,7 @@ class Stiffness:
     def factors(self) -> list[NDArray[Any]]:
         """The arrays of the factors, made now if they were not."""
         self._make(self)
+        self._make = Stiffness.factor_blocks  # what made them may hold this K, in a cycle
         return [array for block in self.blocks for array in block.factor()]
 
     @property
@@ -164,12 +165,12 @@ class Stiffness:
     def compliance(self, A: sp.csc_array) -> Matrix:
         """Q = AᵀK⁻¹A, (m, m), mm/N, by columns."""
         m = A.shape[1]
-        Q = np.zeros((m, m))
+        Q = np.zeros((m, m), order="F")
         _ = self.factors
         for block, rows in self._own_rows():
             if m:
                 Q += block.compliance(sp.csc_array(A[rows]))
-        return np.asfortranarray((Q + Q.T) / 2)
+        return mirrored(Q)
 
     def local_compliance(
         self, A: sp.csc_array, windows: Sequence[Indices], single: bool = True

@@ -1,4 +1,5 @@
-"""A sparse block: a band if some numbering gives a narrow one, else K = LDLᵀ by SuperLU, without pivoting.
+"""A sparse block: a band if some numbering gives a narrow one, else a factor with little fill, by CHOLMOD
+where the extra `cholmod` is installed, or by SuperLU.
 
 Tried are the numbering as it is, the one along the longer side of the model, and Cuthill and McKee's; the
 first that is narrow enough is taken.
@@ -6,23 +7,21 @@ first that is narrow enough is taken.
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
-from scipy.sparse.linalg import splu
 
-from . import Indices, Matrix, Vector, gamma
-from . import U as ROUNDING
+from . import Indices, Matrix, U, Vector
 from .band import half_bandwidth
 from .banded import BandedBlock
 from .block import NotPositiveDefinite, SparseBlock, scaled
+from .superlu import SuperLU, moving_unknown
 
 BAND_TO_ROW = 50  # a band at most this many times longer than K's mean row is worth it
 WITH_INDICES = 1.5  # numbers of eight bytes per entry of a sparse matrix
-SOFT = 2.0**-30  # of an unknown's stiffness: springs that hold a mechanism
 AT_A_TIME = 64  # columns of K⁻¹A
 
 
@@ -48,8 +47,34 @@ def _orders(K: sp.csc_array, nodes: Matrix | None) -> Iterator[Indices]:
     yield reverse_cuthill_mckee(sp.csr_matrix(K), symmetric_mode=True)
 
 
+class GeneralFactor(Protocol):
+    """A factor of K. numbers : the float64 that it holds, if known. LinAlgError, where it is made, says that
+    K is not positive definite.
+    """
+
+    @property
+    def numbers(self) -> int | None: ...
+
+    def solve(self, b: Matrix) -> Matrix:
+        """K⁻¹b, b (N,) or (N, k)."""
+
+    def backward_error(self) -> float | None:
+        """A bound on ‖E‖₂, but for its rounding, where K + E is positive definite; None if there is none."""
+
+
+def general_factor(K: sp.csc_array, lost: float) -> GeneralFactor:
+    """lost : of an entry of the diagonal: a pivot that is not larger is but the rounding of a zero."""
+    try:
+        from .cholmod import Cholmod  # of an extra
+    except ImportError:
+        return SuperLU(K, lost)
+    return Cholmod(K, lost)
+
+
 class GeneralBlock(SparseBlock):
     """width : the least half-bandwidth that was found."""
+
+    factored = staticmethod(general_factor)
 
     def __init__(self, matrix: sp.csc_array, width: int) -> None:
         super().__init__(matrix)
@@ -59,56 +84,39 @@ class GeneralBlock(SparseBlock):
         return type(self)(matrix, self.width)
 
     @cached_property
-    def lu(self) -> Any:
-        return _factored(self.matrix, self.lost)
+    def made(self) -> GeneralFactor:
+        try:
+            return self.factored(self.matrix, self.lost)
+        except np.linalg.LinAlgError as error:
+            raise NotPositiveDefinite(moving_unknown(self.matrix, self.lost)) from error
 
     def factor(self) -> list[NDArray[Any]]:
-        _ = self.lu
-        return []  # SuperLU keeps its own
+        _ = self.made
+        return []  # libraries keep their own
 
     @property
     def numbers(self) -> int:
         """Without a narrow band L has about b² log₂ N entries, as in nested dissection of a square grid with
-        that half-bandwidth, for each body (George, SIAM J. Numer. Anal. 10:345–363, 1973). L and U are kept,
-        and their indices.
+        that half-bandwidth, for each body (George, SIAM J. Numer. Anal. 10:345–363, 1973). L and U are
+        counted, and their indices.
         """
-        if "lu" in vars(self):
-            return int(self.lu.L.nnz + self.lu.U.nnz)
+        if "made" in vars(self) and self.made.numbers is not None:
+            return self.made.numbers
         bodies = connected_components(self.matrix, directed=False)[0]
         dissected = bodies * self.width**2 * np.log2(self.size / bodies)
         return int(WITH_INDICES * 2 * min(self.size * self.width, dissected))
 
     def solve(self, b: Matrix) -> Matrix:
-        x: Matrix = self.lu.solve(np.asarray(b, dtype=float))
-        return x
+        return self.made.solve(b)
 
     def shifted(self, D: Vector, s: float) -> float | None:
-        """With B = fl(DKD − sI) after a symmetric permutation, the computed factors satisfy |B − LU| ≤
-        γ_{c+1} |L||U|, entry by entry and whatever the order of the sums; none has more terms than c, the
-        number of entries in the longest column of U (Higham 2002, theorem 9.3; γ_{2(c+2)} is used, for
-        multiplications by the reciprocal of a pivot). With P = diag(U) > 0 and F = U − PLᵀ, zero but for
-        rounding,
-
-            B = LPLᵀ + (B − LU) + LF,        λmin(B) ≥ −γ ‖|L||U|‖₂ − ‖|L||F|‖₂,
-
-        as LPLᵀ is positive definite. Both norms are at most √(‖·‖₁‖·‖_∞), by products with a vector of ones.
-        """
         shifted = sp.csc_array(scaled(self.matrix, D, D) - s * sp.eye_array(self.size))
         largest = float(abs(shifted.diagonal()).max())
         try:
-            lu = _factored(shifted, self.lost)
-        except NotPositiveDefinite:
+            error = self.factored(shifted, self.lost).backward_error()
+        except np.linalg.LinAlgError:
             return None
-        L, U = lu.L, lu.U
-        pivots = U.diagonal()
-        if not ((pivots > 0).all() and np.isfinite(U.data).all() and np.isfinite(L.data).all()):
-            return None
-        longest = int(np.diff(U.indptr).max())
-        product = sp.csc_array((L @ sp.diags_array(pivots)).T)
-        F = abs(U - product) + ROUNDING * abs(product)
-        for M in (L, U):
-            np.abs(M.data, out=M.data)
-        return gamma(2 * (longest + 2)) * _norm(L, U) + _norm(L, F) + ROUNDING * (largest + abs(s))
+        return None if error is None else error + U * (largest + abs(s))
 
     def compliance(self, A: sp.csc_array) -> Matrix:
         Q = np.empty(A.shape[1:] * 2)
@@ -116,33 +124,3 @@ class GeneralBlock(SparseBlock):
             some = slice(start, start + AT_A_TIME)
             Q[:, some] = A.T @ self.solve(A[:, some].toarray())
         return (Q + Q.T) / 2
-
-
-def _factored(K: sp.csc_array, lost: float) -> Any:
-    options = {"SymmetricMode": True}
-    try:
-        lu = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    except RuntimeError as error:  # exactly singular
-        raise NotPositiveDefinite(_moving_unknown(K)) from error
-    order = np.argsort(lu.perm_c)
-    # Where a pivot on the diagonal is zero, SuperLU takes another row, whose entry may be positive.
-    exchanged = np.argsort(lu.perm_r) != order
-    wrong = np.flatnonzero(~(lu.U.diagonal() > lost * abs(K.diagonal()[order])) | exchanged)
-    if wrong.size:
-        raise NotPositiveDefinite(int(order[wrong[0]]))
-    return lu
-
-
-def _moving_unknown(K: sp.csc_array) -> int:
-    """Where K is singular, the unknown that moves most, each in its own unit, if nothing else holds it."""
-    size = abs(K).max(axis=1).toarray().ravel()
-    size = np.where(size > 0, size, size.max(initial=0.0) or 1.0)
-    held = sp.csc_array(K + SOFT * sp.diags_array(size))
-    force = np.sqrt(size) * np.random.default_rng(0).standard_normal(len(size))
-    return int(np.argmax(abs(splu(held).solve(force)) * np.sqrt(size)))
-
-
-def _norm(P: Any, R: Any) -> float:
-    """‖PR‖₂ or more, for P, R ≥ 0, but for a relative rounding."""
-    ones = np.ones(P.shape[0])
-    return float(np.sqrt((P @ (R @ ones)).max() * (R.T @ (P.T @ ones)).max()))

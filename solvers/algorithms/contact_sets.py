@@ -20,6 +20,8 @@ Appl. 4:303–320, 1969),
 Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; what is left is for the next product with Q.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,15 +43,25 @@ GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoti
 
 @dataclass
 class OpenFactor:
-    """M, and its Cholesky factor on an open set, kept until another one is asked for."""
+    """M, and its Cholesky factor on an open set, kept until another one is asked for.
+
+    room : its own, where one factor follows another: fresh memory takes longer than the factor.
+    """
 
     M: BandedInverse
     last: BandFactor | None = None
+    room: Vector | None = None
 
     def __call__(self, N: Mask) -> BandFactor:
         if self.last is None or (self.last.S ^ N).any():
-            self.last = self.M.factor(N)
+            if self.room is None:
+                self.room = np.empty(self.M.band.size)
+            self.last = self.M.factor(N, self.room)
         return self.last
+
+    def copy(self) -> OpenFactor:
+        """With the same factor, but room of its own for the next one."""
+        return OpenFactor(self.M, self.last)
 
 
 def banded_set(factor: OpenFactor, start: TrialSolution, C: Mask) -> TrialSolution:

@@ -14,15 +14,15 @@ sweep, M's error carrying it into soft modes, up to √cond(Q) times as large. B
 far larger forces, it is computed anew.
 
 A case starts from λ + αw, w = D⁻¹Aᵀδf, D = diag(AᵀA), δf its load less that of the case before, or all of it.
-What fasteners press on two parts is a sum of columns of A: δf = Aw, α = 1 leaves x as it was. What contacts
-cannot carry is left to correct. α in [0, 1] makes ½λᵀQλ − pᵀλ least.
+What fasteners press on two parts is a sum of columns of A: then δf = Aw, Qw = δp + δg takes no product, and
+α = 1 leaves x as it was. What contacts cannot carry is left to correct. α in [0, 1] makes ½λᵀQλ − pᵀλ least.
 
 An edge of contact creeps by about a row of contacts per set. As long as λ is far from the solution, a product
 corrects more than further sets; so the limit on the sets of a sweep grows with the sweeps.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
@@ -98,8 +98,7 @@ class Sweeps:
         before = self.last or [self.solved(loads[0], tolerance)]
         self.last = self._sweep(self._begun([_nearest(before, each) for each in loads], loads), tolerance)
         for case in self.last:
-            if case.factor is not None:
-                case.factor.last = None  # as large as M for each; the next cases have other sets
+            case.factor = None  # as large as M for each; the next cases have other sets
         return [self.answer(case, tolerance) for case in self.last]
 
     def solved(
@@ -155,7 +154,9 @@ class Sweeps:
         """Load cases that start from the solutions of others, and from the forces αw of a change of f."""
         changes = [load - case.load for case, load in zip(solved, loads, strict=True)]
         w = np.column_stack([self.A.T @ change.f / self.squares for change in changes])
-        Qw, some = np.zeros_like(w), np.flatnonzero(w.any(axis=0))
+        left = np.column_stack([change.f for change in changes]) - self.A @ w
+        Qw = np.column_stack([change.p + change.g for change in changes])  # where δf = Aw
+        some = np.flatnonzero(left.any(axis=0))
         if len(some):
             Qw[:, some] = self.gaps(np.asfortranarray(w[:, some]), [changes[k] - changes[k] for k in some])
         begun = []
@@ -165,7 +166,7 @@ class Sweeps:
             force, y = share * force, y + share * moved
             lam = case.trial.lam + force
             C = np.where(force == 0, case.C, lam > 0)
-            factor = None if case.factor is None else replace(case.factor)
+            factor = None if case.factor is None else case.factor.copy()
             trial = TrialSolution(lam, y, float(abs(y).max(initial=0.0)))
             doubt = case.doubt + largest_rounding(self.own, load.p[self.order], lam)
             begun.append(Case(load, C, trial, factor, doubt=doubt))

@@ -2,6 +2,8 @@
 once.
 """
 
+import gc
+import weakref
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from problems.effects.installed_fasteners import InstalledFasteners
 from problems.effects.self_weight import SelfWeight
 from problems.effects.supports import Supports
 from problems.errors import InputError
+from problems.forms import Form
 from problems.forms.assembly import Assembly, Matrix
 from problems.model.condense import NotPositiveDefinite, condense
 from problems.model.effect import effect_class
@@ -208,3 +211,17 @@ def test_load_cases_of_some_effects_add_up_to_that_of_all() -> None:
         assert abs(whole.f - sum(each.f for each in alone)).max() <= 1e-12 * abs(whole.f).max()
     assert model_of(scene) is model_of(scene)
     assert prepared(scene).assembly.parts == prepared(scene, form="sparse").assembly.parts == ("a + b",)
+
+
+@pytest.mark.parametrize("form", ["sparse", "dual"])
+def test_factors_go_with_the_last_that_needs_them(form: Form) -> None:
+    """Without the garbage collector: gigabytes would wait for it in a cycle."""
+    data = prepared(read_scene("scaling/1170"), form=form)
+    _ = data.assembly.K.factors, data.approximate_inverse
+    K = weakref.ref(data.assembly.K)
+    gc.disable()
+    try:
+        del data
+        assert K() is None
+    finally:
+        gc.enable()

@@ -17,8 +17,11 @@ from harness.verification.balanced import independence, smallest_eigenvalue
 from problems.forms.assembly import Matrix, Vector
 from problems.stiffness import U, gamma
 from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.cholmod import Cholmod
 from problems.stiffness.dense import DenseBlock
 from problems.stiffness.operator import Stiffness
+from problems.stiffness.sparse import GeneralBlock, sparse_block
+from problems.stiffness.superlu import SuperLU
 
 KINDS = pytest.mark.parametrize("kind", [np.asfortranarray, sp.csc_array])
 Kind = Callable[[Any], Any]
@@ -109,8 +112,31 @@ def is_semidefinite(K: Matrix, D: Vector, kappa: float) -> bool:
     return True
 
 
+LIBRARIES = pytest.mark.parametrize("library", [SuperLU, Cholmod])
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 40])
+@LIBRARIES
+def test_the_margin_of_a_general_factor_is_that_of_the_theorem(library: Any, n: int) -> None:
+    """K = 11ᵀ + cI in units of 2⁻¹⁰: |L||U| and |L||L|ᵀ are K, whose norm is n 2²⁰."""
+    K = 2.0**20 * (np.ones((n, n)) + 1e-6 * np.eye(n))
+    error = Fraction(library(sp.csc_array(K), 0.0).backward_error())
+    assert 1 <= error / (Fraction(gamma(2 * (n + 2))) * n * 2**20) <= Fraction(6, 5)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@LIBRARIES
+def test_a_general_factor_proves_it_as_well(library: Any, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(GeneralBlock, "factored", staticmethod(library))
+    nearly_singular(seed, lambda K: GeneralBlock(K, K.shape[0]))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_lambda_min_is_proven_for_matrices_that_are_nearly_singular(seed: int) -> None:
+    nearly_singular(seed, sparse_block)
+
+
+def nearly_singular(seed: int, block: Callable[[sp.csc_array], Any]) -> None:
     """λmin from 1e-2 down to what rounding leaves, and below zero: κ is never above it."""
     random = np.random.default_rng(seed)
     n = int(random.integers(2, 11))
@@ -120,7 +146,7 @@ def test_lambda_min_is_proven_for_matrices_that_are_nearly_singular(seed: int) -
     proven = []
     for left in (1e-2, 1e-5, 1e-8, 1e-12, 1e-15, 1e-16, 0.0, -1e-16):
         near = sp.csc_array(K - sp.diags_array((least - left) / D**2))
-        held = Stiffness.of(near)
+        held = Stiffness([block(near)])
         units = held.units
         kappa = proven_in_units(held, units)
         if kappa > 0:

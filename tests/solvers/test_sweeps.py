@@ -24,6 +24,7 @@ from problems.load_cases.random_gaps import random_gaps
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 from solvers.algorithms import sweeps
+from solvers.algorithms.contact_sets import OpenFactor
 from solvers.algorithms.sweeps import Sweeps
 from solvers.base import Answer, WarmStart
 from solvers.kkt import with_p
@@ -114,6 +115,18 @@ def test_a_band_factor_solves_with_the_principal_submatrix(share: float, tmp_pat
     wanted = np.zeros(45)
     wanted[S] = np.linalg.solve(dense[np.ix_(S, S)], b[S])
     np.testing.assert_allclose(M.factor(S).solve(b), wanted, rtol=1e-10, atol=1e-12)
+
+
+def test_one_factor_takes_the_place_of_another_but_not_of_its_copy(tmp_path: Path) -> None:
+    data = prepared(read_scene(str(write_strip(tmp_path))))
+    M, rng = banded_inverse(data.Q, data.assembly.contact_nodes), np.random.default_rng(2)
+    (S, T), b = rng.random((2, 45)) < 0.5, rng.standard_normal(45)
+    wanted, factor = M.factor(S).solve(b), OpenFactor(M)
+    first, copy = factor(S), factor.copy()
+    np.testing.assert_array_equal(copy(T).solve(b), M.factor(T).solve(b))
+    assert factor(S) is first
+    np.testing.assert_array_equal(first.solve(b), wanted)
+    assert np.shares_memory(factor(T).L, first.L)
 
 
 def test_m_has_a_narrow_band_where_q_decays_alone() -> None:

@@ -1,0 +1,97 @@
+"""K = LDLᵀ by SuperLU, without pivoting; and which unknown moves where there is no such factor."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from . import Matrix, gamma
+from . import U as ROUNDING
+
+SOFT = 2.0**-30  # of an unknown's stiffness: springs that hold a mechanism
+
+
+class SuperLU:
+    """K (N, N). lost : of an entry of the diagonal: a pivot that is not larger is but the rounding of a zero.
+
+    Raises LinAlgError if K is not positive definite.
+    """
+
+    def __init__(self, K: sp.csc_array, lost: float) -> None:
+        try:
+            self.lu = _factored(K)
+        except RuntimeError as error:  # exactly singular
+            raise np.linalg.LinAlgError(str(error)) from error
+        if _wrong(self.lu, K, lost).any():
+            raise np.linalg.LinAlgError("a pivot is not positive")
+
+    def solve(self, b: Matrix) -> Matrix:
+        x: Matrix = self.lu.solve(np.asarray(b, dtype=float))
+        return x
+
+    @property
+    def numbers(self) -> int:
+        """L and U are kept."""
+        return int(self.lu.L.nnz + self.lu.U.nnz)
+
+    def backward_error(self) -> float | None:
+        """A bound on ‖E‖₂, but for its rounding, where K + E is positive definite; None if there is none.
+
+        After a symmetric permutation the computed factors satisfy |K − LU| ≤ γ_{c+1} |L||U|, entry by entry
+        and whatever the order of the sums; none has more terms than c, the number of entries in the longest
+        column of U (Higham 2002, theorem 9.3; γ_{2(c+2)} is used, for multiplications by the reciprocal of a
+        pivot). With P = diag(U) > 0 and F = U − PLᵀ, zero but for rounding,
+
+            K = LPLᵀ + (K − LU) + LF,        λmin(K) ≥ −γ ‖|L||U|‖₂ − ‖|L||F|‖₂,
+
+        as LPLᵀ is positive definite. Both norms are at most √(‖·‖₁‖·‖_∞), by products with a vector of ones.
+        """
+        L, U = self.lu.L, self.lu.U
+        pivots = U.diagonal()
+        if not ((pivots > 0).all() and np.isfinite(U.data).all() and np.isfinite(L.data).all()):
+            return None
+        longest = int(np.diff(U.indptr).max())
+        product = sp.csc_array((L @ sp.diags_array(pivots)).T)
+        F = abs(U - product) + ROUNDING * abs(product)
+        for M in (L, U):
+            np.abs(M.data, out=M.data)
+        return gamma(2 * (longest + 2)) * _norm(L, U) + _norm(L, F)
+
+
+def moving_unknown(K: sp.csc_array, lost: float) -> int:
+    """Of a K without a factor: one whose pivot is not positive, or that moves most if nothing else holds it,
+    each in its own unit.
+    """
+    try:
+        lu = _factored(K)
+        wrong = np.flatnonzero(_wrong(lu, K, lost))
+        if wrong.size:
+            return int(np.argsort(lu.perm_c)[wrong[0]])
+    except RuntimeError:
+        pass
+    size = abs(K).max(axis=1).toarray().ravel()
+    size = np.where(size > 0, size, size.max(initial=0.0) or 1.0)
+    held = sp.csc_array(K + SOFT * sp.diags_array(size))
+    force = np.sqrt(size) * np.random.default_rng(0).standard_normal(len(size))
+    return int(np.argmax(abs(splu(held).solve(force)) * np.sqrt(size)))
+
+
+def _factored(K: sp.csc_array) -> Any:
+    options = {"SymmetricMode": True}
+    return splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def _wrong(lu: Any, K: sp.csc_array, lost: float) -> Any:
+    """Which pivots are not positive. Where one on the diagonal is zero, SuperLU takes another row, whose
+    entry may be positive.
+    """
+    order = np.argsort(lu.perm_c)
+    exchanged = np.argsort(lu.perm_r) != order
+    return ~(lu.U.diagonal() > lost * abs(K.diagonal()[order])) | exchanged
+
+
+def _norm(P: Any, R: Any) -> float:
+    """‖PR‖₂ or more, for P, R ≥ 0, but for a relative rounding."""
+    ones = np.ones(P.shape[0])
+    return float(np.sqrt((P @ (R @ ones)).max() * (R.T @ (P.T @ ones)).max()))
