@@ -1,5 +1,6 @@
 """K = LDLᵀ by SuperLU, without pivoting; and which unknown moves where there is no such factor."""
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -63,13 +64,11 @@ def moving_unknown(K: sp.csc_array, lost: float) -> int:
     """Of a K without a factor: one whose pivot is not positive, or that moves most if nothing else holds it,
     each in its own unit.
     """
-    try:
+    with suppress(RuntimeError):  # exactly singular
         lu = _factored(K)
         wrong = np.flatnonzero(_wrong(lu, K, lost))
         if wrong.size:
             return int(np.argsort(lu.perm_c)[wrong[0]])
-    except RuntimeError:
-        pass
     size = abs(K).max(axis=1).toarray().ravel()
     size = np.where(size > 0, size, size.max(initial=0.0) or 1.0)
     held = sp.csc_array(K + SOFT * sp.diags_array(size))

@@ -156,7 +156,7 @@ class Sweeps:
         w = np.column_stack([self.A.T @ change.f / self.squares for change in changes])
         left = np.column_stack([change.f for change in changes]) - self.A @ w
         Qw = np.column_stack([change.p + change.g for change in changes])  # where δf = Aw
-        some = np.flatnonzero(left.any(axis=0))
+        some = np.flatnonzero(left.any(axis=0) & w.any(axis=0))
         if len(some):
             Qw[:, some] = self.gaps(np.asfortranarray(w[:, some]), [changes[k] - changes[k] for k in some])
         begun = []
