@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from PIL import Image
 
 from harness.planning.suite import read_suite
 from harness.results import records, series_file
@@ -52,6 +53,7 @@ NAMES = (
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
 #: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.
 KEPT_MIB = 5
+COLOURS = 256
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
 
@@ -138,6 +140,8 @@ def publish(name: str, directory: Path) -> None:
     if (directory / SERIES_FILE).exists():
         series_file.drop_gaps(directory)
     pack(directory)
+    for picture in directory.rglob("*.png"):
+        slim(picture)
     target, old = PUBLISHED / name, directory.with_name(f"{name}.old")
     PUBLISHED.mkdir(parents=True, exist_ok=True)
     if target.exists():
@@ -145,6 +149,13 @@ def publish(name: str, directory: Path) -> None:
         target.rename(old)
     directory.rename(target)
     shutil.rmtree(old, ignore_errors=True)
+
+
+def slim(picture: Path) -> None:
+    """Write it in 256 colours: a third of the size, and no eye sees it."""
+    with Image.open(picture) as image:
+        small = image.convert("RGB").quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    small.save(picture, optimize=True)
 
 
 def _unwanted(directory: Path) -> Iterator[Path]:

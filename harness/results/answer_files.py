@@ -47,7 +47,7 @@ def pack(directory: Path) -> None:
     folder = directory / "answers"
     files = sorted(folder.glob("*.npz"))
     if files:
-        with zipfile.ZipFile(directory / ARCHIVE, "w", zipfile.ZIP_DEFLATED) as archive:
+        with zipfile.ZipFile(directory / ARCHIVE, "w") as archive:
             for path in files:
-                archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes(), zipfile.ZIP_DEFLATED)
+                archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes(), zipfile.ZIP_LZMA)
         shutil.rmtree(folder)

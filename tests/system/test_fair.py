@@ -145,7 +145,6 @@ def took(row: Row) -> float:
     return float(row["time_limit_s"]) if row["status"] in ("time_limit", "not_run") else seconds(row)
 
 
-@pytest.mark.xfail(strict=True, reason="the first seventeen of 24 scenes are measured so far")
 def test_scenes_are_drawn() -> None:
     drawn = {f"drawn/{n}/{k}" for n in SIZES for k in range(8)}
     assert {row["scene"] for row in rows_of("speed")} == drawn
