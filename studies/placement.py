@@ -20,9 +20,9 @@ import numpy as np
 import pandas as pd
 
 from harness.placement.candidates import Movable, Place, Plan, grid, plan_of
-from harness.placement.opponents import bisected, farthest_plans, uniform_plans
 from harness.placement.search import Search, Step
 from harness.placement.session import Outcome, PlanSession, Question, Study
+from problems.forms.assembly import Matrix
 from problems.load_cases.random_gaps import random_gaps
 from problems.scene import scene_of
 from report.document.blocks import Section, Table, number, word
@@ -68,18 +68,21 @@ def opened(
     fasteners = {"kind": "fasteners", "preload": preload, "pattern": {"columns": 5, "rows": 1}}
     movable = Movable.of(scene_of({"title": "", "joint": table, "effect": [gap, fasteners]}))
     gaps = random_gaps(movable.bare, cases, 0)
-    return movable, PlanSession(Study(movable.bare, movable.fastener, gaps, "dual", threads=1))
+    return movable, PlanSession(Study(movable.bare, movable.fastener, gaps, "dual"))
 
 
-def search_of(session: PlanSession, allowed: int, limit: float = 0.0) -> tuple[Search, Counted]:
+def search_of(
+    session: PlanSession, candidates: Plan, allowed: int, limit: float = 0.0
+) -> tuple[Search, Counted]:
     ask, nodes = Counted(session), session.data.assembly.contact_nodes
     assert nodes is not None
-    return Search(ask, nodes, session.study.cases.count, allowed, limit), ask
+    study = session.study
+    return Search(ask, study.bare, nodes, candidates, study.cases.count, allowed, limit), ask
 
 
-def searched(search: Search, candidates: Plan, limit: float) -> Step:
+def searched(search: Search) -> Step:
     """As the command does."""
-    return search.fewest(search.whole(candidates), candidates, limit)[0]
+    return search.fewest(search.whole(search.candidates))[0]
 
 
 def added(search: Search, candidates: Plan, limit: float) -> Step:
@@ -90,6 +93,38 @@ def added(search: Search, candidates: Plan, limit: float) -> Step:
         values = search._values(step, plans)
         step = search.whole(min(zip(values, plans, strict=True))[1])
     return step
+
+
+def distances(session: PlanSession, places: Plan) -> Matrix:
+    """(k, k) ‖f_a − f_b‖ in the norm of K⁻¹, √(N·mm): how different what two fasteners do is. On the
+    diagonal ‖f_a‖.
+    """
+    F = np.column_stack([session.column(place)[0] for place in places])
+    G = F.T @ session.data.assembly.K.solve(F)
+    square = np.diag(G)[:, None] + np.diag(G) - G - G.T + np.diag(np.diag(G))
+    root: Matrix = np.sqrt(np.maximum(square, 0.0))
+    return root
+
+
+def farthest_plans(candidates: Plan, distances: Matrix) -> list[Plan]:
+    """First the fastener that does most, then each time the one whose effect is least like all before it: the
+    first 1, 2, … of them.
+    """
+    apart = distances - np.diag(np.diag(distances))
+    order = [int(np.argmax(np.diag(distances)))]
+    while len(order) < len(candidates):
+        order.append(int(np.argmax(apart[:, order].min(axis=1))))
+    return [tuple(sorted(candidates[k] for k in order[: count + 1])) for count in range(len(order))]
+
+
+def bisected(plans: Sequence[Plan], enough_mm: float, search: Search) -> list[Step]:
+    """The plans tried to find the first whose gap is enough, as if gaps shrank along them."""
+    tried, low, high = [], 0, len(plans)
+    while low < high:
+        middle = (low + high) // 2
+        tried.append(search.whole(plans[middle]))
+        low, high = (low, middle) if tried[-1].gap_mm <= enough_mm else (middle + 1, high)
+    return tried
 
 
 def at_random(search: Search, ask: Counted, candidates: Plan, limit: float, budget: int) -> Step:
@@ -107,8 +142,8 @@ def compared(name: str, scatter: str) -> tuple[list[dict[str, Any]], list[dict[s
     table, preload, (rows, columns) = JOINTS[name]
     movable, session = opened(table, preload, *SCATTERS[scatter], CASES)
     candidates, allowed = plan_of(grid(movable.bare, rows, columns)), int((1 - SHARE) * CASES + 1e-9)
-    limit = LIMIT * search_of(session, allowed)[0].whole(candidates).gap_mm
-    search, ask = search_of(session, allowed, limit)
+    limit = LIMIT * search_of(session, candidates, allowed)[0].whole(candidates).gap_mm
+    search, ask = search_of(session, candidates, allowed, limit)
     lines: list[dict[str, Any]] = []
 
     def line(method: str, started: float, count: int, steps: Sequence[Step]) -> None:
@@ -126,12 +161,11 @@ def compared(name: str, scatter: str) -> tuple[list[dict[str, Any]], list[dict[s
         line(method, started, count, steps)
         return list(steps)
 
-    (best,) = timed("removal and exchange", lambda: [searched(search, candidates, limit)])
+    (best,) = timed("removal and exchange", lambda: [searched(search)])
     budget = ask.count
-    plans = uniform_plans(movable.bare, len(candidates) + 1)
-    timed("uniform patterns", lambda: [s for p in plans for s in bisected(p, limit, search.whole)])
-    far = farthest_plans(candidates, session.distances(candidates))
-    timed("farthest points", lambda: bisected(far, limit, search.whole))
+    timed("uniform patterns", lambda: list(search.uniform()))
+    far = farthest_plans(candidates, distances(session, candidates))
+    timed("farthest points", lambda: bisected(far, limit, search))
     timed("greedy adding", lambda: [added(search, candidates, limit)])
     start = ask.count
     timed("random plans", lambda: [at_random(search, ask, candidates, limit, start + budget)])
@@ -168,9 +202,9 @@ def optimal(seed: int) -> dict[str, Any]:
     sd = float(random.uniform(0.05, 0.15))
     movable, session = opened(table, float(random.integers(50, 400)), sd, 80.0, SMALL_CASES)
     candidates = plan_of(grid(movable.bare, rows, columns))
-    limit = float(random.uniform(1.2, 3.0)) * search_of(session, 1)[0].whole(candidates).gap_mm
-    search, ask = search_of(session, 1, limit)
-    best = searched(search, candidates, limit)
+    limit = float(random.uniform(1.2, 3.0)) * search_of(session, candidates, 1)[0].whole(candidates).gap_mm
+    search, ask = search_of(session, candidates, 1, limit)
+    best = searched(search)
     solved = ask.count
     optimum = len(best.plan)
     for count in range(len(best.plan)):

@@ -9,15 +9,10 @@ import typer
 
 from .options import SceneName, error_reporting, option
 
-LIMIT_MM = 0.05
-
 
 def explore(
     scene: SceneName,
-    allow_gap: Annotated[float, option("MM", "The limit to begin with.", min=0.0)] = LIMIT_MM,
-    port: Annotated[
-        int, option("PORT", "Port on this machine.  [default: a free one]", min=0, max=65535)
-    ] = 0,
+    allow_gap: Annotated[float, option("MM", "The limit to begin with.", min=0.0)] = 0.05,
     open_browser: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
     ] = True,
@@ -44,7 +39,6 @@ def explore(
         except ImportError as error:
             allowed = f"needs Bokeh: pip install 'rivetbench[explore]' ({error})"
             raise InputError.one("explore", "bokeh", "not installed", allowed) from error
-        from rich.text import Text
 
         from harness.explore.answers import Explorer, Settings
         from harness.planning.form_choice import chosen_form
@@ -57,7 +51,7 @@ def explore(
         read = read_scene(scene)
         settings = Settings.of(read)
         assert isinstance(read, JointScene)
-        with console.status(Text("matrices, and the first answer")):
+        with console.status("matrices, and the first answer"):
             explorer = Explorer(read, chosen_form(read, FORMS, None).form)
             first = explorer.answer(settings)
 
@@ -66,4 +60,4 @@ def explore(
             if open_browser:
                 webbrowser.open(address)
 
-        serve(explorer, scene, allow_gap, first, port, ready)
+        serve(explorer, scene, allow_gap, first, ready)

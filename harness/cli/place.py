@@ -8,19 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import (
-    Around,
-    Cases,
-    Gaps,
-    Length,
-    Mean,
-    SceneName,
-    Scheduler,
-    Seed,
-    Spread,
-    error_reporting,
-    option,
-)
+from . import options
+from .options import error_reporting, option
 
 if TYPE_CHECKING:
     from problems.load_cases import LoadCases
@@ -28,15 +17,11 @@ if TYPE_CHECKING:
 
 
 def place(
-    scene: SceneName,
+    scene: options.SceneName,
     out: Annotated[Path, option("DIR", "Output directory.")],
     candidates: Annotated[
         str | None,
-        option(
-            "HOLES",
-            "Rows x columns of the junction, as 4x32, or a CSV with x and y in mm.  [default: the "
-            "scene's own fasteners]",
-        ),
+        option("HOLES", "Rows x columns, as 4x32, or a CSV with x and y in mm.  [default: the scene's own]"),
     ] = None,
     allow_gap: Annotated[
         float | None, option("MM", "Find the fewest fasteners that leave no larger gap.", min=0.0)
@@ -44,21 +29,16 @@ def place(
     count: Annotated[int | None, option("N", "Find the best N fasteners instead.", min=1)] = None,
     share: Annotated[
         float | None,
-        option(
-            "SHARE",
-            "Of the cases, in which the gap must be kept.  [default: 0.95; of one case, 1]",
-            min=0.01,
-            max=1.0,
-        ),
+        option("SHARE", "Of the cases that must keep it.  [default: 0.95; of one, 1]", min=0.01, max=1.0),
     ] = None,
-    cases: Cases = None,
-    seed: Seed = None,
-    mean: Mean = None,
-    sd: Spread = None,
-    correlation_length: Length = None,
-    around: Around = None,
-    gaps: Gaps = None,
-    scheduler: Scheduler = None,
+    cases: options.Cases = None,
+    seed: options.Seed = None,
+    mean: options.Mean = None,
+    sd: options.Spread = None,
+    correlation_length: options.Length = None,
+    around: options.Around = None,
+    gaps: options.Gaps = None,
+    scheduler: options.Scheduler = None,
 ) -> None:
     """Find the fewest fasteners that keep a gap in most load cases, or the best N, and their order.
 
@@ -99,14 +79,11 @@ def place(
         movable = Movable.of(read)
         holes = movable.candidates(candidates)
         given = GivenCases(cases, seed, mean, sd, correlation_length, around, gaps)
-        faults = []
+        faults = given.faults()
         if allow_gap is None and count is None:
             faults.append(Fault("place", "goal", None, "--allow-gap MM, or --count N"))
         if count is not None and count > len(holes):
             faults.append(Fault("--count", "N", count, f"at most {len(holes)}, the candidates"))
-        if gaps and given.drawn:
-            mixed = " ".join(["--gaps", *given.drawn])
-            faults.append(Fault("place", "cases", mixed, "random gaps or --gaps"))
         if faults:
             raise InputError(faults)
         one = not (gaps or given.drawn or cases) and not any(
@@ -122,7 +99,7 @@ def place(
 
         bare = cases_of(movable.bare)
         share = share if share is not None else (1.0 if bare.count == 1 else 0.95)
-        study = Study(movable.bare, movable.fastener, bare, choice.form, threads=1)
+        study = Study(movable.bare, movable.fastener, bare, choice.form)
         facts = {"solver_version": made.version, "solver_code": made.code}
         goal = Goal(allow_gap, share, count)
         raise typer.Exit(run(scene, movable, holes, goal, cases_of, study, facts, out, console, scheduler))

@@ -110,10 +110,7 @@ def series(
 
         refuse_unusable(allow_gap)
         given = GivenCases(cases, seed, mean, sd, correlation_length, around, gaps)
-        faults = []
-        if (gaps and sweep) or (given.drawn and (gaps or sweep)):
-            mixed = [*(["--gaps"] if gaps else []), *(["--sweep"] if sweep else []), *given.drawn]
-            faults.append(Fault("series", "cases", " ".join(mixed), "random gaps, --gaps or --sweep"))
+        faults = given.faults(sweep or ())
         if sweep and cases is not None:
             faults.append(Fault("--cases", "cases", cases, "a sweep has one per combination of values"))
         signal.signal(signal.SIGTERM, signal.default_int_handler)

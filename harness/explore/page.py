@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable
-from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -17,16 +16,9 @@ import numpy as np
 from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
 from bokeh.layouts import column, row
-from bokeh.models import (
-    Button,
-    ColorBar,
-    ColumnDataSource,
-    Div,
-    LinearColorMapper,
-    PointDrawTool,
-    Slider,
-    TextInput,
-)
+from bokeh.models import Button, ColorBar, ColumnDataSource, Div, Slider, TextInput
+from bokeh.models.mappers import LinearColorMapper
+from bokeh.models.tools import PointDrawTool
 from bokeh.plotting import figure
 from bokeh.server.server import Server
 
@@ -43,7 +35,6 @@ OVER = "#D55E00"  # gaps above the limit
 STALE = 0.35  # opacity of an answer to other settings
 WIDE = 760  # pixels of a map
 TALLEST, LOWEST = 420, 150
-HERE = "127.0.0.1"
 PROOF_MS = 50  # after the first change that is not proven: the map comes before
 
 
@@ -210,25 +201,18 @@ def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
 
 
 def serve(
-    explorer: Explorer, source: str, limit_mm: float, first: Answer, port: int, ready: Callable[[str], None]
+    explorer: Explorer, source: str, limit_mm: float, first: Answer, ready: Callable[[str], None]
 ) -> None:
     """Serve pages to this machine alone, under an address that nobody can guess, until interrupted."""
     token = secrets.token_urlsafe(16)
-    application = Application(FunctionHandler(partial(_page, explorer, source, limit_mm, first)))
-    try:
-        server = Server({f"/{token}": application}, address=HERE, port=port, use_index=False)
-    except OSError as error:
-        raise InputError.one("explore", "--port", port, f"a free one: {error}") from error
+    application = Application(FunctionHandler(lambda each: Page(explorer, source, limit_mm, first, each)))
+    server = Server({f"/{token}": application}, address="127.0.0.1", port=0, use_index=False)
     server.start()
     ready(f"http://localhost:{server.port}/{token}")
     try:
         server.io_loop.start()
     finally:
         server.stop()
-
-
-def _page(explorer: Explorer, source: str, limit_mm: float, first: Answer, document: Any) -> None:
-    Page(explorer, source, limit_mm, first, document)
 
 
 def _slider(title: str, value: float) -> Slider:

@@ -98,8 +98,7 @@ def outcomes_of(scheduler: str | None, directory: Path, console: Console) -> Ite
     if scheduler is None:
         yield lambda tasks: ((pending, run_task(task, directory / "answers")) for pending, task in tasks)
         return
-    with workers(scheduler) as (executor, count):
-        console.print(f"{count} workers at {scheduler}")
+    with workers(scheduler, console) as (executor, count):
         yield partial(done_as_completed, executor, count, run_task_on_worker)
 
 

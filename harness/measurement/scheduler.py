@@ -15,6 +15,8 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from rich.console import Console
+
 from harness.results.provenance import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
 from problems.storage import ROOT, fingerprint
@@ -30,8 +32,8 @@ TASKS_PER_WORKER = 2  # one running, one waiting
 
 
 @contextmanager
-def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
-    """An executor on the workers and how many there are.
+def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
+    """An executor on the workers and how many there are, which is also told.
 
     Raises InputError if Dask is not installed, the scheduler does not answer or has no worker, or a worker
     has more than one thread or other versions than this process.
@@ -52,7 +54,7 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
             )
         try:
             with cluster, Client(cluster) as client, _silent_if_interrupted():
-                yield _connected(client, scheduler)
+                yield _connected(client, scheduler, console)
         finally:
             logging.disable(logging.NOTSET)
         return
@@ -61,7 +63,7 @@ def workers(scheduler: str) -> Iterator[tuple[Executor, int]]:
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError.one("--scheduler", "scheduler", scheduler, f"does not answer: {error}") from error
     with client:
-        yield _connected(client, scheduler)
+        yield _connected(client, scheduler, console)
 
 
 @contextmanager
@@ -103,7 +105,7 @@ def threads_per_worker(scheduler: str | None) -> int | None:
     return None if count is None else max(usable_cores() // count, 1)
 
 
-def _connected(client: Any, scheduler: str) -> tuple[Executor, int]:
+def _connected(client: Any, scheduler: str, console: Console) -> tuple[Executor, int]:
     threads = client.nthreads()
     faults = [
         Fault(f"worker {address}", "nthreads", n, "start it with --nthreads 1: a measurement needs it alone")
@@ -115,6 +117,7 @@ def _connected(client: Any, scheduler: str) -> tuple[Executor, int]:
     faults += _other_versions(client)
     if faults:
         raise InputError(faults)
+    console.print(f"{len(threads)} workers at {scheduler}")
     return client.get_executor(pure=False, retries=RETRIES), len(threads)
 
 

@@ -13,9 +13,7 @@ from harness.measurement.scheduler import done_as_completed
 from harness.placement.session import Outcome, Question, Study, answer
 from harness.results import records
 from harness.results.records import to_line
-from problems.errors import Fault, InputError
 
-OTHER = "name another directory with --out"
 PLANS = "plans.jsonl"
 
 
@@ -34,8 +32,8 @@ class Asked:
         first, *rows = records.read(path) or [{}]
         if not first:
             records.append(path, identity)
-        elif faults := _differences(path, first, identity):
-            raise InputError(faults)
+        else:
+            records.refuse_other(path, first, identity)
         self.known = {to_line(row["question"]): _outcome(row) for row in rows}
 
     def __call__(self, questions: Sequence[Question]) -> list[Outcome]:
@@ -60,11 +58,3 @@ class Asked:
 def _outcome(row: dict[str, Any]) -> Outcome:
     largest = tuple(inf if value is None else value for value in row["largest"])
     return Outcome(largest, tuple(row["contact"]), tuple(row["mean"]))
-
-
-def _differences(path: Path, before: dict[str, Any], now: dict[str, Any]) -> list[Fault]:
-    return [
-        Fault(str(path), key, before.get(key), f"now {value!r}: {OTHER}")
-        for key, value in records.parsed(to_line(now)).items()
-        if before.get(key) != value
-    ]

@@ -18,6 +18,7 @@ Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
 
 ROWS_AND_COLUMNS = re.compile(r"([1-9]\d{0,3})x([1-9]\d{0,3})")
+ROWS = range(1, 5)  # of uniform plans
 DIGITS = 6  # of a place in mm: to the nanometre
 
 
@@ -90,6 +91,16 @@ def _twice(points: Matrix, source: str) -> list[Fault]:
 
 def plan_of(points: Matrix) -> Plan:
     return tuple(sorted({(x, y) for x, y in points.round(DIGITS).tolist()}))
+
+
+def uniform_plans(bare: JointScene, count: int) -> list[Plan]:
+    """Of so many fasteners, in rows that differ by one at most: at the middles of equal cells."""
+    plans = []
+    for rows in ROWS[:count]:
+        columns = [count // rows + (row < count % rows) for row in range(rows)]
+        lines = [grid(bare, rows, c).reshape(rows, c, 2)[row] for row, c in enumerate(columns)]
+        plans.append(plan_of(np.vstack(lines)))
+    return plans
 
 
 def grid(scene: JointScene, rows: int, columns: int) -> Matrix:

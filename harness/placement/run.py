@@ -7,24 +7,21 @@ DIRECTORY/own, on the scenes as a user would read them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict, dataclass
+from itertools import islice
 from math import ceil, floor, log
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from rich.console import Console
-from rich.text import Text
 
 from harness.measurement.scheduler import workers
 from harness.placement.asked import PLANS, Asked
-from harness.placement.candidates import Movable, Plan
-from harness.placement.opponents import bisected, farthest_plans, uniform_plans
-from harness.placement.search import Search, Step
-from harness.placement.session import Study, distances
+from harness.placement.candidates import Movable, Plan, uniform_plans
+from harness.placement.search import Search, Step, Values
+from harness.placement.session import THREADS, Study
 from harness.results import records
 from harness.results.provenance import installed_version, provenance
 from harness.scene.edited import edited, with_fasteners
@@ -65,9 +62,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Found:
-    """steps : all plans that were kept. best : that of the goal; None if all candidates do not keep the
-    limit. order : the plans while it is set, with 0, 1, … fasteners.
-    """
+    """best : None if all candidates do not keep the limit. order : the plans with 0, 1, … fasteners set."""
 
     steps: list[Step]
     best: Step | None
@@ -94,68 +89,50 @@ def run(
     nodes = prepared(study.bare, form=study.form).assembly.contact_nodes
     assert nodes is not None  # of a joint
     with records.locked(directory, (), other=records.MEASUREMENTS):
-        with _workers(scheduler, console) as where, _showing(console) as said:
+        pool = workers(scheduler, console) if scheduler else nullcontext()
+        with pool as where, _showing(console) as said:
             ask = Asked(study, directory / PLANS, _identity(study), where)
-            search = Search(ask, nodes, study.cases.count, allowed, goal.limit_mm or 0.0, said)
-            found = searched(search, movable, candidates, goal, lambda: _distances(study, candidates, where))
+            limit_mm = goal.limit_mm or 0.0
+            search = Search(ask, study.bare, nodes, candidates, study.cases.count, allowed, limit_mm, said)
+            found = searched(search, movable.own, goal)
         plans = {"own": movable.own} | ({"plan": found.best.plan} if found.best else {})
         for name, plan in plans.items():
             path = directory / f"{name}.toml"
             records.replace_text(path, edited(source, directory, with_fasteners(plan)))
             scene = read_scene(str(path))
-            limits = SERIES_TOLERANCE, LIMIT_MM, 0, study.threads
-            job = Job(scene, cases_of(scene), "newton", study.form, *limits)
+            job = Job(scene, cases_of(scene), "newton", study.form, SERIES_TOLERANCE, LIMIT_MM, 0, THREADS)
             run_series(job, facts, directory / name, console)
             pd.DataFrame(plan, columns=["x", "y"]).to_csv(directory / f"{name}.csv", index=False)
+        words, code = _said(found, goal, nodes)
         record = _record(study, movable, candidates, goal, found, nodes)
-        records.replace_object(directory / RECORD, record)
+        records.replace_object(directory / RECORD, record | {"said": words})
         from report.writers.place import write  # slow to import: not before the search
 
         console.print(f"Report: {write(directory)}")
-        return _show(found, goal, nodes, console)
+        console.print(words, style="green" if code == DONE else "red")
+        return code
 
 
-def searched(
-    search: Search, movable: Movable, candidates: Plan, goal: Goal, apart: Callable[[], Matrix]
-) -> Found:
-    """All candidates, the scene's own plan, removal and exchange, the patterns and points to beat, the order.
-
-    apart : gives the distances of the candidates.
-    """
-    steps = [search.whole(candidates, "all candidates")]
-    if movable.own != candidates:
-        steps.append(search.whole(movable.own, "own"))
-    limit = goal.limit_mm
+def searched(search: Search, own: Plan, goal: Goal) -> Found:
+    """All candidates, the scene's own plan, uniform patterns, removal and exchange, the order."""
+    steps = [search.whole(search.candidates, "all candidates")]
+    if own != search.candidates:
+        steps.append(search.whole(own, "own"))
     if goal.count is None:
-        assert limit is not None
-        if steps[0].gap_mm > limit:
+        if steps[0].gap_mm > search.limit_mm:
             return Found(steps, None, [])
-        best, way = search.fewest(steps[0], candidates, limit)
-        steps += way
+        best, way = search.fewest(steps[0])
+        steps += [*way, *search.uniform()]
     else:
-        way, removal = [steps[0]], search.removal(steps[0])
-        while len(way[-1].plan) > goal.count:
-            way.append(next(removal))
-        best = search.exchanged(way[-1], candidates, limit or 0.0)
-        steps += [*way[1:], best]
-    steps += _opponents(search, movable, candidates, goal, apart())
+        before: Values = {}
+        more = len(search.candidates) - goal.count
+        steps += (way := list(islice(search.removal(steps[0], before), max(more - 1, 0))))
+        best = [steps[0], *way][-1]
+        if more:
+            steps.append(best := search.fewer(best, before)[0])
+        steps += search.wholes(uniform_plans(search.bare, goal.count), "uniform")
     order = [best, *search.removal(best)]
     return Found(steps, best, order[::-1])
-
-
-def _opponents(
-    search: Search, movable: Movable, candidates: Plan, goal: Goal, apart: Matrix
-) -> Iterator[Step]:
-    """Uniform patterns and farthest points: of as many fasteners, or the fewest that keep the limit."""
-    families = {"uniform": uniform_plans(movable.bare, len(candidates) + 1)}
-    families["farthest points"] = [farthest_plans(candidates, apart)]
-    for name, family in families.items():
-        for plans in family:
-            if goal.count is None:
-                assert goal.limit_mm is not None
-                yield from bisected(plans, goal.limit_mm, partial(search.whole, moved=name))
-            else:
-                yield from search.wholes([plan for plan in plans if len(plan) == goal.count], name)
 
 
 def _identity(study: Study) -> dict[str, Any]:
@@ -165,7 +142,6 @@ def _identity(study: Study) -> dict[str, Any]:
         "cases_key": study.cases.key,
         "cases": study.cases.count,
         "form": study.form,
-        "threads": study.threads,
         "rivetbench_version": installed_version("rivetbench"),
     }
 
@@ -190,9 +166,7 @@ def _record(
         "title": study.bare.title,
         "cases": study.cases.count,
         "preload": study.fastener.preload,
-        "limit_mm": goal.limit_mm,
-        "share": goal.share,
-        "count": goal.count,
+        **asdict(goal),
         "candidates": candidates,
         "own": movable.own,
         "steps": [step(each) for each in found.steps],
@@ -202,51 +176,30 @@ def _record(
     }
 
 
-def _show(found: Found, goal: Goal, nodes: Matrix, console: Console) -> int:
-    """Print the outcome; returns the exit code."""
-    of = f"in {goal.share:.4g} of the cases" if goal.share < 1 else "in every case"
+def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
+    """The outcome in words, and the exit code."""
+    of = f"in {100 * goal.share:.4g} % of the cases" if goal.share < 1 else "in every case"
     step = found.best or found.steps[0]
-    fails = goal.limit_mm is not None and step.gap_mm > goal.limit_mm
     left = f"{len(step.plan)} fasteners leave at most {step.gap_mm:.3g} mm {of}, proven"
-    if not fails:
-        console.print(f"{left}.", style="green")
-        return DONE
+    if goal.limit_mm is None or step.gap_mm <= goal.limit_mm:
+        return f"{left}.", DONE
     x, y = nodes[step.outcome.contact[step.worst]]
     all_set = "all of the " if found.best is None else ""
-    console.print(
-        f"FAIL: {all_set}{left}, {step.gap_mm - (goal.limit_mm or 0.0):.3g} mm more than allowed; case "
-        f"{step.worst} is the worst, at ({x:.4g}, {y:.4g}) mm.",
-        style="red",
-    )
-    return GAP_EXCEEDED
-
-
-def _distances(study: Study, places: Plan, where: tuple[Executor, int] | None) -> Matrix:
-    if where is None:
-        return distances((study, places))
-    return where[0].submit(distances, (study, places)).result()
-
-
-@contextmanager
-def _workers(scheduler: str | None, console: Console) -> Iterator[tuple[Executor, int] | None]:
-    if scheduler is None:
-        yield None
-        return
-    with workers(scheduler) as (executor, count):
-        console.print(f"{count} workers at {scheduler}")
-        yield executor, count
+    more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
+    worst = f"case {step.worst} is the worst, at ({x:.4g}, {y:.4g}) mm"
+    return f"FAIL: {all_set}{left}, {more}; {worst}.", GAP_EXCEEDED
 
 
 @contextmanager
 def _showing(console: Console) -> Iterator[Callable[[Step], None]]:
     """Shows each plan that is kept."""
-    with console.status(Text("all candidates")) as status:
+    with console.status("all candidates") as status:
         kept = 0
 
         def said(step: Step) -> None:
             nonlocal kept
             kept += 1
-            fasteners = f"{len(step.plan)} fasteners, {step.moved}: {step.gap_mm:.3g} mm"
-            status.update(Text(f"{fasteners} ({kept} plans proven)"))
+            plan = f"{len(step.plan)} fasteners, {step.moved}: {step.gap_mm:.3g} mm"
+            status.update(f"{plan} ({kept} plans proven)")
 
         yield said

@@ -9,12 +9,13 @@ estimated on the cases that decide about G: twice the number that may fail and 8
 before. Their G is never above that of all. Each plan that is kept is then solved in all cases, and proven.
 
 Removal takes out the fastener without which φ is least, or an eighth of the plan, those without which it is
-least one by one, as long as the limit is kept. What removing one costs grows, as a rule, with each other that
-is gone, so that values of earlier steps are tried in their order until none can be less (the lazy greedy
-method: Minoux, Optimization Techniques, 234–243, 1978).
+least one by one, no two next to each other, as long as the limit is kept. What removing one costs grows, as
+a rule, with each other that is gone, so that values of earlier steps are tried in their order until none can
+be less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 1978).
 
 Exchange moves a fastener to one of the free holes next to where the gap is too large: one of the nearest, or
-of those that are needed least. The best move is made as long as it makes φ less.
+of those that are needed least. The best move is made as long as it makes φ less. It starts from the two plans
+of least φ among the one without the fastener that is needed least, and uniform ones of as many.
 """
 
 from __future__ import annotations
@@ -26,19 +27,23 @@ from typing import TypeAlias
 
 import numpy as np
 
-from harness.placement.candidates import Place, Plan
+from harness.placement.candidates import ROWS, Place, Plan, grid, plan_of, uniform_plans
 from harness.placement.session import Outcome, Question
 from problems.forms.assembly import Matrix
+from problems.model.scene import JointScene
 
 Ask: TypeAlias = Callable[[Sequence[Question]], list[Outcome]]
 Value: TypeAlias = tuple[float, float]
+Values: TypeAlias = dict[Place, Value]
 
 BLOCK = 50  # cases that are solved together
-MORE_CASES = 8  # than twice those that may fail, in an estimate
+MORE_CASES = 8  # than twice those that may fail, in an estimate: of fewer, a plan's worst may be new ones
 AT_ONCE = 8  # plans that are tried together
-SHARE_AT_ONCE = 8  # a plan's share that is taken out at once, as long as that keeps the limit
 NONE = (0.0, 0.0)  # less than any φ
 HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners needed least
+SHARE_AT_ONCE = 8  # a plan's share that is taken out at once, as long as that keeps the limit
+NEXT = 3  # a fastener and those next to it
+STARTS = 2  # of an exchange
 FURTHER = 1.25  # times what is enough: how far removal goes on
 DIGITS = 6  # of mm: values closer than a nanometre are equal, whatever the rounding
 
@@ -58,23 +63,20 @@ class Step:
         return max(range(len(self.outcome.largest)), key=lambda k: self.outcome.largest[k])
 
 
+@dataclass
 class Search:
-    """ask : answers questions. contacts : (m, 2) their places, mm. cases : K. allowed : ⌊(1 − share) K⌋.
-
-    said : told of each plan that is kept.
+    """ask : answers questions. bare : the scene without fasteners. contacts : (m, 2) their places, mm.
+    cases : K. allowed : ⌊(1 − share) K⌋. said : told of each plan that is kept.
     """
 
-    def __init__(
-        self,
-        ask: Ask,
-        contacts: Matrix,
-        cases: int,
-        allowed: int,
-        limit_mm: float,
-        said: Callable[[Step], None] = lambda step: None,
-    ) -> None:
-        self.ask, self.contacts, self.cases = ask, contacts, cases
-        self.allowed, self.limit_mm, self.said = allowed, limit_mm, said
+    ask: Ask
+    bare: JointScene
+    contacts: Matrix
+    candidates: Plan
+    cases: int
+    allowed: int
+    limit_mm: float
+    said: Callable[[Step], None] = lambda step: None
 
     def gap(self, outcome: Outcome) -> float:
         """G, mm, of all cases, or of those in the outcome."""
@@ -96,43 +98,73 @@ class Search:
             self.said(steps[-1])
         return steps
 
-    def fewest(self, start: Step, candidates: Plan, enough_mm: float) -> tuple[Step, list[Step]]:
-        """The smallest plan found whose gap is enough, as that of `start` is, and every plan on the way."""
+    def uniform(self) -> Iterator[Step]:
+        """What is tried to find the fewest fasteners in a uniform pattern: for each number of rows the most
+        columns, then by bisection, as if gaps shrank with more of them.
+        """
+        fewest = len(self.candidates) + 1
+        for rows in ROWS:
+            columns = (fewest - 1) // rows
+            low, high = 1, columns + 1
+            while low < high:
+                yield (step := self.whole(plan_of(grid(self.bare, rows, columns)), "uniform"))
+                if step.gap_mm <= self.limit_mm:
+                    high, fewest = columns, rows * columns
+                else:
+                    low = columns + 1
+                columns = (low + high) // 2
+
+    def fewest(self, start: Step) -> tuple[Step, list[Step]]:
+        """The smallest plan found that keeps the limit, as `start`, all candidates, does; all on the way."""
         best, steps, before = start, list[Step](), dict[Place, Value]()
         while (count := len(best.plan) // SHARE_AT_ONCE) > 1:
             steps.append(step := self._without_least(best, before, count))
-            if step.gap_mm > enough_mm:
+            if step.gap_mm > self.limit_mm:
                 break
             best = step
+        known = dict(before)
         for step in self.removal(best, before):
             steps.append(step)
-            if step.gap_mm <= enough_mm:
-                best = step
-            elif step.gap_mm > FURTHER * enough_mm:
+            if step.gap_mm <= self.limit_mm:
+                best, known = step, dict(before)
+            elif step.gap_mm > FURTHER * self.limit_mm:
                 break
         while best.plan:
-            fewer = self.exchanged(next(self.removal(best)), candidates, enough_mm)
-            if fewer.gap_mm > enough_mm:
+            fewer, known = self.fewer(best, known)
+            if fewer.gap_mm > self.limit_mm:
                 break
             steps.append(best := fewer)
         return best, steps
 
-    def removal(self, step: Step, before: dict[Place, Value] | None = None) -> Iterator[Step]:
+    def fewer(self, step: Step, before: Values) -> tuple[Step, Values]:
+        """The best that exchange makes of plans with one fastener less, and the values on its way."""
+        even = uniform_plans(self.bare, len(step.plan) - 1)
+        starts: dict[Plan, Values] = {onto(plan, self.candidates): {} for plan in even}
+        starts[without(step.plan, self._least(step, before, 1)[0])] = before
+        made: list[tuple[Step, Values]] = []
+        for _, plan in sorted(zip(self._values(step, list(starts)), starts, strict=True))[:STARTS]:
+            made.append((self.exchanged(self.whole(plan, "exchange"), starts[plan]), starts[plan]))
+            if made[-1][0].gap_mm <= self.limit_mm:
+                break
+        return min(made, key=lambda each: each[0].gap_mm)
+
+    def removal(self, step: Step, before: Values | None = None) -> Iterator[Step]:
         """The plans with one fastener less each. before : values of earlier steps."""
         before = {} if before is None else before
         while step.plan:
             yield (step := self._without_least(step, before, 1))
 
-    def _without_least(self, step: Step, before: dict[Place, Value], count: int) -> Step:
-        """Without the fasteners that are needed least."""
-        fresh = self._harm(step, before, count)
-        before |= fresh
-        gone = sorted(fresh, key=lambda place: (fresh[place], place))[:count]
+    def _without_least(self, step: Step, before: Values, count: int) -> Step:
+        """Without the fasteners that are needed least; of those next to each other, without one."""
+        gone: list[Place] = []
+        for place in self._least(step, before, count):
+            if not set(nearest(step.plan, place, NEXT)).intersection(gone):
+                gone.append(place)
         return self.whole(tuple(place for place in step.plan if place not in gone), "removal")
 
-    def _harm(self, step: Step, before: dict[Place, Value], count: int) -> dict[Place, Value]:
-        """φ of the plan without one of its fasteners: of those that may be the `count` least."""
-        fresh: dict[Place, Value] = {}
+    def _least(self, step: Step, before: Values, count: int) -> list[Place]:
+        """The `count` fasteners without one of which φ is least. before : earlier values, renewed."""
+        fresh: Values = {}
         waiting = sorted(step.plan, key=lambda place: (before.get(place, NONE), place))
         while waiting:
             if len(fresh) >= count and sorted(fresh.values())[count - 1] <= before.get(waiting[0], NONE):
@@ -141,12 +173,13 @@ class Search:
             fresh |= dict(
                 zip(some, self._values(step, [without(step.plan, each) for each in some]), strict=True)
             )
-        return fresh
+        before |= fresh
+        return sorted(fresh, key=lambda place: (fresh[place], place))[:count]
 
-    def exchanged(self, step: Step, candidates: Plan, enough_mm: float) -> Step:
-        """The plan after the best moves, until its gap is at most enough_mm or no move makes φ less."""
-        while step.gap_mm > enough_mm:
-            moves = self._moves(step, candidates)
+    def exchanged(self, step: Step, before: Values) -> Step:
+        """The plan after the best moves, until it keeps the limit or no move makes φ less."""
+        while step.gap_mm > self.limit_mm:
+            moves = self._moves(step, before)
             (own, *values) = self._values(step, [step.plan, *moves])
             best = min(range(len(moves)), key=lambda k: (values[k], moves[k]), default=None)
             if best is None or values[best] >= own:
@@ -157,13 +190,12 @@ class Search:
             step = after
         return step
 
-    def _moves(self, step: Step, candidates: Plan) -> list[Plan]:
+    def _moves(self, step: Step, before: Values) -> list[Plan]:
         """Plans with one fastener moved to a free hole."""
-        free = [place for place in candidates if place not in step.plan]
+        free = [place for place in self.candidates if place not in step.plan]
         if not (free and step.plan):
             return []
-        harm = self._harm(step, {}, LEAST)
-        least = sorted(harm, key=lambda place: (harm[place], place))[:LEAST]
+        least = self._least(step, before, LEAST)
         places = [self.contacts[step.outcome.contact[k]] for k in self._deciding(step)]
         holes = Counter(nearest(free, place, 1)[0] for place in places)
         moves = {
@@ -194,6 +226,14 @@ FIELDS = ("largest", "contact", "mean")
 
 def without(plan: Plan, gone: Place) -> Plan:
     return tuple(place for place in plan if place != gone)
+
+
+def onto(plan: Plan, candidates: Plan) -> Plan:
+    """Each of the plan's fasteners in the nearest hole that is free."""
+    free = list(candidates)
+    for place in plan:
+        free.remove(nearest(free, place, 1)[0])
+    return tuple(place for place in candidates if place not in free)
 
 
 def nearest(places: Sequence[Place], to: Place | Matrix, count: int) -> list[Place]:

@@ -32,6 +32,7 @@ from solvers.kkt import with_p
 
 TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-6
 ENOUGH_MM = LIMIT_MM / 2  # a proven bound that needs no further refinement
+THREADS = 1  # of linear algebra: two workers gain more than two threads
 POWER = 8  # of the mean of gaps that stands for the largest one where that does not change
 
 
@@ -43,7 +44,6 @@ class Study:
     fastener: Fasteners
     cases: LoadCases
     form: Form
-    threads: int
     key: str = field(default_factory=lambda: uuid4().hex)
 
 
@@ -71,7 +71,7 @@ class Outcome:
 
 class PlanSession:
     def __init__(self, study: Study) -> None:
-        threadpoolctl.threadpool_limits(study.threads)
+        threadpoolctl.threadpool_limits(THREADS)
         self.study = study
         self.data = prepared(study.bare, form=study.form)
         self.sweeps = Sweeps(self.data)
@@ -93,21 +93,10 @@ class PlanSession:
             gaps = np.column_stack([self.sweeps.vectors(case)[1] for case in cases])
             error = np.zeros(len(loads))
         largest = gaps.max(axis=0)
-        scale = np.where(largest > 0, largest, 1.0)
-        mean = scale * ((np.maximum(gaps, 0.0) / scale) ** POWER).mean(axis=0) ** (1 / POWER)
+        mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
         return Outcome(
             tuple((largest + error).tolist()), tuple(gaps.argmax(axis=0).tolist()), tuple(mean.tolist())
         )
-
-    def distances(self, places: Sequence[Place]) -> Matrix:
-        """(k, k) ‖f_a − f_b‖ in the norm of K⁻¹, √(N·mm): how different what two fasteners do is. On the
-        diagonal ‖f_a‖.
-        """
-        F = np.column_stack([self._column(place)[0] for place in places])
-        G = F.T @ self.data.assembly.K.solve(F)
-        square = np.diag(G)[:, None] + np.diag(G) - G - G.T + np.diag(np.diag(G))
-        root: Matrix = np.sqrt(np.maximum(square, 0.0))
-        return root
 
     def _solve(self, loads: list[LoadCase], start: list[Case], tolerance: float) -> list[Case]:
         self.sweeps.last = start
@@ -132,11 +121,11 @@ class PlanSession:
         f = self.loads[numbers[0]].f.copy()
         u = np.zeros(self.data.assembly.m)
         for place in plan:
-            force, overlap = self._column(place)
+            force, overlap = self.column(place)
             f, u = f + force, u + overlap
         return [LoadCase(f, self.loads[k].g, self.loads[k].p + u) for k in numbers]
 
-    def _column(self, place: Place) -> tuple[Vector, Vector]:
+    def column(self, place: Place) -> tuple[Vector, Vector]:
         """f_z (n,) N and u_z (m,) mm."""
         if place not in self.columns:
             study, assembly = self.study, self.data.assembly
@@ -146,22 +135,12 @@ class PlanSession:
         return self.columns[place]
 
 
-_sessions: dict[str, PlanSession] = {}
-
-
-def _session_of(study: Study) -> PlanSession:
-    """The one that this process keeps: each worker opens the assembly once."""
-    if study.key not in _sessions:
-        _sessions.clear()
-        _sessions[study.key] = PlanSession(study)
-    return _sessions[study.key]
+_sessions: dict[str, PlanSession] = {}  # the one that this process keeps, so that it opens the assembly once
 
 
 def answer(task: tuple[Study, Question]) -> Outcome:
     study, question = task
-    return _session_of(study).answer(question)
-
-
-def distances(task: tuple[Study, Plan]) -> Matrix:
-    study, places = task
-    return _session_of(study).distances(places)
+    if study.key not in _sessions:
+        _sessions.clear()
+        _sessions[study.key] = PlanSession(study)
+    return _sessions[study.key].answer(question)

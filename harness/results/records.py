@@ -18,7 +18,7 @@ import filelock
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.errors import InputError
+from problems.errors import Fault, InputError
 from problems.input.bounded import regular_file
 
 from .schema import CRC, SERIES
@@ -178,6 +178,17 @@ def _replacing(path: Path) -> Iterator[BinaryIO]:
         new.replace(path)
     finally:
         new.unlink(missing_ok=True)
+
+
+def refuse_other(path: Path, before: Row, now: Row) -> None:
+    """Raises InputError, naming each difference, if what PATH holds is of another command: of `before`."""
+    faults = [
+        Fault(str(path), key, before.get(key), f"now {value!r}: name another directory with --out")
+        for key, value in parsed(to_line(now)).items()
+        if before.get(key) != value
+    ]
+    if faults:
+        raise InputError(faults)
 
 
 @contextmanager

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
+from problems.errors import Fault
 from problems.forms import Form
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import measured_gaps
@@ -31,6 +34,14 @@ class GivenCases:
         """The options that are of random gaps alone."""
         names = ("seed", "mean", "sd", "correlation_length", "around")
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
+
+    def faults(self, sweep: Sequence[str] = ()) -> list[Fault]:
+        """Of cases from more than one source."""
+        sources = ["--gaps"] * bool(self.gaps), ["--sweep"] * bool(sweep), self.drawn
+        if sum(map(bool, sources)) < 2:
+            return []
+        allowed = "random gaps, --gaps or --sweep" if sweep else "random gaps or --gaps"
+        return [Fault("cases", "given", " ".join(chain(*sources)), allowed)]
 
     def of(self, scene: Scene, form: Form) -> LoadCases:
         """Raises InputError as these do."""

@@ -45,8 +45,7 @@ def results_of(
             session = SeriesSession(job)
         yield session.solve(remaining)
         return
-    with workers(scheduler) as (executor, count):
-        console.print(f"{count} workers at {scheduler}")
+    with workers(scheduler, console) as (executor, count):
         yield on_workers(job, remaining, executor, count, console)
 
 

@@ -5,7 +5,6 @@ The same command resumes the series that a directory holds; another series is re
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -126,13 +125,7 @@ def open_series(directory: Path, identity: dict[str, Any], facts: dict[str, Any]
     series_file.create(directory)
     before = series_file.read_facts(directory)
     if before is not None:
-        faults = [
-            Fault(str(directory / SERIES), key, before["identity"].get(key), f"now {value!r}: {OTHER}")
-            for key, value in json.loads(to_line(identity)).items()
-            if before["identity"].get(key) != value
-        ]
-        if faults:
-            raise InputError(faults)
+        records.refuse_other(directory / SERIES, before["identity"], identity)
     series_file.write_fact(directory, "series", to_line({"identity": identity, **facts}))
 
 

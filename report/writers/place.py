@@ -25,14 +25,12 @@ FAMILIES = {
     "exchange": ("after exchanges", style.BLACK, "*", ""),
     "own": ("the scene's own", style.GREEN, "D", ""),
     "uniform": ("uniform patterns", style.VERMILLION, "s", ""),
-    "farthest points": ("farthest points", style.PURPLE, "^", ""),
 }
-RECORD = "place.json"
 
 
 def write(directory: Path) -> Path:
     """Write DIRECTORY/report/report.md from the record and the series in DIRECTORY. Returns its path."""
-    record = quoted(json.loads((directory / RECORD).read_text("utf-8")))
+    record = quoted(json.loads((directory / "place.json").read_text("utf-8")))
     target = emptied(directory / "report")
     steps = pd.DataFrame(record["steps"])
     title = f"Where fasteners go: {record['title']}"
@@ -52,22 +50,12 @@ def _summary(record: dict[str, Any]) -> Table:
     known = {
         "asked for": f"{asked} in {share}",
         "candidates": f"{len(record['candidates'])} holes, {significant(record['preload'])} N each",
+        "found": record["said"],
     }
-    if best is None:
-        worst = record["steps"][0]
-        x, y = worst["worst_at"]
-        known["found"] = (
-            f"none: all of them leave {significant(worst['gap_mm'])} mm; the worst case, "
-            f"{worst['worst_case']}, at ({x:.4g}, {y:.4g}) mm"
-        )
-    else:
-        known["found"] = (
-            f"{best['fasteners']} fasteners that leave at most {significant(best['gap_mm'])} mm, proven"
-        )
+    if best is not None:
         if limit is not None:
             failing = ", ".join(map(str, best["failing"])) or "none"
             known["cases beyond the limit"] = f"{len(best['failing'])} of {record['cases']}: {failing}"
-        known["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
         known["lower bound"] = "none is known: this is the best plan found"
     lines = pd.DataFrame(known.items(), columns=["what", "value"])
     return Table("", "*The question and its answer.*", lines, [word("what", "what"), word("value", "value")])
@@ -144,8 +132,7 @@ def _order(record: dict[str, Any]) -> list[Block]:
         new = [tuple(place) for place in step["plan"] if tuple(place) not in places]
         places += new
         x, y = new[0] if new else (np.nan, np.nan)
-        at = dict(zip(("at_x_mm", "at_y_mm"), step["worst_at"], strict=True))
-        lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]} | at)
+        lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]})
     table = pd.DataFrame(lines)
     drawing = style.figure(3.0)
     axes = drawing.subplots()

@@ -1,6 +1,5 @@
 """Answers while fasteners move, against `solve` on the scene as it is saved; wrong values; words."""
 
-import socket
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -120,14 +119,6 @@ def test_scenes_without_fasteners(scene: str, said: str) -> None:
     done = harness("explore", scene, "--no-open")
     assert done.exit_code == 2
     assert said in done.output
-
-
-def test_a_port_that_is_taken_is_named(path: Path) -> None:
-    pytest.importorskip("bokeh")
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        done = harness("explore", path, "--no-open", "--port", taken.getsockname()[1])
-    assert done.exit_code == 2
-    assert "explore: --port = " in done.output
 
 
 def test_the_outcome_in_words(path: Path) -> None:

@@ -1,6 +1,7 @@
 """Where fasteners go: plans against other answers and full enumeration; refused, resumed, on workers."""
 
 import json
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,7 @@ from joints import two_parts
 from harness import solve
 from harness.placement import search as search_module
 from harness.placement.asked import PLANS, Asked
-from harness.placement.candidates import Movable, Plan, grid, plan_of
-from harness.placement.opponents import bisected, farthest_plans
+from harness.placement.candidates import Movable, Plan, grid, plan_of, uniform_plans
 from harness.placement.run import Goal
 from harness.placement.search import Search
 from harness.placement.session import Outcome, PlanSession, Question, Study
@@ -50,7 +50,7 @@ def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def study_of(path: Path, cases: int = 6) -> Study:
     movable = Movable.of(read_scene(str(path)))
     gaps = random_gaps(movable.bare, cases, 0)
-    return Study(movable.bare, movable.fastener, gaps, "dual", threads=1)
+    return Study(movable.bare, movable.fastener, gaps, "dual")
 
 
 def plans_of(path: Path, rows: int, columns: int) -> Plan:
@@ -107,11 +107,12 @@ def test_an_outcome_is_that_of_its_question_alone(strip: Path, session: PlanSess
     assert before == fresh[::-1]
 
 
-def searched(session: PlanSession, limit: float, allowed: int = 0) -> Search:
+def searched(session: PlanSession, limit: float, candidates: Plan, allowed: int = 0) -> Search:
     nodes = session.data.assembly.contact_nodes
     assert nodes is not None
-    cases = session.study.cases.count
-    return Search(lambda asked: [session.answer(q) for q in asked], nodes, cases, allowed, limit)
+    study = session.study
+    given = study.bare, nodes, candidates, study.cases.count, allowed, limit
+    return Search(lambda asked: [session.answer(q) for q in asked], *given)
 
 
 @pytest.mark.parametrize("allowed", [0, 2])
@@ -121,7 +122,7 @@ def test_the_fewest_are_the_optimum_or_one_more(
 ) -> None:
     """Against all 2⁸ plans of eight candidates."""
     candidates = plans_of(strip, 2, 4)
-    search = searched(session, limit, allowed)
+    search = searched(session, limit, candidates, allowed)
     gaps = {
         plan: search.whole(plan).gap_mm
         for count in range(len(candidates) + 1)
@@ -131,14 +132,14 @@ def test_the_fewest_are_the_optimum_or_one_more(
     best = search.whole(candidates)
     if best.gap_mm > limit:
         pytest.skip("all candidates do not keep the limit")
-    best, _ = search.fewest(best, candidates, limit)
+    best, _ = search.fewest(best)
     assert optimum is not None
     assert gaps[best.plan] == best.gap_mm <= limit
     assert optimum <= len(best.plan) <= optimum + 1
 
 
-def test_the_gap_is_that_of_the_share() -> None:
-    search = Search(lambda asked: [], np.zeros((1, 2)), 5, 1, 0.0)
+def test_the_gap_is_that_of_the_share(session: PlanSession) -> None:
+    search = replace(searched(session, 0.0, ()), cases=5, allowed=1)
     assert search.gap(Outcome((0.1, 0.5, 0.3, 0.2, 0.0), (0,) * 5, (0.0,) * 5)) == 0.3
 
 
@@ -147,40 +148,56 @@ def test_lazy_removal_asks_less_and_finds_the_same(
 ) -> None:
     """As if every fastener were tried in every step."""
     monkeypatch.setattr(search_module, "AT_ONCE", 2)
-    search = searched(session, 0.0)
-    asked: list[Question] = []
-    lazy = Search(
-        lambda some: asked.extend(some) or [session.answer(q) for q in some],  # type: ignore[func-returns-value]
-        search.contacts,
-        search.cases,
-        0,
-        0.0,
-    )
-    start = search.whole(plans_of(strip, 2, 4))
+    candidates, asked = plans_of(strip, 2, 4), list[Question]()
+    search = searched(session, 0.0, candidates)
+    lazy = replace(search, ask=lambda some: asked.extend(some) or search.ask(some))  # type: ignore[func-returns-value]
+    start = search.whole(candidates)
     found = [step.gap_mm for step in lazy.removal(start)]
     step, greedy = start, []
     while step.plan:
-        fresh = search._harm(step, {}, len(step.plan))
-        step = search.whole(search_module.without(step.plan, min(fresh, key=lambda p: (fresh[p], p))))
+        (least,) = search._least(step, {}, 1)
+        step = search.whole(search_module.without(step.plan, least))
         greedy.append(step.gap_mm)
     tried = sum(question.base is not None for question in asked)
     assert tried < 8 * 9 // 2
     assert np.mean(found) <= 1.1 * np.mean(greedy)
 
 
-def test_uniform_patterns_and_farthest_points() -> None:
-    scene_like = [[((float(x), 0.0),) for x in range(1, 6)]]
-    gaps = {plan: 1.0 / (k + 1) for k, plan in enumerate(scene_like[0])}
+def test_the_fewest_uniform_fasteners(strip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of gaps that shrink with the number of columns and grow with that of rows: against all patterns."""
+    bare = study_of(strip).bare
+    holes = tuple((float(k), 0.0) for k in range(24))
 
-    def whole(plan: Plan) -> Any:
-        return search_module.Step(plan, gaps[plan], Outcome((), (), ()))
+    def whole(plan: Plan, moved: str) -> Any:
+        rows = len({y for _, y in plan})
+        return search_module.Step(plan, rows / len(plan) + 0.02 * rows, Outcome((), (), ()), moved)
 
-    tried = bisected(scene_like[0], 0.3, whole)
-    assert min(step.gap_mm for step in tried if step.gap_mm <= 0.3) == 0.25
-    places = ((0.0, 0.0), (1.0, 0.0), (10.0, 0.0))
-    norms = np.array([5.0, 5.1, 6.0])
-    distances = np.array([[0, 1, 10], [1, 0, 9], [10, 9, 0]]) + np.diag(norms)
-    assert farthest_plans(places, distances) == [places[2:], (places[0], places[2]), places]
+    monkeypatch.setattr(Search, "whole", lambda self, plan, moved: whole(plan, moved))
+    patterns = [whole(plan_of(grid(bare, r, c)), "") for r in range(1, 5) for c in range(1, 24 // r + 1)]
+    for enough in (0.1, 0.2, 0.3, 0.5, 2.0):
+        fewest = min((len(p.plan) for p in patterns if p.gap_mm <= enough), default=None)
+        tried = list(Search(lambda asked: [], bare, np.zeros((1, 2)), holes, 1, 0, enough).uniform())
+        assert min((len(p.plan) for p in tried if p.gap_mm <= enough), default=None) == fewest
+        assert len(tried) < len(patterns) / 3
+
+
+def test_uniform_plans_of_any_number(strip: Path) -> None:
+    """In rows of as many fasteners, or one more, each evenly along the joint."""
+    bare = study_of(strip).bare
+    for count in (1, 2, 7, 12):
+        plans = uniform_plans(bare, count)
+        assert [len(plan) for plan in plans] == [count] * min(count, 4)
+        for rows, plan in enumerate(plans, start=1):
+            lines = [sorted(x for x, y in plan if y == at) for at in sorted({y for _, y in plan})]
+            assert len(lines) == rows
+            assert {len(line) for line in lines} <= {count // rows, count // rows + 1}
+            assert all(line[0] == pytest.approx(100 / len(line), abs=1e-6) for line in lines)
+    assert plan_of(grid(bare, 3, 4)) == uniform_plans(bare, 12)[2]
+
+
+def test_a_plan_moves_onto_the_nearest_free_holes() -> None:
+    holes = ((0.0, 0.0), (10.0, 0.0), (20.0, 0.0), (30.0, 0.0))
+    assert search_module.onto(((9.0, 5.0), (11.0, 0.0)), holes) == holes[1:3]
 
 
 def place(path: Path, out: Path, *words: object) -> Any:
@@ -220,7 +237,7 @@ def test_the_best_of_a_number(strip: Path, tmp_path: Path) -> None:
     same = [step for step in record["steps"] if step["fasteners"] == 4]
     assert record["best"]["fasteners"] == 4
     assert record["best"]["gap_mm"] <= min(step["gap_mm"] for step in same)
-    assert {"uniform", "farthest points"} <= {step["moved"] for step in same}
+    assert "uniform" in {step["moved"] for step in same}
 
 
 @pytest.mark.slow
@@ -331,6 +348,6 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
     movable = Movable.of(read_scene(str(path)))
-    study = Study(movable.bare, movable.fastener, Listed((load_case(movable.bare),)), "dual", 1)
+    study = Study(movable.bare, movable.fastener, Listed((load_case(movable.bare),)), "dual")
     found = PlanSession(study).answer(Question(movable.own, (0,)))
     assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)

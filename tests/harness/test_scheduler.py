@@ -49,6 +49,7 @@ CASES = 24
 ROOT = Path(__file__).parents[2]
 VERSIONS = versions()
 DASK = importlib.util.find_spec("distributed") is not None
+QUIET = Console(quiet=True)
 needs_dask = pytest.mark.skipif(not DASK, reason="needs Dask")
 
 
@@ -128,14 +129,17 @@ def test_every_task_comes_back_once_and_few_are_handed_out() -> None:
 
 def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not there
-    with pytest.raises(InputError, match=r"pip install 'rivetbench\[distributed\]'"), workers("local:2"):
+    with (
+        pytest.raises(InputError, match=r"pip install 'rivetbench\[distributed\]'"),
+        workers("local:2", QUIET),
+    ):
         pass
 
 
 @needs_dask
 @pytest.mark.parametrize("wrong", ["local:0", "local:x", "local:-1"])
 def test_a_number_of_workers_that_cannot_be(wrong: str) -> None:
-    with pytest.raises(InputError, match="local:N"), workers(wrong):
+    with pytest.raises(InputError, match="local:N"), workers(wrong, QUIET):
         pass
 
 
@@ -171,7 +175,7 @@ def test_workers_that_will_not_do_are_named(
 ) -> None:
     """The driver thinks that it has other packages than its workers; it says which, of each worker."""
     monkeypatch.setattr(scheduler, "installed_version", lambda name: (VERSIONS | {"scipy": "0.1"})[name])
-    with pytest.raises(InputError) as raised, workers(cluster.scheduler_address):
+    with pytest.raises(InputError) as raised, workers(cluster.scheduler_address, QUIET):
         pass
     assert [fault.where.split()[0] for fault in raised.value.faults] == ["worker", "worker"]
     for fault in raised.value.faults:
@@ -187,13 +191,13 @@ def test_a_worker_with_threads_and_a_scheduler_without_workers() -> None:
     ) as cluster:
         with (
             pytest.raises(InputError, match="nthreads = 2: start it with --nthreads 1"),
-            workers(cluster.scheduler_address),
+            workers(cluster.scheduler_address, QUIET),
         ):
             pass
         cluster.scale(0)
         while cluster.scheduler.workers:
             time.sleep(0.05)
-        with pytest.raises(InputError, match="has no worker"), workers(cluster.scheduler_address):
+        with pytest.raises(InputError, match="has no worker"), workers(cluster.scheduler_address, QUIET):
             pass
 
 

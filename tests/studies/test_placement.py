@@ -2,14 +2,21 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from studies import placement
 
-pytestmark = pytest.mark.slow
+
+def test_farthest_points() -> None:
+    """The one that does most, then what is farthest from it."""
+    places = ((0.0, 0.0), (1.0, 0.0), (10.0, 0.0))
+    apart = np.array([[0, 1, 10], [1, 0, 9], [10, 9, 0]]) + np.diag([5.0, 5.1, 6.0])
+    assert placement.farthest_plans(places, apart) == [places[2:], (places[0], places[2]), places]
 
 
+@pytest.mark.slow
 def test_it_compares_and_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     small = placement.joint(200.0, 60.0, (11, 4), (2.0, 3.0))
     monkeypatch.setattr(placement, "JOINTS", {"small": (small, 100.0, (1, 5))})
