@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from harness.results.schema import ANSWERED
-from report.analysis.standings import best_tolerances
+from report.analysis.standings import best_tolerances, shown
 from report.document.blocks import Block, Column, Figure, Section, Table, number, word
 from report.document.numbers import power, whole
 from report.figures import style
@@ -26,8 +26,8 @@ def section(results: Results) -> Section | None:
     seconds = (cells["setup_s"].fillna(0.0) + cells["solve_s"]).where(cells["verdict"].isin(ANSWERED))
     good = (cells["status"] == "solved") & (cells["verdict"] == "within")
     cells = best_tolerances(cells.assign(load_case_s=seconds, good=good))
-    run = cells[cells["status"] != "not_run"]
-    blocks: list[Block] = [_figure(run)] if len(run) else []
+    often = shown(cells)
+    blocks: list[Block] = [_figure(often)] if len(often) else []
     blocks.append(_times(cells, results.limit))
     if not cells["good"].all():
         blocks.append(_failures(cells[~cells["good"]]))
@@ -42,7 +42,11 @@ def _figure(cells: pd.DataFrame) -> Figure:
         against_contacts(axes, of_size, styles)
         axes.set_title(f"n = {n:.0f}, {of_size['scene'].nunique()} scenes", pad=5)
     axes.set_xlabel("closed contacts")
-    return Figure("drawn", "*Seconds of every solve* (set-up + solve) against the closed contacts.", drawing)
+    caption = (
+        "*Seconds of every solve* (set-up + solve) against the closed contacts, of the methods run on at "
+        "least half of the scenes."
+    )
+    return Figure("drawn", caption, drawing)
 
 
 def _times(cells: pd.DataFrame, limit: str) -> Table:
