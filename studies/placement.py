@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import time
+from bisect import bisect_left
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import combinations
@@ -117,13 +118,15 @@ def farthest_plans(candidates: Plan, distances: Matrix) -> list[Plan]:
     return [tuple(sorted(candidates[k] for k in order[: count + 1])) for count in range(len(order))]
 
 
-def bisected(plans: Sequence[Plan], enough_mm: float, search: Search) -> list[Step]:
+def bisected(plans: Sequence[Plan], search: Search) -> list[Step]:
     """The plans tried to find the first whose gap is enough, as if gaps shrank along them."""
-    tried, low, high = [], 0, len(plans)
-    while low < high:
-        middle = (low + high) // 2
-        tried.append(search.whole(plans[middle]))
-        low, high = (low, middle) if tried[-1].gap_mm <= enough_mm else (middle + 1, high)
+    tried: list[Step] = []
+
+    def enough(plan: Plan) -> bool:
+        tried.append(search.whole(plan))
+        return tried[-1].gap_mm <= search.limit_mm
+
+    bisect_left(plans, True, key=enough)
     return tried
 
 
@@ -163,9 +166,9 @@ def compared(name: str, scatter: str) -> tuple[list[dict[str, Any]], list[dict[s
 
     (best,) = timed("removal and exchange", lambda: [searched(search)])
     budget = ask.count
-    timed("uniform patterns", lambda: list(search.uniform()))
+    timed("uniform patterns", search.uniform)
     far = farthest_plans(candidates, distances(session, candidates))
-    timed("farthest points", lambda: bisected(far, limit, search))
+    timed("farthest points", lambda: bisected(far, search))
     timed("greedy adding", lambda: [added(search, candidates, limit)])
     start = ask.count
     timed("random plans", lambda: [at_random(search, ask, candidates, limit, start + budget)])
@@ -180,7 +183,7 @@ def orders(search: Search, best: Step) -> list[dict[str, Any]]:
         return search.wholes([tuple(sorted(order[:k])) for k in range(len(order) + 1)])
 
     found = {
-        "least needed last": [best, *search.removal(best)][::-1],
+        "least needed last": [best, *search.removal(best, {})][::-1],
         "left to right": prefixes(best.plan),
         "centre outwards": prefixes(
             sorted(best.plan, key=lambda place: (float(np.hypot(*(place - middle))), place))

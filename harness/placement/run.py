@@ -131,7 +131,7 @@ def searched(search: Search, own: Plan, goal: Goal) -> Found:
         if more:
             steps.append(best := search.fewer(best, before)[0])
         steps += search.wholes(uniform_plans(search.bare, goal.count), "uniform")
-    order = [best, *search.removal(best)]
+    order = [best, *search.removal(best, {})]
     return Found(steps, best, order[::-1])
 
 

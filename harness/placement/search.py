@@ -20,9 +20,10 @@ of least φ among the one without the fastener that is needed least, and uniform
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TypeAlias
 
 import numpy as np
@@ -93,30 +94,32 @@ class Search:
         steps = []
         for plan in plans:
             parts = [next(found) for _ in blocks]
-            outcome = Outcome(*(tuple(v for p in parts for v in getattr(p, name)) for name in FIELDS))
+            names = (each.name for each in fields(Outcome))
+            outcome = Outcome(*(tuple(v for p in parts for v in getattr(p, name)) for name in names))
             steps.append(Step(plan, self.gap(outcome), outcome, moved))
             self.said(steps[-1])
         return steps
 
-    def uniform(self) -> Iterator[Step]:
+    def uniform(self) -> list[Step]:
         """What is tried to find the fewest fasteners in a uniform pattern: for each number of rows the most
         columns, then by bisection, as if gaps shrank with more of them.
         """
+        tried: list[Step] = []
+
+        def enough(columns: int) -> bool:
+            tried.append(self.whole(plan_of(grid(self.bare, rows, columns)), "uniform"))
+            return tried[-1].gap_mm <= self.limit_mm
+
         fewest = len(self.candidates) + 1
         for rows in ROWS:
-            columns = (fewest - 1) // rows
-            low, high = 1, columns + 1
-            while low < high:
-                yield (step := self.whole(plan_of(grid(self.bare, rows, columns)), "uniform"))
-                if step.gap_mm <= self.limit_mm:
-                    high, fewest = columns, rows * columns
-                else:
-                    low = columns + 1
-                columns = (low + high) // 2
+            most = (fewest - 1) // rows
+            if most and enough(most):
+                fewest = rows * (1 + bisect_left(range(1, most), True, key=enough))
+        return tried
 
     def fewest(self, start: Step) -> tuple[Step, list[Step]]:
         """The smallest plan found that keeps the limit, as `start`, all candidates, does; all on the way."""
-        best, steps, before = start, list[Step](), dict[Place, Value]()
+        best, steps, before = start, list[Step](), Values()
         while (count := len(best.plan) // SHARE_AT_ONCE) > 1:
             steps.append(step := self._without_least(best, before, count))
             if step.gap_mm > self.limit_mm:
@@ -148,9 +151,8 @@ class Search:
                 break
         return min(made, key=lambda each: each[0].gap_mm)
 
-    def removal(self, step: Step, before: Values | None = None) -> Iterator[Step]:
+    def removal(self, step: Step, before: Values) -> Iterator[Step]:
         """The plans with one fastener less each. before : values of earlier steps."""
-        before = {} if before is None else before
         while step.plan:
             yield (step := self._without_least(step, before, 1))
 
@@ -219,9 +221,6 @@ class Search:
             (round(max(self.gap(each), self.limit_mm), DIGITS), round(float(np.mean(each.mean)), DIGITS))
             for each in found
         ]
-
-
-FIELDS = ("largest", "contact", "mean")
 
 
 def without(plan: Plan, gone: Place) -> Plan:

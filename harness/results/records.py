@@ -28,6 +28,7 @@ Row = dict[str, Any]
 MEASUREMENTS = "measurements.jsonl"
 OUTDATED = "measurements.outdated.jsonl"
 ROWS_MIB, ARRAYS_MIB = 4096, 1024  # of a file that is read
+OTHER = "name another directory with --out"
 
 
 def to_line(row: Row) -> str:
@@ -183,7 +184,7 @@ def _replacing(path: Path) -> Iterator[BinaryIO]:
 def refuse_other(path: Path, before: Row, now: Row) -> None:
     """Raises InputError, naming each difference, if what PATH holds is of another command: of `before`."""
     faults = [
-        Fault(str(path), key, before.get(key), f"now {value!r}: name another directory with --out")
+        Fault(str(path), key, before.get(key), f"now {value!r}: {OTHER}")
         for key, value in parsed(to_line(now)).items()
         if before.get(key) != value
     ]

@@ -29,7 +29,6 @@ from problems.model.scene import JointScene
 from .places import results_of
 from .session import Job, Result
 
-OTHER = "name another directory with --out"
 MAX_FAULTS = 10  # named at once
 
 
@@ -142,7 +141,7 @@ def solved(directory: Path, cases: LoadCases) -> NDArray[np.bool_]:
         done[case] = True
         for name, value in cases.parameters(case).items():
             if row.get(name) != value:
-                where, allowed = f"case {case}, {name}", f"is now {value!r}: {OTHER}"
+                where, allowed = f"case {case}, {name}", f"is now {value!r}: {records.OTHER}"
                 faults.append(Fault(str(directory / SERIES), where, row.get(name), allowed))
     if faults:
         raise InputError(faults[:MAX_FAULTS])

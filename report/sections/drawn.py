@@ -26,15 +26,19 @@ def section(results: Results) -> Section | None:
     seconds = (cells["setup_s"].fillna(0.0) + cells["solve_s"]).where(cells["verdict"].isin(ANSWERED))
     good = (cells["status"] == "solved") & (cells["verdict"] == "within")
     cells = best_tolerances(cells.assign(load_case_s=seconds, good=good))
-    often = shown(cells)
-    blocks: list[Block] = [_figure(often)] if len(often) else []
+    run, often = cells[cells["status"] != "not_run"], shown(cells)
+    blocks: list[Block] = []
+    if len(often):
+        blocks.append(_figure(often, ", of the methods run on at least half of the scenes"))
+    elif len(run):
+        blocks.append(_figure(run))
     blocks.append(_times(cells, results.limit))
     if not cells["good"].all():
         blocks.append(_failures(cells[~cells["good"]]))
     return Section("Scenes drawn at random", blocks)
 
 
-def _figure(cells: pd.DataFrame) -> Figure:
+def _figure(cells: pd.DataFrame, whose: str = "") -> Figure:
     dots = {"markersize": 4.0, "linestyle": ""}
     styles = {name: look | dots for name, look in styles_of(cells).items()}
     drawing, panels = style.panels(cells["n"].nunique(), PANEL, entries(cells, styles))
@@ -42,10 +46,7 @@ def _figure(cells: pd.DataFrame) -> Figure:
         against_contacts(axes, of_size, styles)
         axes.set_title(f"n = {n:.0f}, {of_size['scene'].nunique()} scenes", pad=5)
     axes.set_xlabel("closed contacts")
-    caption = (
-        "*Seconds of every solve* (set-up + solve) against the closed contacts, of the methods run on at "
-        "least half of the scenes."
-    )
+    caption = f"*Seconds of every solve* (set-up + solve) against the closed contacts{whose}."
     return Figure("drawn", caption, drawing)
 
 

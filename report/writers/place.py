@@ -56,6 +56,7 @@ def _summary(record: dict[str, Any]) -> Table:
         if limit is not None:
             failing = ", ".join(map(str, best["failing"])) or "none"
             known["cases beyond the limit"] = f"{len(best['failing'])} of {record['cases']}: {failing}"
+        known["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
         known["lower bound"] = "none is known: this is the best plan found"
     lines = pd.DataFrame(known.items(), columns=["what", "value"])
     return Table("", "*The question and its answer.*", lines, [word("what", "what"), word("value", "value")])
@@ -132,7 +133,8 @@ def _order(record: dict[str, Any]) -> list[Block]:
         new = [tuple(place) for place in step["plan"] if tuple(place) not in places]
         places += new
         x, y = new[0] if new else (np.nan, np.nan)
-        lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]})
+        at = dict(zip(("at_x_mm", "at_y_mm"), step["worst_at"], strict=True))
+        lines.append({"set": step["fasteners"], "x_mm": x, "y_mm": y, "gap_mm": step["gap_mm"]} | at)
     table = pd.DataFrame(lines)
     drawing = style.figure(3.0)
     axes = drawing.subplots()

@@ -152,7 +152,7 @@ def test_lazy_removal_asks_less_and_finds_the_same(
     search = searched(session, 0.0, candidates)
     lazy = replace(search, ask=lambda some: asked.extend(some) or search.ask(some))  # type: ignore[func-returns-value]
     start = search.whole(candidates)
-    found = [step.gap_mm for step in lazy.removal(start)]
+    found = [step.gap_mm for step in lazy.removal(start, {})]
     step, greedy = start, []
     while step.plan:
         (least,) = search._least(step, {}, 1)
@@ -176,7 +176,7 @@ def test_the_fewest_uniform_fasteners(strip: Path, monkeypatch: pytest.MonkeyPat
     patterns = [whole(plan_of(grid(bare, r, c)), "") for r in range(1, 5) for c in range(1, 24 // r + 1)]
     for enough in (0.1, 0.2, 0.3, 0.5, 2.0):
         fewest = min((len(p.plan) for p in patterns if p.gap_mm <= enough), default=None)
-        tried = list(Search(lambda asked: [], bare, np.zeros((1, 2)), holes, 1, 0, enough).uniform())
+        tried = Search(lambda asked: [], bare, np.zeros((1, 2)), holes, 1, 0, enough).uniform()
         assert min((len(p.plan) for p in tried if p.gap_mm <= enough), default=None) == fewest
         assert len(tried) < len(patterns) / 3
 
@@ -193,6 +193,33 @@ def test_uniform_plans_of_any_number(strip: Path) -> None:
             assert {len(line) for line in lines} <= {count // rows, count // rows + 1}
             assert all(line[0] == pytest.approx(100 / len(line), abs=1e-6) for line in lines)
     assert plan_of(grid(bare, 3, 4)) == uniform_plans(bare, 12)[2]
+
+
+def told(strip: Path, candidates: Plan, gap_of: Any) -> Search:
+    """A search whose one case has these gaps."""
+
+    def ask(questions: Any) -> list[Outcome]:
+        return [Outcome((gap_of(question.plan),), (0,), (gap_of(question.plan),)) for question in questions]
+
+    return Search(ask, study_of(strip).bare, np.zeros((1, 2)), candidates, 1, 0, 0.0)
+
+
+def test_no_two_fasteners_next_to_each_other_go_at_once(strip: Path) -> None:
+    """Of five in a line, needed less the further right, the two at the right are neighbours: one goes."""
+    line = tuple((10.0 * k, 0.0) for k in range(5))
+    search = told(strip, line, lambda plan: sum(1.0 / (1.0 + x) for x, _ in set(line) - set(plan)))
+    start = search.whole(line)
+    assert search._without_least(start, {}, 2).plan == line[:4]
+    assert search._without_least(start, {}, 3).plan == (line[0], line[1], line[3])
+
+
+def test_exchange_starts_from_uniform_plans_too(strip: Path) -> None:
+    """Where only the uniform one of three is good, which no exchange would reach one by one."""
+    candidates = plans_of(strip, 1, 9)
+    even = tuple(candidates[k] for k in (1, 4, 7))
+    search = told(strip, candidates, lambda plan: 0.0 if plan == even else 1.0 + sum(x for x, _ in plan))
+    found, _ = search.fewer(search.whole(candidates[:4]), {})
+    assert (found.plan, found.gap_mm) == (even, 0.0)
 
 
 def test_a_plan_moves_onto_the_nearest_free_holes() -> None:

@@ -196,6 +196,8 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "harness/placement/search.py": {
         "reverse=True)[self.allowed]": ("reverse=True)[0]", "reverse=True)[self.allowed + 1]"),
+        "set(nearest(step.plan, place, NEXT))": ("set()",),
+        "for plan in even}": ("for plan in []}",),
     },
     "solvers/algorithms/sweeps.py": {
         "self.A.T @ change.f / self.squares": ("self.A.T @ change.f",),

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from synthetic_results import no_answer, results, row, shown, table, write_rows
 
-from report.document.blocks import Section
+from report.document.blocks import Figure, Section
 from report.sections import drawn as drawn_scenes
 from report.writers.markdown import write
 
@@ -49,6 +49,18 @@ def test_medians_and_worst_cases(tmp_path: Path) -> None:
         "mprgp (sparse)": ["4386", "5", "5", "0.480", "0.560", "1.17", "drawn/4386/4"],
         "mprgp (dual)": ["4386", "5", "5", "0.120", "0.140", "1.17", "drawn/4386/4"],
     }
+
+
+@pytest.mark.parametrize("methods", [1, 2])
+def test_the_picture_is_of_what_was_run_on_half_of_the_scenes(tmp_path: Path, methods: int) -> None:
+    """Where that is one method only, of all that was run."""
+    often = [line for k in range(SCENES) for line in every_row()[4 * k : 4 * k + methods]]
+    (figure, _) = section_of(tmp_path, [*often, drawn(0, "newton", "sparse")]).blocks[:2]
+    assert isinstance(figure, Figure)
+    names = [text.get_text() for text in figure.drawing.legends[0].get_texts()]
+    assert len(names) == 2
+    assert ("at least half" in figure.caption) == (methods == 2)
+    assert ("newton (sparse)" in names) == (methods == 1)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,9 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from harness.planning.suite import suite_names
 from harness.results.records import MEASUREMENTS, append
@@ -139,6 +141,19 @@ def test_another_checkout_is_refused(there: Path, monkeypatch: pytest.MonkeyPatc
 def test_an_interruption_is_not_counted_as_time() -> None:
     assert published.minutes([row(minute=minute) for minute in (0, 2, 7, 50)]) == 7
     assert published.minutes([row()]) is None
+
+
+def test_a_picture_is_small_and_looks_the_same(tmp_path: Path) -> None:
+    """Dots of a ramp of colours: each channel within what 256 of them can be off."""
+    ramp = np.random.default_rng(0).integers(0, 256, (60, 80), dtype=np.uint8)
+    picture = np.stack([ramp, 255 - ramp, 0 * ramp], axis=-1)
+    Image.fromarray(picture).save(path := tmp_path / "ramp.png")
+    size = path.stat().st_size
+    published.slim(path)
+    with Image.open(path) as image:
+        assert image.mode == "P"
+        assert abs(np.asarray(image.convert("RGB"), dtype=int) - picture).max() <= 4
+    assert path.stat().st_size < size
 
 
 def test_the_commands_exist(tmp_path: Path) -> None:
