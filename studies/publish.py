@@ -152,9 +152,9 @@ def publish(name: str, directory: Path) -> None:
 
 
 def slim(picture: Path) -> None:
-    """Write it in 256 colours: a third of the size, and no eye sees it."""
+    """Write it in 256 colours that cover all of its own, also the rare ones of a map: a third of the size."""
     with Image.open(picture) as image:
-        small = image.convert("RGB").quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        small = image.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     small.save(picture, optimize=True)
 
 
