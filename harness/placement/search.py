@@ -14,8 +14,8 @@ a rule, with each other that is gone, so that values of earlier steps are tried 
 be less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 1978).
 
 Exchange moves a fastener to one of the free holes next to where the gap is too large: one of the nearest, or
-of those that are needed least. The best move is made as long as it makes φ less. It starts from the two plans
-of least φ among the one without the fastener that is needed least, and uniform ones of as many.
+of those that are needed least. The best move is made as long as it makes φ less. It starts from the plan of
+least φ among the one without the fastener that is needed least, and uniform ones of as many.
 """
 
 from __future__ import annotations
@@ -44,7 +44,6 @@ NONE = (0.0, 0.0)  # less than any φ
 HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners needed least
 SHARE_AT_ONCE = 8  # a plan's share that is taken out at once, as long as that keeps the limit
 NEXT = 3  # a fastener and those next to it
-STARTS = 2  # of an exchange
 FURTHER = 1.25  # times what is enough: how far removal goes on
 DIGITS = 6  # of mm: values closer than a nanometre are equal, whatever the rounding
 
@@ -144,12 +143,8 @@ class Search:
         even = uniform_plans(self.bare, len(step.plan) - 1)
         starts: dict[Plan, Values] = {onto(plan, self.candidates): {} for plan in even}
         starts[without(step.plan, self._least(step, before, 1)[0])] = before
-        made: list[tuple[Step, Values]] = []
-        for _, plan in sorted(zip(self._values(step, list(starts)), starts, strict=True))[:STARTS]:
-            made.append((self.exchanged(self.whole(plan, "exchange"), starts[plan]), starts[plan]))
-            if made[-1][0].gap_mm <= self.limit_mm:
-                break
-        return min(made, key=lambda each: each[0].gap_mm)
+        _, plan = min(zip(self._values(step, list(starts)), starts, strict=True))
+        return self.exchanged(self.whole(plan, "exchange"), starts[plan]), starts[plan]
 
     def removal(self, step: Step, before: Values) -> Iterator[Step]:
         """The plans with one fastener less each. before : values of earlier steps."""

@@ -4,8 +4,8 @@ A fastener at z adds f_z to the forces f₀ of the scene without any, and u_z = 
 
     f = f₀ + Σ f_z,   p = p₀ + Σ u_z,
 
-so that a plan costs no more than its contact problems. Each is solved by active-set Newton from the nearest
-answer to another plan, which most contacts share.
+so that a plan costs no more than its contact problems. Each is solved by active-set Newton from the answer of
+its load case to another plan, which most contacts share.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from problems.model.scene import JointScene
 from solvers.algorithms.sweeps import Case, Sweeps
 from solvers.kkt import with_p
 
-TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-6
+TOLERANCE_MM, ESTIMATE_MM = 1e-9, 1e-5  # of estimates: gaps agree to a nanometre
 ENOUGH_MM = LIMIT_MM / 2  # a proven bound that needs no further refinement
 THREADS = 1  # of linear algebra: two workers gain more than two threads
 POWER = 8  # of the mean of gaps that stands for the largest one where that does not change
@@ -98,9 +98,9 @@ class PlanSession:
             tuple((largest + error).tolist()), tuple(gaps.argmax(axis=0).tolist()), tuple(mean.tolist())
         )
 
-    def _solve(self, loads: list[LoadCase], start: list[Case], tolerance: float) -> list[Case]:
-        self.sweeps.last = start
-        self.sweeps(loads, tolerance)
+    def _solve(self, loads: list[LoadCase], starts: list[Case], tolerance: float) -> list[Case]:
+        self.sweeps.last = []
+        self.sweeps(loads, tolerance, starts)
         return self.sweeps.last
 
     def _proven(self, loads: list[LoadCase], cases: list[Case]) -> tuple[Matrix, Vector]:

@@ -93,10 +93,16 @@ class Sweeps:
         """In place of M."""
         return ContactSprings(self.prepared)
 
-    def __call__(self, loads: Sequence[LoadCase], tolerance: float) -> list[Answer]:
-        """An answer to each load, all with p, solved together from the nearest of the cases before them."""
-        before = self.last or [self.solved(loads[0], tolerance)]
-        self.last = self._sweep(self._begun([_nearest(before, each) for each in loads], loads), tolerance)
+    def __call__(
+        self, loads: Sequence[LoadCase], tolerance: float, starts: Sequence[Case] = ()
+    ) -> list[Answer]:
+        """An answer to each load, all with p, solved together. starts : of each; else the nearest case of the
+        last ones.
+        """
+        if not starts:
+            before = self.last or [self.solved(loads[0], tolerance)]
+            starts = [_nearest(before, each) for each in loads]
+        self.last = self._sweep(self._begun(starts, loads), tolerance)
         for case in self.last:
             case.factor = None  # as large as M for each; the next cases have other sets
         return [self.answer(case, tolerance) for case in self.last]
