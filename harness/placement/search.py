@@ -14,8 +14,8 @@ a rule, with each other that is gone, so that values of earlier steps are tried 
 be less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 1978).
 
 Exchange moves a fastener to one of the free holes next to where the gap is too large: one of the nearest, or
-of those that are needed least. The best move is made as long as it makes φ less. It starts from the plan of
-least φ among the one without the fastener that is needed least, and uniform ones of as many.
+of those that are needed least. The best move is made as long as it makes φ less. Of the plan without the
+fastener that is needed least and uniform ones of as many, it starts from the one of least G.
 """
 
 from __future__ import annotations
@@ -143,8 +143,10 @@ class Search:
         even = uniform_plans(self.bare, len(step.plan) - 1)
         starts: dict[Plan, Values] = {onto(plan, self.candidates): {} for plan in even}
         starts[without(step.plan, self._least(step, before, 1)[0])] = before
-        _, plan = min(zip(self._values(step, list(starts)), starts, strict=True))
-        return self.exchanged(self.whole(plan, "exchange"), starts[plan]), starts[plan]
+        start = min(
+            self.wholes(list(starts), "exchange"), key=lambda each: (round(each.gap_mm, DIGITS), each.plan)
+        )
+        return self.exchanged(start, starts[start.plan]), starts[start.plan]
 
     def removal(self, step: Step, before: Values) -> Iterator[Step]:
         """The plans with one fastener less each. before : values of earlier steps."""
@@ -174,17 +176,23 @@ class Search:
         return sorted(fresh, key=lambda place: (fresh[place], place))[:count]
 
     def exchanged(self, step: Step, before: Values) -> Step:
-        """The plan after the best moves, until it keeps the limit or no move makes φ less."""
+        """The plan after the best moves, until it keeps the limit or no move makes φ less. The worst cases of
+        a move that was none decide about the next ones, too.
+        """
+        cases = self._deciding(step)
         while step.gap_mm > self.limit_mm:
             moves = self._moves(step, before)
-            (own, *values) = self._values(step, [step.plan, *moves])
+            (own, *values) = self._values(step, [step.plan, *moves], cases)
             best = min(range(len(moves)), key=lambda k: (values[k], moves[k]), default=None)
             if best is None or values[best] >= own:
                 break
             after = self.whole(moves[best], "exchange")
-            if after.gap_mm >= step.gap_mm:  # as all cases show
+            if after.gap_mm < step.gap_mm:
+                step, cases = after, self._deciding(after)
+            elif set(more := self._deciding(after)) <= set(cases):
                 break
-            step = after
+            else:
+                cases = tuple(sorted({*cases, *more}))
         return step
 
     def _moves(self, step: Step, before: Values) -> list[Plan]:
@@ -208,9 +216,9 @@ class Search:
         worst = sorted(range(self.cases), key=lambda k: (-round(step.outcome.largest[k], DIGITS), k))
         return tuple(sorted(worst[: 2 * self.allowed + MORE_CASES]))
 
-    def _values(self, step: Step, plans: Sequence[Plan]) -> list[Value]:
-        """φ of other plans, estimated."""
-        cases = self._deciding(step)
+    def _values(self, step: Step, plans: Sequence[Plan], cases: tuple[int, ...] = ()) -> list[Value]:
+        """φ of other plans, estimated. cases : those that decide, unless given."""
+        cases = cases or self._deciding(step)
         found = self.ask([Question(plan, cases, step.plan) for plan in plans])
         return [
             (round(max(self.gap(each), self.limit_mm), DIGITS), round(float(np.mean(each.mean)), DIGITS))

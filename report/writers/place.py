@@ -97,9 +97,7 @@ def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
     style.plain_log(axes.yaxis)
     drawing.legend(loc="outside right upper")
     share = f"{100 * record['share']:.4g} %"
-    caption = (
-        f"*The gap against the number of fasteners*: the largest in the best {share} of the cases, proven."
-    )
+    caption = f"*The gap against the number of fasteners*: the largest in {share} of the cases, proven."
     return Figure("gap-against-fasteners", caption, drawing, steps.drop(columns=["plan", "failing"]))
 
 
@@ -141,11 +139,9 @@ def _order(record: dict[str, Any]) -> list[Block]:
     axes.plot(table["set"], table["gap_mm"], color=style.BLUE, marker="o", ms=4)
     axes.set(xlabel="fasteners set", ylabel="largest gap, mm", ylim=(0, None))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    columns = [number("set", "set", whole), number("x, mm", "x_mm"), number("y, mm", "y_mm")]
-    columns += [number("gap after it, mm", "gap_mm")]
-    caption = (
-        "*The order that keeps the gap small after each step*: the reverse of removing the least needed."
-    )
+    names = {"x, mm": "x_mm", "y, mm": "y_mm", "gap after it, mm": "gap_mm"}
+    columns = [number("set", "set", whole), *(number(name, key) for name, key in names.items())]
+    caption = "*The order that keeps the gap small*: the reverse of removing what is needed least."
     return [
         Figure("gap-while-setting", "*The largest gap after each fastener.*", drawing),
         Table("order", caption, table, columns),
