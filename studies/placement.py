@@ -57,8 +57,8 @@ class Counted:
     def __init__(self, session: PlanSession) -> None:
         self.session, self.count = session, 0
 
-    def __call__(self, asked: Sequence[Question]) -> list[Outcome]:
-        self.count += sum(len(question.cases) for question in asked)
+    def __call__(self, asked: Sequence[Question]) -> list[list[Outcome]]:
+        self.count += sum(len(question.plans) * len(question.cases) for question in asked)
         return [self.session.answer(question) for question in asked]
 
 

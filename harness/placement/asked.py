@@ -34,9 +34,9 @@ class Asked:
             records.append(path, identity)
         else:
             records.refuse_other(path, first, identity)
-        self.known = {to_line(row["question"]): _outcome(row) for row in rows}
+        self.known = {to_line(row["question"]): list(map(_outcome, row["outcomes"])) for row in rows}
 
-    def __call__(self, questions: Sequence[Question]) -> list[Outcome]:
+    def __call__(self, questions: Sequence[Question]) -> list[list[Outcome]]:
         texts = [to_line(asdict(question)) for question in questions]
         new = {text: q for text, q in zip(texts, questions, strict=True) if text not in self.known}
         if self.workers is None:
@@ -50,9 +50,9 @@ class Asked:
                 self._keep(text, new[text], found)
         return [self.known[text] for text in texts]
 
-    def _keep(self, text: str, question: Question, outcome: Outcome) -> None:
-        records.append(self.path, {"question": asdict(question), **asdict(outcome)})
-        self.known[text] = outcome
+    def _keep(self, text: str, question: Question, found: list[Outcome]) -> None:
+        records.append(self.path, {"question": asdict(question), "outcomes": list(map(asdict, found))})
+        self.known[text] = found
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:

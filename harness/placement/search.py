@@ -24,6 +24,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from math import dist
 from typing import TypeAlias
 
 import numpy as np
@@ -33,11 +34,11 @@ from harness.placement.session import Outcome, Question
 from problems.forms.assembly import Matrix
 from problems.model.scene import JointScene
 
-Ask: TypeAlias = Callable[[Sequence[Question]], list[Outcome]]
+Ask: TypeAlias = Callable[[Sequence[Question]], list[list[Outcome]]]
 Value: TypeAlias = tuple[float, float]
 Values: TypeAlias = dict[Place, Value]
 
-BLOCK = 50  # cases that are solved together
+TOGETHER, FEW = 25, 7  # cases of a question, at most; of an estimate
 MORE_CASES = 8  # than twice those that may fail, in an estimate: of fewer, a plan's worst may be new ones
 AT_ONCE = 8  # plans that are tried together
 NONE = (0.0, 0.0)  # less than any φ
@@ -87,17 +88,23 @@ class Search:
         return self.wholes([plan], moved)[0]
 
     def wholes(self, plans: Sequence[Plan], moved: str = "") -> list[Step]:
-        starts = range(0, self.cases, BLOCK)
-        blocks = [tuple(range(start, min(start + BLOCK, self.cases))) for start in starts]
-        found = iter(self.ask([Question(plan, block) for plan in plans for block in blocks]))
-        steps = []
-        for plan in plans:
-            parts = [next(found) for _ in blocks]
-            names = (each.name for each in fields(Outcome))
-            outcome = Outcome(*(tuple(v for p in parts for v in getattr(p, name)) for name in names))
-            steps.append(Step(plan, self.gap(outcome), outcome, moved))
-            self.said(steps[-1])
+        found = zip(plans, self._left(plans, range(self.cases), TOGETHER), strict=True)
+        steps = [Step(plan, self.gap(outcome), outcome, moved) for plan, outcome in found]
+        for step in steps:
+            self.said(step)
         return steps
+
+    def _left(
+        self, plans: Sequence[Plan], cases: Sequence[int], most: int, base: Plan | None = None
+    ) -> list[Outcome]:
+        """Of each plan, asked in parts of the cases that share no solution."""
+        parts = np.array_split(cases, -(-len(cases) // most))
+        found = self.ask([Question(tuple(plans), tuple(part.tolist()), base) for part in parts])
+        names = [each.name for each in fields(Outcome)]
+        return [
+            Outcome(*(tuple(v for part in each for v in getattr(part, name)) for name in names))
+            for each in zip(*found, strict=True)
+        ]
 
     def uniform(self) -> list[Step]:
         """What is tried to find the fewest fasteners in a uniform pattern: for each number of rows the most
@@ -143,9 +150,8 @@ class Search:
         even = uniform_plans(self.bare, len(step.plan) - 1)
         starts: dict[Plan, Values] = {onto(plan, self.candidates): {} for plan in even}
         starts[without(step.plan, self._least(step, before, 1)[0])] = before
-        start = min(
-            self.wholes(list(starts), "exchange"), key=lambda each: (round(each.gap_mm, DIGITS), each.plan)
-        )
+        found = self.wholes(list(starts), "exchange")
+        start = min(found, key=lambda each: (round(each.gap_mm, DIGITS), each.plan))
         return self.exchanged(start, starts[start.plan]), starts[start.plan]
 
     def removal(self, step: Step, before: Values) -> Iterator[Step]:
@@ -169,9 +175,8 @@ class Search:
             if len(fresh) >= count and sorted(fresh.values())[count - 1] <= before.get(waiting[0], NONE):
                 break
             some, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
-            fresh |= dict(
-                zip(some, self._values(step, [without(step.plan, each) for each in some]), strict=True)
-            )
+            values = self._values(step, [without(step.plan, each) for each in some])
+            fresh |= dict(zip(some, values, strict=True))
         before |= fresh
         return sorted(fresh, key=lambda place: (fresh[place], place))[:count]
 
@@ -218,8 +223,7 @@ class Search:
 
     def _values(self, step: Step, plans: Sequence[Plan], cases: tuple[int, ...] = ()) -> list[Value]:
         """φ of other plans, estimated. cases : those that decide, unless given."""
-        cases = cases or self._deciding(step)
-        found = self.ask([Question(plan, cases, step.plan) for plan in plans])
+        found = self._left(plans, cases or self._deciding(step), FEW, step.plan)
         return [
             (round(max(self.gap(each), self.limit_mm), DIGITS), round(float(np.mean(each.mean)), DIGITS))
             for each in found
@@ -240,6 +244,4 @@ def onto(plan: Plan, candidates: Plan) -> Plan:
 
 def nearest(places: Sequence[Place], to: Place | Matrix, count: int) -> list[Place]:
     """Those of the places that are nearest, the nearest first."""
-    return sorted(places, key=lambda place: ((place[0] - to[0]) ** 2 + (place[1] - to[1]) ** 2, place))[
-        :count
-    ]
+    return sorted(places, key=lambda place: (dist(place, to), place))[:count]

@@ -49,11 +49,9 @@ class Study:
 
 @dataclass(frozen=True)
 class Question:
-    """What a plan leaves in some cases. base : the plan from whose answers they are solved, as an estimate;
-    None: from nothing, and proven.
-    """
+    """What plans leave in some cases. base : the plan from whose answers they are estimated; none: proven."""
 
-    plan: Plan
+    plans: tuple[Plan, ...]
     cases: tuple[int, ...]
     base: Plan | None = None
 
@@ -78,25 +76,25 @@ class PlanSession:
         self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
         self.loads: dict[int, LoadCase] = {}
         self.columns: dict[Place, tuple[Vector, Vector]] = {}
-        self.solved: tuple[Plan, tuple[int, ...], list[Case]] | None = None
 
-    def answer(self, question: Question) -> Outcome:
-        """The same to the last bit, whatever was asked before."""
-        loads = self._loads(question.plan, question.cases)
-        if question.base is None:
-            gaps, error = self._proven(loads, self._solve(loads, [], TOLERANCE_MM))
-        else:
-            if self.solved is None or self.solved[:2] != (question.base, question.cases):
-                before = self._solve(self._loads(question.base, question.cases), [], ESTIMATE_MM)
-                self.solved = question.base, question.cases, before
-            cases = self._solve(loads, self.solved[2], ESTIMATE_MM)
+    def answer(self, question: Question) -> list[Outcome]:
+        """Of each plan. The same to the last bit, whatever was asked before."""
+        starts: list[Case] = []
+        if question.base is not None:
+            starts = self._solve(self._loads(question.base, question.cases), [], ESTIMATE_MM)
+        return [self._outcome(self._loads(plan, question.cases), starts) for plan in question.plans]
+
+    def _outcome(self, loads: list[LoadCase], starts: list[Case]) -> Outcome:
+        """starts : of an estimate, of each case."""
+        if starts:
+            cases = self._solve(loads, starts, ESTIMATE_MM)
             gaps = np.column_stack([self.sweeps.vectors(case)[1] for case in cases])
             error = np.zeros(len(loads))
+        else:
+            gaps, error = self._proven(loads, self._solve(loads, [], TOLERANCE_MM))
         largest = gaps.max(axis=0)
         mean = (np.maximum(gaps, 0.0) ** POWER).mean(axis=0) ** (1 / POWER)
-        return Outcome(
-            tuple((largest + error).tolist()), tuple(gaps.argmax(axis=0).tolist()), tuple(mean.tolist())
-        )
+        return Outcome(*(tuple(each.tolist()) for each in (largest + error, gaps.argmax(axis=0), mean)))
 
     def _solve(self, loads: list[LoadCase], starts: list[Case], tolerance: float) -> list[Case]:
         self.sweeps.last = []
@@ -138,7 +136,7 @@ class PlanSession:
 _sessions: dict[str, PlanSession] = {}  # the one that this process keeps, so that it opens the assembly once
 
 
-def answer(task: tuple[Study, Question]) -> Outcome:
+def answer(task: tuple[Study, Question]) -> list[Outcome]:
     study, question = task
     if study.key not in _sessions:
         _sessions.clear()

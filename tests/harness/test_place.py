@@ -66,8 +66,8 @@ def test_a_plan_leaves_what_a_scene_with_its_fasteners_leaves(strip: Path, sessi
     """Against `solve` on the scene with these fasteners and each gap, by another way to the loads."""
     plan = ((33.0, 12.5), (120.0, 40.0))
     read = read_scene(str(strip))
-    found = session.answer(Question(plan, (0, 1, 2)))
-    estimated = session.answer(Question(plan, (0, 1, 2), base=((33.0, 12.5),)))
+    (found,) = session.answer(Question((plan,), (0, 1, 2)))
+    _, estimated = session.answer(Question(((), plan), (0, 1, 2), base=((33.0, 12.5),)))
     np.testing.assert_allclose(estimated.largest, found.largest, rtol=0, atol=1e-6)
     text = strip.read_text().replace(
         "[[20.0, 10.0], [50.0, 25.0], [80.0, 40.0]]", str([list(p) for p in plan])
@@ -86,11 +86,11 @@ def test_what_is_not_proven_counts_against_a_plan(
     session: PlanSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its largest gap is no less than the proven upper bound of any."""
-    question = Question(((33.0, 12.5),), (0, 1))
-    sure = session.answer(question)
+    question = Question((((33.0, 12.5),),), (0, 1))
+    (sure,) = session.answer(question)
     m = session.data.assembly.m
     monkeypatch.setattr(session, "gap_error", lambda *_: np.linspace(0.0, 1e-3, m))
-    unsure = session.answer(question)
+    (unsure,) = session.answer(question)
     np.testing.assert_allclose(np.subtract(unsure.largest, sure.largest), 1e-3, rtol=0.01)
 
 
@@ -98,9 +98,9 @@ def test_an_outcome_is_that_of_its_question_alone(strip: Path, session: PlanSess
     """To the last bit, whatever was asked before: so that workers agree."""
     first, second = plans_of(strip, 1, 3), plans_of(strip, 1, 4)
     asked = [
-        Question(second, (0, 3), base=first),
-        Question(first, (1, 2)),
-        Question(first, (0, 3), base=second),
+        Question((second,), (0, 3), base=first),
+        Question((first, second), (1, 2)),
+        Question((first,), (0, 3), base=second),
     ]
     before = [session.answer(question) for question in asked]
     fresh = [PlanSession(session.study).answer(question) for question in reversed(asked)]
@@ -158,7 +158,7 @@ def test_lazy_removal_asks_less_and_finds_the_same(
         (least,) = search._least(step, {}, 1)
         step = search.whole(search_module.without(step.plan, least))
         greedy.append(step.gap_mm)
-    tried = sum(question.base is not None for question in asked)
+    tried = sum(len(question.plans) for question in asked if question.base is not None)
     assert tried < 8 * 9 // 2
     assert np.mean(found) <= 1.1 * np.mean(greedy)
 
@@ -195,19 +195,24 @@ def test_uniform_plans_of_any_number(strip: Path) -> None:
     assert plan_of(grid(bare, 3, 4)) == uniform_plans(bare, 12)[2]
 
 
-def told(strip: Path, candidates: Plan, gap_of: Any) -> Search:
-    """A search whose one case has these gaps."""
+def told(strip: Path, candidates: Plan, gap_of: Any, cases: int = 1) -> Search:
+    """A search whose cases have these gaps, each at another candidate, in turn."""
 
-    def ask(questions: Any) -> list[Outcome]:
-        return [Outcome((gap_of(question.plan),), (0,), (gap_of(question.plan),)) for question in questions]
+    def outcomes(question: Question) -> list[Outcome]:
+        found = [tuple(gap_of(plan, case) for case in question.cases) for plan in question.plans]
+        at = tuple(case % len(candidates) for case in question.cases)
+        return [Outcome(gaps, at, gaps) for gaps in found]
 
-    return Search(ask, study_of(strip).bare, np.zeros((1, 2)), candidates, 1, 0, 0.0)
+    bare = study_of(strip).bare
+    return Search(
+        lambda some: list(map(outcomes, some)), bare, np.array(candidates), candidates, cases, 0, 0.0
+    )
 
 
 def test_no_two_fasteners_next_to_each_other_go_at_once(strip: Path) -> None:
     """Of five in a line, needed less the further right, the two at the right are neighbours: one goes."""
     line = tuple((10.0 * k, 0.0) for k in range(5))
-    search = told(strip, line, lambda plan: sum(1.0 / (1.0 + x) for x, _ in set(line) - set(plan)))
+    search = told(strip, line, lambda plan, _: sum(1.0 / (1.0 + x) for x, _ in set(line) - set(plan)))
     start = search.whole(line)
     assert search._without_least(start, {}, 2).plan == line[:4]
     assert search._without_least(start, {}, 3).plan == (line[0], line[1], line[3])
@@ -217,9 +222,31 @@ def test_exchange_starts_from_uniform_plans_too(strip: Path) -> None:
     """Where only the uniform one of three is good, which no exchange would reach one by one."""
     candidates = plans_of(strip, 1, 9)
     even = tuple(candidates[k] for k in (1, 4, 7))
-    search = told(strip, candidates, lambda plan: 0.0 if plan == even else 1.0 + sum(x for x, _ in plan))
+    search = told(strip, candidates, lambda plan, _: 0.0 if plan == even else 1.0 + sum(x for x, _ in plan))
     found, _ = search.fewer(search.whole(candidates[:4]), {})
     assert (found.plan, found.gap_mm) == (even, 0.0)
+
+
+def test_exchange_goes_on_after_a_move_that_opens_another_case(strip: Path) -> None:
+    """The second hole is best in the cases that decide, and worst in one that does not; the third is next."""
+    first, second, third = ((10.0 * k, 0.0) for k in range(3))
+
+    def gap(plan: Plan, case: int) -> float:
+        return {(first,): 1.0, (second,): 2.0 if case == 15 else 0.2, (third,): 0.6}.get(plan, 3.0)
+
+    search = told(strip, (first, second, third), gap, cases=20)
+    found = search.exchanged(search.whole((first,)), {})
+    assert (found.plan, found.gap_mm) == ((third,), 0.6)
+
+
+def test_exchange_starts_from_what_is_least_in_all_cases(strip: Path) -> None:
+    """Not from a uniform plan that is good only in those that decide about another one."""
+    candidates = plans_of(strip, 1, 9)
+    search = told(
+        strip, candidates, lambda plan, case: 0.5 + (candidates[4] in plan and case == 15), cases=20
+    )
+    found, _ = search.fewer(search.whole(candidates[:2]), {})
+    assert found.gap_mm == 0.5
 
 
 def test_a_plan_moves_onto_the_nearest_free_holes() -> None:
@@ -376,5 +403,5 @@ def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)
     movable = Movable.of(read_scene(str(path)))
     study = Study(movable.bare, movable.fastener, Listed((load_case(movable.bare),)), "dual")
-    found = PlanSession(study).answer(Question(movable.own, (0,)))
+    (found,) = PlanSession(study).answer(Question((movable.own,), (0,)))
     assert found.largest[0] == pytest.approx(solve(str(path)).gap.max(), abs=1e-7)

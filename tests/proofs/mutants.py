@@ -190,7 +190,7 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "problems/stiffness/operator.py": {"solve(v / D) / D": ("solve(v)",)},
     "harness/placement/session.py": {
-        "(largest + error).tolist()": ("(largest - error).tolist()", "largest.tolist()"),
+        "(largest + error, ": ("(largest - error, ", "(largest, "),
         "u = f + force, u + overlap": ("u = f + force, u",),
         "np.zeros(len(loads))\n": ("-1e-4 * np.ones(len(loads))\n",),
     },
@@ -198,6 +198,8 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
         "reverse=True)[self.allowed]": ("reverse=True)[0]", "reverse=True)[self.allowed + 1]"),
         "set(nearest(step.plan, place, NEXT))": ("set()",),
         "for plan in even}": ("for plan in []}",),
+        "key=lambda each: (round(each.gap_mm, DIGITS), each.plan)": ("key=lambda each: each.plan",),
+        "set(more := self._deciding(after)) <= set(cases)": ("(more := self._deciding(after))",),
     },
     "solvers/algorithms/sweeps.py": {
         "self.A.T @ change.f / self.squares": ("self.A.T @ change.f",),
