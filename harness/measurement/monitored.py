@@ -38,6 +38,7 @@ THREAD_VARIABLES = (
     *("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"),
     *("VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS", "RAYON_NUM_THREADS"),
 )
+TRIM = "MALLOC_TRIM_THRESHOLD_"  # as Dask sets it, an array's memory is given back and fetched anew each time
 
 
 def environment(threads: int) -> dict[str, str]:
@@ -46,7 +47,8 @@ def environment(threads: int) -> dict[str, str]:
     if str(ROOT) not in (*site.getsitepackages(), site.getusersitepackages()):
         paths.insert(0, str(ROOT))
     count = dict.fromkeys(THREAD_VARIABLES, str(threads))
-    return {**os.environ, **count, "OMP_DYNAMIC": "FALSE", "PYTHONPATH": os.pathsep.join(paths)}
+    mine = {name: value for name, value in os.environ.items() if name != TRIM}
+    return {**mine, **count, "OMP_DYNAMIC": "FALSE", "PYTHONPATH": os.pathsep.join(paths)}
 
 
 class Monitored:

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from rich.console import Console
 
+from harness.measurement.monitored import TRIM
 from harness.results.provenance import PACKAGES, installed_version, usable_cores
 from problems.errors import Fault, InputError
 from problems.storage import ROOT, fingerprint
@@ -29,6 +30,7 @@ CONNECT_TIMEOUT = "20s"
 RETRIES = 2  # of a task that raises
 CODE = ("problems", "solvers", "harness")
 TASKS_PER_WORKER = 2  # one running, one waiting
+ENVIRONMENT = "distributed.nanny.pre-spawn-environ"  # of a local worker
 
 
 @contextmanager
@@ -39,12 +41,14 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
     has more than one thread or other versions than this process.
     """
     try:
+        from dask import config
         from distributed import Client, LocalCluster
     except ImportError as error:
         allowed = "needs Dask: pip install 'rivetbench[distributed]'"
         raise InputError.one("--scheduler", "scheduler", scheduler, f"{allowed} ({error})") from error
     if count := local_workers(scheduler):
-        with _uninterrupted():
+        environment = {name: value for name, value in config.get(ENVIRONMENT).items() if name != TRIM}
+        with config.set({ENVIRONMENT: environment}), _uninterrupted():
             cluster = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,

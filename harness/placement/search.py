@@ -38,7 +38,7 @@ Ask: TypeAlias = Callable[[Sequence[Question]], list[list[Outcome]]]
 Value: TypeAlias = tuple[float, float]
 Values: TypeAlias = dict[Place, Value]
 
-TOGETHER, FEW = 25, 7  # cases of a question, at most; of an estimate
+TOGETHER, FEW = 50, 14  # cases of two questions, at most; of estimates
 MORE_CASES = 8  # than twice those that may fail, in an estimate: of fewer, a plan's worst may be new ones
 AT_ONCE = 8  # plans that are tried together
 NONE = (0.0, 0.0)  # less than any φ
@@ -97,9 +97,9 @@ class Search:
     def _left(
         self, plans: Sequence[Plan], cases: Sequence[int], most: int, base: Plan | None = None
     ) -> list[Outcome]:
-        """Of each plan, asked in parts of the cases that share no solution."""
-        parts = np.array_split(cases, -(-len(cases) // most))
-        found = self.ask([Question(tuple(plans), tuple(part.tolist()), base) for part in parts])
+        """Of each plan, asked in parts of the cases, which share no solution: in pairs, for two workers."""
+        parts = [tuple(part.tolist()) for part in np.array_split(cases, 2 * -(-len(cases) // most))]
+        found = self.ask([Question(tuple(plans), part, base) for part in parts if part])
         names = [each.name for each in fields(Outcome)]
         return [
             Outcome(*(tuple(v for part in each for v in getattr(part, name)) for name in names))

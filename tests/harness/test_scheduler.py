@@ -26,6 +26,7 @@ from runs import heed_interrupts, rows_of, said_by, series_rows, wait_for
 from strip import write_strip
 
 from harness.measurement import scheduler
+from harness.measurement.monitored import TRIM, environment
 from harness.measurement.run import run as run_suite
 from harness.measurement.scheduler import (
     TASKS_PER_WORKER,
@@ -151,6 +152,16 @@ def test_local_workers_share_the_cores(
 ) -> None:
     monkeypatch.setattr(scheduler, "usable_cores", lambda: 8)
     assert scheduler.threads_per_worker(where) == each
+
+
+@needs_dask
+def test_local_workers_keep_the_memory_of_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor has a measurement on a worker that Dask began the setting by which it would give it back."""
+    with workers("local:1", QUIET) as (executor, _):
+        assert executor.submit(os.environ.get, TRIM).result() is None
+        assert executor.submit(os.environ.get, "OMP_NUM_THREADS").result() == "1"
+    monkeypatch.setenv(TRIM, "65536")
+    assert TRIM not in environment(1)
 
 
 @needs_dask
