@@ -30,6 +30,7 @@ ETA = 2.0**-1074  # the smallest positive number
 TERMS = 5  # of a row of a residual, or fewer: two exact ones of each product, and one
 MORE = 12  # roundings of what is not exact in a product beside those of its sums, or fewer
 ENTRIES_AT_A_TIME = 2**15  # of M: they and what is computed from them stay in the processor's cache
+WIDTH = 512  # columns of a dense M whose products are summed at once
 
 #: (rows, columns, M[rows, columns]), dense or CSR; M is zero beside.
 Panel = tuple[Any, slice, Any]
@@ -119,35 +120,42 @@ class Residual:
         most, most3, most_after = (abs(part).max(axis=0, initial=0.0) for part in (hi, x3, after))
         # |M₁| ≤ |M| + 2ᵗ⁻ᵇ, |M₂| ≤ 2ᵗ⁻ᵇ, |M₃| ≤ 2ᵗ⁻²ᵇ, entry by entry, where there is one. M₃ by the second
         # half of x is left out: a rounding of M₃x. Σ|terms| ≤ |Σ| + 2 Σ|products|, where u|Σ| covers γ²|Σ|.
-        rounding, again = gamma(longest + MORE), 4 * gamma(TERMS) ** 2
-        of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
-        if not sharp:  # γ² is within the 1 % of γ 2⁻ᵇ
-            of_parts = rounding * most_after, rounding * most, 0 * most
-        of_each = SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])
+        again = 4 * gamma(TERMS) ** 2
+
+        def of_each(rounding: float) -> Matrix:
+            of_parts = rounding * most3 + again * most, rounding * most_after, rounding * most
+            if not sharp:  # γ² is within the 1 % of γ 2⁻ᵇ
+                of_parts = rounding * most_after, rounding * most, 0 * most
+            return SAFE * np.stack([*of_parts, 8 * ETA * (1 + most) * (most > 0)])
+
+        terms = min(longest, WIDTH + -(-longest // WIDTH))
+        of_dense, of_sparse = of_each(gamma(terms + MORE)), of_each(gamma(longest + MORE))
         by_first, by_second, k = np.hstack([x1, x2, x3]), np.hstack([x1, after]), x1.shape[1]
         for rows, columns, panel in panels:
             entries, count, above, of_row = _scaled(panel, unit[columns])
             M1, beyond = cut(entries, of_row(above), bits)
             if sharp:
                 M2, M3 = cut(beyond, of_row(above - bits), bits)
-                first = _with(panel, M1) @ by_first[columns]
+                first = _times(panel, M1, by_first[columns])
                 small, rest = first[:, k : 2 * k], first[:, 2 * k :]
                 if M2.any():
-                    second = _with(panel, M2) @ by_second[columns]
+                    second = _times(panel, M2, by_second[columns])
                     small, rest = small + second[:, :k], rest + second[:, k:]
                 if M3.any():
-                    rest = rest + _with(panel, M3) @ hi[columns]
+                    rest = rest + _times(panel, M3, hi[columns])
             else:
-                first, small = _with(panel, M1) @ x1[columns], 0.0
-                rest = _with(panel, entries) @ after[columns]
+                first = _times(panel, M1, x1[columns])
+                small = np.zeros_like(first)
+                rest = _times(panel, entries, after[columns])
                 if beyond.any():
-                    rest = rest + _with(panel, beyond) @ x1[columns]
+                    rest = rest + _times(panel, beyond, x1[columns])
             value, lost = two_sum(self.hi[rows], -first[:, :k])
             self.hi[rows], error = two_sum(value, -small)
             self.lo[rows] += lost + (error - rest)
             of_M2 = count * np.exp2(above - bits)
             of_M1 = _with(panel, abs(entries)).sum(axis=1)[:, None] + of_M2
-            self.error[rows] += np.hstack([of_M1, of_M2, of_M2 * 2.0**-bits, count + 1]) @ of_each
+            of_rows = np.hstack([of_M1, of_M2, of_M2 * 2.0**-bits, count + 1])
+            self.error[rows] += of_rows @ (of_sparse if sp.issparse(panel) else of_dense)
 
     def subtract_small(self, panels: Iterable[Panel], longest: int, x: Matrix) -> None:
         """Mx in float64, with its rounding."""
@@ -197,6 +205,16 @@ def _scaled(panel: Any, unit: Vector) -> tuple[Matrix, Matrix, Matrix, Callable[
         np.maximum.reduceat(abs(entries), panel.indptr[:-1][count > 0]) if entries.size else 0
     )
     return entries, count[:, None], exponent(largest)[:, None], lambda of_row: np.repeat(of_row[:, 0], count)
+
+
+def _times(panel: Any, entries: Matrix, x: Matrix) -> Matrix:
+    """The panel with other entries times x; of a dense one, WIDTH columns at a time."""
+    if sp.issparse(panel):
+        return np.asarray(_with(panel, entries) @ x)
+    total: Matrix = entries[:, :WIDTH] @ x[:WIDTH]
+    for start in range(WIDTH, len(x), WIDTH):
+        total += entries[:, start : start + WIDTH] @ x[start : start + WIDTH]
+    return total
 
 
 def _with(panel: Any, entries: Matrix) -> Any:

@@ -120,7 +120,7 @@ class Proof:
         best = [Proven(x2[:, k], lam2[:, k], np.inf) for k in range(len(loads))]
         worse = np.zeros(len(loads), dtype=int)  # passes since a bound was halved
         left = np.arange(len(loads))  # the load cases of the columns
-        bounds, rounding = self.bounds(x2, lam2, r, s, translated=quick)
+        bounds, rounding = self.bounds(x2, lam2, r, s, quick, translated=quick)
         for step in range(MAX_PASSES):
             enough = np.maximum(enough_mm, AT_ROUNDING * rounding)
             going = np.zeros(len(left), dtype=bool)
@@ -142,7 +142,7 @@ class Proof:
             lam2 = DoubleDouble(np.where(negative, 0, lam2.hi), np.where(negative, 0, lam2.lo))
             if step == 0 and enough_mm:  # what was in float64 has moved by dx and dλ without rounding
                 r, s = units.moved(r, s, dx, dlam)
-                bounds, rounding = self.bounds(x2, lam2, r, s)
+                bounds, rounding = self.bounds(x2, lam2, r, s, quick)
             if step or not (bounds <= enough_mm).all():
                 r, s = units.residuals(load, x2, lam2)
                 bounds, rounding = self.bounds(x2, lam2, r, s)
@@ -150,11 +150,17 @@ class Proof:
         return [Proven(each.x.scaled(D), each.lam.scaled(R), each.bound_mm) for each in best]
 
     def bounds(
-        self, x: DoubleDouble, lam: DoubleDouble, r: Enclosure, s: Enclosure, translated: bool = False
+        self,
+        x: DoubleDouble,
+        lam: DoubleDouble,
+        r: Enclosure,
+        s: Enclosure,
+        compliant: bool = False,
+        translated: bool = False,
     ) -> tuple[Vector, Vector]:
         """(k,) mm of each column, and what of it is due to the rounding of x to float64.
 
-        translated : by z, with a solution with K.
+        compliant : by √(K⁻¹)_ii in place of D_i/√κ. translated : by z, with a solution with K.
         """
         units, asked = self.balanced, self.balanced.assembly.at_junction
         pressing = lam.hi > 0
@@ -162,8 +168,9 @@ class Proof:
         uncertain = s.error * (pressing | (s.value < s.error))
         D, lo = asked(units.D), abs(asked(x.lo))
         reach, distance = D / np.sqrt(self.kappa), np.zeros(x.hi.shape[1])
-        if translated:
+        if compliant:
             reach = np.minimum(reach, np.sqrt(self.compliance))
+        if translated:
             delta, uncertain, distance = self._translated(delta, uncertain)
         missed, force = length(abs(delta) + uncertain), length(abs(r.value) + r.error)
         stretch = np.sqrt(np.divide(units.stiffest, units.sigma2)) if missed.any() else 0.0

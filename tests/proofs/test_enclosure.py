@@ -8,6 +8,7 @@ import pytest
 import scipy.sparse as sp
 from exact_answer import exactly
 
+from harness.verification import enclosure
 from harness.verification.balanced import Balanced
 from harness.verification.enclosure import DoubleDouble, Enclosure, Residual, length, two_sum
 from problems.forms.assembly import Assembly, LoadCase
@@ -29,7 +30,7 @@ def residual_of(
     value: np.ndarray, M: np.ndarray, x: DoubleDouble, kind: str, sharp: bool = True
 ) -> Enclosure:
     total = Residual(value)
-    panel: Any = M if kind == "dense" else sp.csr_array(M)
+    panel: Any = sp.csr_array(M) if kind == "sparse" else M
     total.subtract_product([(WHOLE, WHOLE, panel)], M.shape[1], x, sharp)
     return total.enclosed()
 
@@ -49,11 +50,15 @@ def doubled(hi: np.ndarray, lo: np.ndarray | float = 0.0) -> DoubleDouble:
     return DoubleDouble(hi, np.broadcast_to(lo, hi.shape).copy())
 
 
-@pytest.mark.parametrize("kind", ["dense", "sparse"])
+@pytest.mark.parametrize("kind", ["dense", "dense, by columns", "sparse"])
 @pytest.mark.parametrize("cases", [1, 3])
 @pytest.mark.parametrize("sharp", [True, False])
 @pytest.mark.parametrize("seed", range(15))
-def test_a_residual_lies_within_its_bound(kind: str, cases: int, seed: int, sharp: bool) -> None:
+def test_a_residual_lies_within_its_bound(
+    kind: str, cases: int, seed: int, sharp: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if kind == "dense, by columns":
+        monkeypatch.setattr(enclosure, "WIDTH", 4)
     rng = np.random.default_rng(seed)
     M, hi = wild(rng, 6, 9) * (rng.random((6, 9)) < 0.7), wild(rng, 9, cases)
     x = doubled(hi, hi * rng.uniform(-1e-16, 1e-16, hi.shape))
@@ -65,6 +70,21 @@ def test_a_residual_lies_within_its_bound(kind: str, cases: int, seed: int, shar
     assert (
         found.error.max(axis=1) <= (1e-27 if sharp else 1e-20) * sizes + 3e-16 * abs(found.value).max(axis=1)
     ).all()
+
+
+@pytest.mark.parametrize("width", [7, 50])
+def test_sums_of_parts_are_in_less_doubt(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By γ of the roundings of one part and of their sum, not of a row's."""
+    rng = np.random.default_rng(0)
+    M, x = rng.standard_normal((3, 200)), doubled(rng.standard_normal((200, 2)))
+    whole = residual_of(M @ x.hi, M, x, "sparse", sharp=False)
+    monkeypatch.setattr(enclosure, "WIDTH", width)
+    parts = residual_of(M @ x.hi, M, x, "dense", sharp=False)
+    terms = width + -(-200 // width)
+    ratio = gamma(terms + enclosure.MORE) / gamma(200 + enclosure.MORE)
+    np.testing.assert_allclose(parts.error / whole.error, ratio, rtol=1e-3)
+    again = residual_of(M @ x.hi, M, x, "sparse", sharp=False)
+    np.testing.assert_array_equal(again.error, whole.error)
 
 
 #: n, and x and M with the only term of the product that is rounded; the least that its rounding may be.

@@ -59,7 +59,7 @@ def bound(
     force, gap = units.residuals(one, at, forces)
     force = Enclosure(force.value, force.error + r * units.D)
     gap = Enclosure(gap.value, gap.error + s * units.R)
-    return float(proof.bounds(at, forces, force, gap, translated)[0][0])
+    return float(proof.bounds(at, forces, force, gap, compliant=translated, translated=translated)[0][0])
 
 
 #: Springs of 4 and 16 N/mm; x* = (1, 2), λ* = 6 N.
@@ -153,6 +153,22 @@ def test_a_gap_is_closed_by_a_translation(share: float) -> None:
     assert wider * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 1.05 * wider
     proof.compliance = 1e9  # then it is D/√κ
     assert 4 * wider * (1 - 1e-12) <= bound(proof, LOAD, *at, translated=True) <= 4.15 * wider
+
+
+def test_a_corrected_answer_is_proven_by_the_compliance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As √(K⁻¹)_ii is less than 1/√κ, without a residual in twice the working precision."""
+    data, load, x, lam = beam(150, np.asfortranarray, 0)
+    proof, made = proof_of(data), list[bool]()
+    residuals = proof.balanced.residuals
+
+    def counted(*at: Any, sharp: bool = True) -> Any:
+        made.append(sharp)
+        return residuals(*at, sharp=sharp)
+
+    object.__setattr__(proof.balanced, "residuals", counted)
+    (found,) = proof.proven([load], [1.001 * lam], enough_mm=3e-7)
+    assert abs(found.x.hi - x).max() <= found.bound_mm <= 3e-7
+    assert made == [False]
 
 
 def test_the_rounding_of_what_a_translation_leaves_counts() -> None:
