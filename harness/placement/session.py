@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from uuid import uuid4
 
 import numpy as np
@@ -76,12 +77,11 @@ class PlanSession:
         self.proof, self.gap_error = proof_of(self.data), GapError.of(self.data.assembly)
         self.loads: dict[int, LoadCase] = {}
         self.columns: dict[Place, tuple[Vector, Vector]] = {}
+        self.starts = lru_cache(4)(lambda base, k: self._solve(self._loads(base, k), [], ESTIMATE_MM))
 
     def answer(self, question: Question) -> list[Outcome]:
         """Of each plan. The same to the last bit, whatever was asked before."""
-        starts: list[Case] = []
-        if question.base is not None:
-            starts = self._solve(self._loads(question.base, question.cases), [], ESTIMATE_MM)
+        starts = [] if question.base is None else self.starts(question.base, question.cases)
         return [self._outcome(self._loads(plan, question.cases), starts) for plan in question.plans]
 
     def _outcome(self, loads: list[LoadCase], starts: list[Case]) -> Outcome:
