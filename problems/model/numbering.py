@@ -57,6 +57,13 @@ def free_unknowns(model: PartModel) -> Indices:
     return np.concatenate([model.plate.line_dofs(line) for line in model.free_lines])
 
 
+def lines_across(model: PartModel) -> list[Indices]:
+    """The unknowns on each grid line across the longer direction of a part that are not built in."""
+    free = free_unknowns(model)
+    line = min(_grid_lines(model, free), key=_widest)
+    return [free[line == k] for k in range(line.min(), line.max() + 1)]
+
+
 def _grid_lines(model: PartModel, unknowns: Indices) -> tuple[Indices, Indices]:
     """The number of the grid line x = const, and that of y = const, on which each unknown lies."""
     nx, ny = len(model.plate.x), len(model.plate.y)
