@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from scipy.interpolate import LinearNDInterpolator
+from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from report.document.numbers import significant
 from report.results.answers import pair_name
@@ -32,7 +32,11 @@ def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure 
     if np.linalg.matrix_rank(nodes - low) < 2:
         return None
     X, Y = np.meshgrid(*(np.linspace(*ends, LINES) for ends in zip(low, high, strict=True)))
-    found = LinearNDInterpolator(nodes, np.column_stack([seen.first, gap]), rescale=True)(X, Y)
+    triangles = Triangulation(*((nodes - low) / (high - low)).T)
+    grid = (X - low[0]) / (high - low)[0], (Y - low[1]) / (high - low)[1]
+    first, between = (
+        LinearTriInterpolator(triangles, values)(*grid).filled(np.nan) for values in (seen.first, gap)
+    )
     colours = ScalarMappable(Normalize(0.0, max(float(gap.max()), TINY)), colormaps["viridis"])
     look: dict[str, Any] = {"rcount": LINES, "ccount": LINES, "lw": 0.2, "clip_on": False}
     with style.applied():
@@ -42,10 +46,8 @@ def deformed_figure(record: dict[str, Any], arrays: dict[str, Array]) -> Figure 
         sides = np.maximum((high - low) / (high - low).max(), NARROWEST)
         axes.set_box_aspect((*sides, HEIGHT), zoom=1.2)
         axes.view_init(azim=-60 if sides[0] >= sides[1] else -30)  # the longer side across the picture
-        axes.plot_surface(X, Y, found[..., 0], color=style.GREY, **look)
-        axes.plot_surface(
-            X, Y, found.sum(axis=-1), facecolors=colours.to_rgba(found[..., 1]), alpha=0.8, **look
-        )
+        axes.plot_surface(X, Y, first, color=style.GREY, **look)
+        axes.plot_surface(X, Y, first + between, facecolors=colours.to_rgba(between), alpha=0.8, **look)
         axes.set(xlabel="x, mm", ylabel="y, mm", zlabel="normal, mm")
         axes.locator_params(nbins=4)
         figure.suptitle(
