@@ -10,34 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import blas
 
+from problems.stiffness.dense import product
 from problems.stiffness.operator import Stiffness
 
 from .assembly import Assembly, Indices, Matrix, Vector
 from .banded_inverse import WINDOW_LINES, BandedInverse, Windows, of_windows
 
-#: Above this fraction of nonzero entries, a product with the whole matrix beats one with copied columns.
-SPARSE_LIMIT = 1 / 8
 #: A window of contacts → its principal submatrix of Q, stored by columns, which may be overwritten.
 Local = Callable[[Indices], Matrix]
-
-
-def product(G: Matrix, v: Matrix) -> Matrix:
-    """G v for G symmetric, column-major, v (m,) or columns (m, k). One reads a triangle, or only the
-    columns where v is nonzero.
-
-    Only SciPy's BLAS is called: NumPy's has its own thread pool, and each pool spins while the other works.
-    """
-    if v.ndim == 2 and v.shape[1] != 1:
-        return blas.dgemm(1.0, G, v)
-    one = v.ravel()
-    support = np.flatnonzero(one)
-    if support.size > SPARSE_LIMIT * len(one):
-        found = blas.dsymv(1.0, G, one, lower=1)  # faster than the upper triangle
-    else:
-        found = blas.dgemv(1.0, G.T[support].T, one[support]) if support.size else np.zeros(len(one))
-    return found.reshape(v.shape)
 
 
 @dataclass(frozen=True)

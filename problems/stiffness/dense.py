@@ -1,7 +1,7 @@
 """A dense block: K = UᵀU by LAPACK; and the dense blocks of a sparse K."""
 
 from collections.abc import Iterator
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -22,6 +22,8 @@ SMALL = 50  # unknowns below which eigenvalues are computed densely
 LEAST_ROWS = 16  # of a panel
 NORM_STEPS = 5  # of the power method, for v
 PANEL = 256  # columns
+#: Above this fraction of nonzero entries, a product with the whole matrix beats one with copied columns.
+SPARSE_LIMIT = 1 / 8
 
 
 class DenseBlock(Block):
@@ -47,6 +49,9 @@ class DenseBlock(Block):
     @property
     def numbers(self) -> int:
         return self.size**2
+
+    def multiply(self, x: Matrix) -> Matrix:
+        return product(self.matrix, x)
 
     def solve(self, b: Matrix) -> Matrix:
         """For a single column without LAPACK's blocked solution, which takes twice the time."""
@@ -117,16 +122,9 @@ class DenseBlock(Block):
             return float(values[0]), float(values[-1])
 
         v0 = np.random.default_rng(0).standard_normal(n)
+        operators = (LinearOperator((n, n), each, dtype=float) for each in (self.multiply, self.solve))
         largest, smallest_inverse = (
-            eigsh(
-                LinearOperator((n, n), matvec=product, dtype=float),
-                k=1,
-                which="LA",
-                v0=v0,
-                tol=1e-3,
-                return_eigenvectors=False,
-            )[0]
-            for product in (partial(blas.dsymv, 1.0, K, lower=1), self.solve)
+            eigsh(op, 1, which="LA", v0=v0, tol=1e-3, return_eigenvectors=False)[0] for op in operators
         )
         return float(1 / smallest_inverse), float(largest)
 
@@ -140,7 +138,7 @@ class InverseBlock(DenseBlock):
     @cached_property
     def matrix(self) -> Matrix:
         """K, by a Cholesky factor of Q, when it is first asked for. Raises NotPositiveDefinite."""
-        return np.asfortranarray(sla.cho_solve((cholesky(self.Q), False), np.eye(len(self.Q))))
+        return mirrored(sla.cho_solve((cholesky(self.Q), False), np.eye(len(self.Q), order="F")))
 
     @property
     def size(self) -> int:
@@ -155,6 +153,23 @@ class InverseBlock(DenseBlock):
 
     def solve(self, b: Matrix) -> Matrix:
         return self.Q @ b
+
+
+def product(G: Matrix, v: Matrix) -> Matrix:
+    """G v for G symmetric, column-major, v (m,) or columns (m, k). One reads a triangle, or only the
+    columns where v is nonzero.
+
+    Only SciPy's BLAS is called: NumPy's has its own thread pool, and each pool spins while the other works.
+    """
+    if v.ndim == 2 and v.shape[1] != 1:
+        return blas.dgemm(1.0, G, v)
+    one = v.ravel()
+    support = np.flatnonzero(one)
+    if support.size > SPARSE_LIMIT * len(one):
+        found = blas.dsymv(1.0, G, one, lower=1)  # faster than the upper triangle
+    else:
+        found = blas.dgemv(1.0, G.T[support].T, one[support]) if support.size else np.zeros(len(one))
+    return found.reshape(v.shape)
 
 
 def dense_blocks(K: sp.csr_array) -> list[Matrix]:

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.forms.assembly import LoadCase, Matrix, Vector
-from problems.forms.compliance import product
 from problems.forms.prepared import Prepared
+from problems.stiffness.dense import product
 
 from .newton_system import Direct, NewtonSystem
 

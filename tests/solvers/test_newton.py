@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small import by_nnls, definite
 
-from problems.forms.compliance import product
+from problems.stiffness.dense import product
 from solvers.algorithms.block_pivoting import MAX_STALE_PASSES, _towards, block_pivoting, forces_on
 
 
