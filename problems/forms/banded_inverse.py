@@ -69,10 +69,13 @@ class BandedInverse:
 
     def shifted_factor(self, s: Vector) -> BandFactor:
         """The Cholesky factor of I + diag(s) M diag(s)."""
-        shifted = self.scaled(s).band
-        shifted[0] += 1.0
-        every = np.ones(len(s), dtype=bool)
-        return BandFactor.of(every, np.arange(len(s)), shifted)
+        return self.scaled(s).stiffened_factor(np.ones(len(s)))
+
+    def stiffened_factor(self, d: Vector) -> BandFactor:
+        """The Cholesky factor of M + diag(d). Raises LinAlgError if rounding makes it indefinite."""
+        band = np.array(self.band[:-1], order="F")
+        band[0] += d
+        return BandFactor.of(np.ones(len(d), dtype=bool), np.arange(len(d)), band)
 
 
 @dataclass(frozen=True)

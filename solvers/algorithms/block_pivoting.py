@@ -15,7 +15,7 @@ from solvers.base import Answer
 from solvers.kkt import judged, kkt_status, rounding_of
 
 MAX_SETS = 1000  # of `solve_from`
-MAX_STALE_PASSES = 10  # passes without a new smallest count of wrong signs, before steps of descent
+MAX_STALE_PASSES = 2  # passes without a new smallest count of wrong signs, before steps of descent
 ROUNDING_FACTOR = 10.0  # times the observed rounding: a value closer to zero has no wrong sign
 SIGN_UNCERTAINTY = 1e-5  # of |y_C| where a change starts: smaller values have no reliable sign
 
@@ -53,7 +53,7 @@ def block_pivoting(
 
     Each pass exchanges every index with a wrong sign. A pass without a new smallest count of these only opens
     contacts, as long as a force is negative, and closes contacts once none is (as Hungerländer and Rendl 2015
-    reach a feasible point): this stops the oscillation that a few forces on a stiff part cause. After ten
+    reach a feasible point): this stops the oscillation that a few forces on a stiff part cause. After two
     such passes λ ≥ 0 moves towards the forces of each set, until the first of them is zero and opens; once
     none is negative, every wrong index closes (Lawson and Hanson 1974 close one). The objective decreases, so
     that no set comes back: for Q positive definite this ends, in exact arithmetic.

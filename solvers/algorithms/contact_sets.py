@@ -18,6 +18,8 @@ Appl. 4:303–320, 1969),
     (K + ρ A_C A_Cᵀ) dx = A_N λ_N + A_C (ρ y_C − dλ_C),        dλ_C ← dλ_C + ρ (A_Cᵀdx − y_C).
 
 Each pass reduces the error by 1 + ρ λmin(Q_CC) or more; what is left is for the next product with Q.
+
+Springs alone, ever stiffer, find a first set in both ways.
 """
 
 from __future__ import annotations
@@ -73,6 +75,31 @@ def banded_set(factor: OpenFactor, start: TrialSolution, C: Mask) -> TrialSoluti
     return TrialSolution(new, np.where(C, 0.0, y + z), SIGN_UNCERTAINTY * start.rounding)
 
 
+def yielding_set(M: BandedInverse, compliance: Vector, start: TrialSolution) -> Mask:
+    """The contact set of springs in place of contacts, ever stiffer; vectors in the order of M.
+
+    With springs ρ_i = τ/q_ii and λ⁺ = λ − ρy⁺ on C = {λ − ρy > 0}, λ⁺ = 0 on N (augmented Lagrangian),
+
+        (M + diag(ρ_C)) y⁺ = My − λ_N,
+
+    one step of Newton's method per τ, from the stiffness of the body at the overlaps v of the start,
+    vᵀMv / Σ v_i²/q_ii, to that of M. An edge of contact moves as far as the springs give way, however fine
+    the mesh, where pivoting moves it by a row of contacts per set (Hintermüller and Kunisch, SIAM J. Optim.
+    17:159–187, 2006). Where nothing overlaps, C = {λ_i q_ii > y_i}.
+    """
+    lam, y, overlap = start.lam, start.y, np.maximum(-start.y, 0.0)
+    if not overlap.any():
+        return lam * compliance > y
+    tau = float(overlap @ M.product(overlap)) / float(overlap @ (overlap / compliance))
+    stiffest, My = float((M.band[0] * compliance).mean()), M.product(y)
+    C = lam * compliance > tau * y
+    while tau < stiffest:
+        rho = np.where(C, tau / compliance, 0.0)
+        y = M.stiffened_factor(rho).solve(My - np.where(C, 0.0, lam))
+        C, tau = lam * compliance > tau * y, GROWTH * tau
+    return C
+
+
 class ContactSprings:
     """K with springs at closed contacts, in place of Q⁻¹; vectors in the order of A.
 
@@ -105,9 +132,8 @@ class ContactSprings:
     def first_set(self, load: LoadCase) -> Mask:
         """(m,) the contacts that overlap with springs as stiff as K. load : with p.
 
-        Springs alone, ever stiffer, one step of Newton's method per ρ from the stiffness of the body to that
-        of K: an edge of contact moves as far as they give way, however fine the mesh, where pivoting moves it
-        by a row of contacts per set (Hintermüller and Kunisch, SIAM J. Optim. 17:159–187, 2006).
+        As `yielding_set`, from λ = 0: one step of Newton's method per ρ, from the stiffness of the body to
+        that of K.
         """
         A, overlap = self.A, np.maximum(load.p, 0.0)
         C = overlap > 0

@@ -198,6 +198,22 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
 
+@pytest.mark.parametrize(("half_waves", "level"), [(2, 0.2), (4, 0.2), (6, 0.3)])
+def test_an_edge_of_contact_on_a_fine_mesh_moves_in_few_sets(half_waves: int, level: float) -> None:
+    """A beam over obstacles; 5 to 9 sets, where pivoting alone tries 103 to 325. The second answer starts
+    from forces where contact opens.
+    """
+    x, D = np.linspace(0, 1, 600), np.diff(np.eye(600), 2, axis=0)
+    Q = np.linalg.inv(1e4 * D.T @ D + 1e-2 * np.eye(600))
+    own = Sweeps(dual_alone(np.asfortranarray((Q + Q.T) / 2)))
+    p, start = level + np.cos(half_waves * np.pi * x), None
+    for load in (LoadCase(0 * q, -q, q) for q in (p, np.roll(p, 80))):
+        case = own.solved(load, 1e-8, start)
+        assert own.answer(case, 1e-8).status == "solved"
+        assert case.sets <= 15
+        start = WarmStart(load, *own.vectors(case))
+
+
 @pytest.mark.parametrize("form", ["dual", "sparse"])
 def test_forces_at_contacts_go_into_the_contacts_below(tmp_path: Path, form: Any) -> None:
     """δf = Aw: λ + w has the same x, which the start keeps; where a gap is too wide for w, it stays at λ."""
