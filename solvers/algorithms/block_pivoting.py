@@ -31,13 +31,17 @@ class TrialSolution:
 
 @dataclass(frozen=True)
 class PivotingResult:
-    """The contact set, its λ and y, the sets tried, the steps of descent, and whether every sign is right."""
+    """The contact set, its λ and y, the sets tried, the steps of descent, and whether every sign is right.
+
+    creeps : whether it was given up, as more than 3/5 of the signs that were wrong a set before still were.
+    """
 
     C: Mask
     trial: TrialSolution
     passes: int
     descents: int
     converged: bool
+    creeps: bool
 
 
 def wrong_signs(C: Mask, trial: TrialSolution, compliance: Vector, tolerance: float) -> Mask:
@@ -47,9 +51,14 @@ def wrong_signs(C: Mask, trial: TrialSolution, compliance: Vector, tolerance: fl
 
 
 def block_pivoting(
-    at: Callable[[Mask], TrialSolution], C: Mask, compliance: Vector, tolerance: float, passes: int
+    at: Callable[[Mask], TrialSolution],
+    C: Mask,
+    compliance: Vector,
+    tolerance: float,
+    passes: int,
+    patience: int | None = None,
 ) -> PivotingResult:
-    """Start from C and try at most `passes` sets.
+    """Start from C and try at most `passes` sets. patience : the set at which it is seen whether it creeps.
 
     Each pass exchanges every index with a wrong sign. A pass without a new smallest count of these only opens
     contacts, as long as a force is negative, and closes contacts once none is (as Hungerländer and Rendl 2015
@@ -59,11 +68,13 @@ def block_pivoting(
     that no set comes back: for Q positive definite this ends, in exact arithmetic.
     """
     fewest, stale, descents, lam = len(C) + 1, 0, 0, np.zeros(len(C))
+    count = 0
     for k in range(1, passes + 1):
         trial = at(C)
         wrong = wrong_signs(C, trial, compliance, tolerance)
-        count, negative = int(wrong.sum()), wrong & C
-        if not count or k == passes:
+        before, count, negative = count, int(wrong.sum()), wrong & C
+        creeps = k == patience and 5 * count > 3 * before
+        if not count or k == passes or creeps:
             break
         fewest, stale = (count, 0) if count < fewest else (fewest, stale + 1)
         if not descents and stale <= MAX_STALE_PASSES:
@@ -75,7 +86,7 @@ def block_pivoting(
             C = C & ~(negative & (lam == 0))
         else:
             lam, C = np.maximum(trial.lam, 0.0), C ^ wrong
-    return PivotingResult(C, trial, k, descents, not count)
+    return PivotingResult(C, trial, k, descents, not count, creeps)
 
 
 def _towards(aim: Vector, lam: Vector, negative: Mask) -> Vector:

@@ -17,9 +17,9 @@ A case starts from λ + αw, w = D⁻¹Aᵀδf, D = diag(AᵀA), δf its load le
 What fasteners press on two parts is a sum of columns of A: then δf = Aw, Qw = δp + δg takes no product, and
 α = 1 leaves x as it was. What contacts cannot carry is left to correct. α in [0, 1] makes ½λᵀQλ − pᵀλ least.
 
-An edge of contact creeps by about a row of contacts per set. A first set that a few sets do not settle is
-replaced by that of yielding contacts (`contact_sets.yielding_set`), whose edges move further. As long as λ is
-far from the solution, a product corrects more than further sets; so the limit on the sets of a sweep grows.
+An edge of contact creeps by about a row of contacts per set. Where the first sets do, the set of yielding
+contacts takes their place (`contact_sets.yielding_set`), whose edges move further. As long as λ is far from
+the solution, a product corrects more than further sets; so the limit on the sets of a sweep grows with them.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,8 +37,8 @@ from .block_pivoting import ROUNDING_FACTOR, TrialSolution, block_pivoting, wron
 from .contact_sets import ContactSprings, OpenFactor, banded_set, yielding_set
 
 MAX_SWEEPS = 200
-FIRST_SETS = 3  # contact sets in the first sweep; a start that they do not settle is far from the solution
-SETS, GROWTH = 5, 1.1  # in the k-th sweep SETS GROWTHᵏ
+FIRST_SETS, GROWTH = 5, 1.1  # contact sets in the first sweep, and those of the next ones to them
+PATIENCE = 3  # the contact set of the first sweep at which it is seen whether edges creep
 TARGET = 0.02  # of the tolerance: |y_C| that needs no further sweep; x can be off by some hundred times that
 STALLED, STALLED_MM = 3, 1e-8  # sweeps that do not halve the residual, at one that can be rounding
 SMALL = 2.0  # of the rounding of y: one that y may have brought along
@@ -220,13 +220,12 @@ class Sweeps:
             case.factor = case.factor or OpenFactor(self.M)
             at = partial(banded_set, case.factor, case.trial)
         floor = largest_rounding(self.own, case.load.p[self.order], case.trial.lam)
-        begins = self.M if case.sweeps == 0 else None
-        most = FIRST_SETS if begins else int(SETS * GROWTH**case.sweeps)
-        found = block_pivoting(at, case.C, self.own, floor, most)
-        if begins and not found.converged:
+        most, begins = int(FIRST_SETS * GROWTH**case.sweeps), self.M if case.sweeps == 0 else None
+        found = block_pivoting(at, case.C, self.own, floor, most, PATIENCE if begins else None)
+        if begins and found.creeps:
             case.sets += found.passes
             C = yielding_set(begins, self.own, case.trial)
-            found = block_pivoting(at, C, self.own, floor, most)
+            found = block_pivoting(at, C, self.own, floor, PATIENCE)
         unchanged = not (case.C ^ found.C).any()
         case.C, case.sets = found.C, case.sets + found.passes
         lam = found.trial.lam

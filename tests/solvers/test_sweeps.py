@@ -198,9 +198,9 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
 
-@pytest.mark.parametrize(("half_waves", "level"), [(2, 0.2), (4, 0.2), (6, 0.3)])
+@pytest.mark.parametrize(("half_waves", "level"), [(2, 0.2), (4, 0.2), (4, 0.3)])
 def test_an_edge_of_contact_on_a_fine_mesh_moves_in_few_sets(half_waves: int, level: float) -> None:
-    """A beam over obstacles; 5 to 9 sets, where pivoting alone tries 103 to 325. The second answer starts
+    """A beam over obstacles; 5 to 9 sets, where pivoting alone tries 103 to 237. The second answer starts
     from forces where contact opens.
     """
     x, D = np.linspace(0, 1, 600), np.diff(np.eye(600), 2, axis=0)
