@@ -69,13 +69,11 @@ class BandedInverse:
 
     def shifted_factor(self, s: Vector) -> BandFactor:
         """The Cholesky factor of I + diag(s) M diag(s)."""
-        return self.scaled(s).stiffened_factor(np.ones(len(s)))
+        return BandFactor.stiffened(self.scaled(s).band, 1.0)
 
     def stiffened_factor(self, d: Vector) -> BandFactor:
         """The Cholesky factor of M + diag(d). Raises LinAlgError if rounding makes it indefinite."""
-        band = np.array(self.band[:-1], order="F")
-        band[0] += d
-        return BandFactor.of(np.ones(len(d), dtype=bool), np.arange(len(d)), band)
+        return BandFactor.stiffened(np.array(self.band[:-1], order="F"), d)
 
 
 @dataclass(frozen=True)
@@ -93,6 +91,13 @@ class BandFactor:
         if info:
             raise np.linalg.LinAlgError(f"the leading minor {info} of M_SS is not positive definite")
         return cls(S, rows, L)
+
+    @classmethod
+    def stiffened(cls, band: Matrix, d: Vector | float) -> BandFactor:
+        """Of M + diag(d) on all contacts. band : of M, as in `of`."""
+        band[0] += d
+        every = np.ones(band.shape[1], dtype=bool)
+        return cls.of(every, np.arange(len(every)), band)
 
     def solve(self, b: Vector) -> Vector:
         """u (m,) with M_SS u_S = b_S and zero elsewhere."""

