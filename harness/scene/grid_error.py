@@ -21,7 +21,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import threadpoolctl
 
 from harness.scene.solution import Solution
 from harness.solving.session import candidates
@@ -59,9 +58,8 @@ def estimated(found: Solution, refine: bool = False) -> GridError | None:
     if not ratios:
         return None
     try:
-        with threadpoolctl.threadpool_limits(1):  # as for any sparse form
-            moved = _moved(found, coarse)
-            halved = _moved(found, regridded(joint, 2.0)) if refine else None
+        moved = _moved(found, coarse)
+        halved = _moved(found, regridded(joint, 2.0)) if refine else None
     except InputError:  # the answer stands without
         return None
     if halved is None:

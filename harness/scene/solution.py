@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import threadpoolctl
 
 from harness.planning.form_choice import Choice, chosen_form
 from harness.solving.session import answer_of, form_of
@@ -117,36 +116,32 @@ def solve(
         choice = chosen_form(scene, forms, asked)
     if choice.why:
         said(f"In the sparse form, without condensation: {choice.why}")
-    # A second thread gains nothing on narrow bands, and spins.
-    with threadpoolctl.threadpool_limits(1) if choice.form == "sparse" else nullcontext():
-        with step("matrices, loads and gaps"):
-            problem = opened(scene, choice.form, progress, limit_s)
-            _ = problem.prepared.assembly.K.factors
-            p = problem.prepared.dual_load(problem.load)
-        if np.isnan(p).any():
-            largest = float(abs(problem.load.f).max(initial=0.0))
-            raise InputError.one(
-                scene.source_of("f"), "largest |f|", largest, "loads with finite displacements"
-            )
-        for note in problem.prepared.assembly.notes:
-            said(note)
-        with step("answer with a proven bound"):
-            known = problem.reference
-        closest = float(-p.max()) if p.size else None
-        if named is None or closest is None or closest >= 0:
-            method = known.route if closest is not None and closest < 0 else LINEAR
-            answer = Answer("solved", known.lam, known.x)
-        else:
-            name, chosen = named
-            method = f"{name}, {choice.form} form, tolerance {tolerance:g}"
-            with step(f"solving with {name}"):
-                answer = answer_of(name, chosen, problem.prepared, choice.form, problem.load, tolerance)
-        assembly, x = problem.prepared.assembly, np.asarray(answer.x, dtype=float)
-        lam = np.full(assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
-        judgement = problem.judged(x, lam, LIMIT_MM)
-        if answer.x is known.x:  # its error is the bound
-            proven = known.bound_mm <= LIMIT_MM
-            judgement = replace(judgement, verdict="within" if proven else "cannot_be_judged")
+    with step("matrices, loads and gaps"):
+        problem = opened(scene, choice.form, progress, limit_s)
+        _ = problem.prepared.assembly.K.factors
+        p = problem.prepared.dual_load(problem.load)
+    if np.isnan(p).any():
+        largest = float(abs(problem.load.f).max(initial=0.0))
+        raise InputError.one(scene.source_of("f"), "largest |f|", largest, "loads with finite displacements")
+    for note in problem.prepared.assembly.notes:
+        said(note)
+    with step("answer with a proven bound"):
+        known = problem.reference
+    closest = float(-p.max()) if p.size else None
+    if named is None or closest is None or closest >= 0:
+        method = known.route if closest is not None and closest < 0 else LINEAR
+        answer = Answer("solved", known.lam, known.x)
+    else:
+        name, chosen = named
+        method = f"{name}, {choice.form} form, tolerance {tolerance:g}"
+        with step(f"solving with {name}"):
+            answer = answer_of(name, chosen, problem.prepared, choice.form, problem.load, tolerance)
+    assembly, x = problem.prepared.assembly, np.asarray(answer.x, dtype=float)
+    lam = np.full(assembly.m, np.nan) if answer.lam is None else np.asarray(answer.lam, dtype=float)
+    judgement = problem.judged(x, lam, LIMIT_MM)
+    if answer.x is known.x:  # its error is the bound
+        proven = known.bound_mm <= LIMIT_MM
+        judgement = replace(judgement, verdict="within" if proven else "cannot_be_judged")
     error = 0.0 if answer.x is known.x else judgement.displacement_error_mm
     return Solution(
         lam=lam,

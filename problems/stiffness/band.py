@@ -9,6 +9,7 @@ is in LAPACK's lower storage, (b + 1, N) by columns: entry (j + d, j) in row d. 
 from entry (i, j + 1): with b as its leading dimension, each block is an ordinary matrix, not copied.
 """
 
+from contextlib import nullcontext
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -22,6 +23,7 @@ from scipy.linalg import blas, lapack
 from . import Matrix
 
 NARROW = 64  # of a band: it is solved by dpbtrs
+WIDE = 700  # of a band: its factor gains from a second thread
 FEW = 2  # right-hand sides, for which dpbtrs is as fast
 COLUMNS_AT_A_TIME = 1024  # that and their entries stay in the processor's cache
 
@@ -54,9 +56,10 @@ def lower_band(K: sp.csc_array) -> Matrix:
 def band_cholesky(band: Matrix) -> tuple[Matrix, int]:
     """L (b + 1, N) of a symmetric band, which it replaces, and dpbtrf's info.
 
-    On one thread: a second one makes it 1.2 to 4 times slower at b = 80 to 420, as its steps are small.
+    On one thread up to b = 700: a second one makes it 1.2 to 4 times slower at b = 80 to 420, as its steps
+    are small, and takes 0.88, 0.64 and 0.57 of the time at 780, 1200 and 2273.
     """
-    with _threads().limit(limits=1):
+    with nullcontext() if len(band) > WIDE else _threads().limit(limits=1):
         L, info = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
     return L, int(info)
 
