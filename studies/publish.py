@@ -52,7 +52,7 @@ NAMES = (
 )
 DIGITS, DAY = 12, 10  # characters of a commit and of a time, where they are shortened
 #: The answers of a suite are kept, in one archive for the gate to judge anew, if they take at most this.
-KEPT_MIB = 5
+KEPT_KIB = 3800
 COLOURS = 256
 #: A longer time between two rows is not counted: the run was interrupted.
 LONGEST_PAUSE_S = 1200.0
@@ -162,7 +162,7 @@ def _unwanted(directory: Path) -> Iterator[Path]:
     """What is not published: locks, the scenes' arrays, and answers that are large."""
     yield from directory.glob("**/*.lock")
     yield from directory.glob("scenes")
-    if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_MIB * 2**20:
+    if sum(path.stat().st_size for path in directory.glob("answers/*")) > KEPT_KIB * 2**10:
         yield directory / "answers"
 
 

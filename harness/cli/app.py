@@ -41,7 +41,7 @@ def harness() -> None:
 
     \b
     Start here:
-      python -m harness run                       measure the suite `default` (9 minutes) and report on it
+      python -m harness run                       measure the suite `default` (8 minutes) and report on it
       python -m harness run --size 4386           the small problems only
       python -m harness list solvers              what can be measured
       python -m harness run --plugin mine.py      with a solver of your own

@@ -28,6 +28,7 @@ FEWEST_SCENES = 2  # of a size, that predict another one of it
 START = 1e-6  # of a search from nothing
 TIMES_BEHIND = 3.0  # the fastest library: what takes longer on FEWEST_SCENES scenes is not run on others
 TIMES_BEST_FORM = 3.0  # of a solver's seconds in its best form, after which another form of it is stopped
+TELLING_S = 1.0  # at a smaller size: what is quicker is largely constant, and does not grow
 LEAST_S = 10.0  # before what is left behind is stopped
 
 
@@ -151,7 +152,8 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     one. Else all scenes of the next smaller size n' on which the same solver, form and settings were
     measured, if its seconds there, or the limit that they exceeded, times (n/n')² are beyond the limit of m,
     or times n/n' in the sparse form: with dense matrices, time grows at least like n², with sparse ones like
-    n. (Not on rungs of ladders, where size is not what makes them hard.) Or else the other scenes of the size
+    n, beyond a constant: less than TELLING_S tells nothing. (Not on rungs of ladders, where size is not what
+    makes them hard.) Or else the other scenes of the size
     of m, if it was left behind on two or more of them, or on one and on all of n', and on none was not.
     """
     own = [row for row in rows if m.same_settings(row)]
@@ -164,7 +166,9 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     smaller = [row for row in own if row["n"] < n]
     alike = _of_largest([row for row in smaller if row["tolerance"] == m.tolerance])
     growth = [(n / row["n"]) ** (2 if m.form in DENSE_FORMS else 1) for row in alike]
-    if alike and all(g * _least(row) >= m.time_limit_s for g, row in zip(growth, alike, strict=True)):
+    took = [_least(row) for row in alike]
+    late = [g * s >= m.time_limit_s for g, s in zip(growth, took, strict=True)]
+    if alike and all(late) and min(took) >= TELLING_S:
         return _listed(alike)
     if m.stop_at_times_fastest is None:
         return ""

@@ -110,6 +110,13 @@ def test_seconds_at_a_smaller_size_grow_like_its_square(large):
     assert not predicted_timeout(large, 6112, [slow, fast])
 
 
+@pytest.mark.parametrize(("seconds", "late"), [(0.2, False), (1.1, True)])
+def test_what_is_constant_does_not_grow(large, seconds, late):
+    """0.2 s at n = 306, times 400, are no 80 s: a first call takes as long at any size."""
+    tiny = row("gallery/sheet-over-former", 306, solve_s=seconds) | {"status": "solved", "verdict": "within"}
+    assert bool(predicted_timeout(large, 6112, [tiny])) == late
+
+
 def test_what_is_not_run_says_so_and_counts_as_out_of_time(large, tmp_path):
     (told,) = run_task(Task([large], Description(["primal"], "1.0", ""), "4386/0107"), tmp_path).reports
     assert told == {"status": "not_run", "message": "too slow or too large already on 4386/0107"}

@@ -113,7 +113,7 @@ def test_scenes_large_answers_gaps_and_locks_are_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published")
-    for name, size in (("small", 1000), ("large", published.KEPT_MIB * 2**20 + 1)):
+    for name, size in (("small", 1000), ("large", published.KEPT_KIB * 2**10 + 1)):
         folder = tmp_path / name
         measured(folder, row())
         for file in ("answers/a.npz", "answers/.lock", ".lock", "scenes/a.npz"):

@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 FAIR = (ROOT / "docs/fair.md").read_text("utf-8")
 MEASURED = [name for name in NAMES if (PUBLISHED / name / "suite.toml").is_file()]
 Row = dict[str, Any]
-#: What published rows are older than: ladders of `hard` that are gone.
+#: What published rows are older than.
 OLDER = pytest.mark.xfail(strict=True, reason="the published rows are older than this rule")
 
 
@@ -158,7 +158,7 @@ def test_scenes_are_drawn() -> None:
     assert len(drawn_scenes(min(SIZES))) >= 3
 
 
-@pytest.mark.parametrize("suite", measured("hard"))
+@pytest.mark.parametrize("suite", MEASURED)
 def test_no_row_is_taken_out(suite: str) -> None:
     """What the suite beside the rows plans is there; of a search and of repeats by pace, the first."""
     plan = expand(read_written(PUBLISHED / suite / "suite.toml"))
@@ -186,7 +186,7 @@ def test_the_same_problem(suite: str) -> None:
     assert {len(each) for each in asked.values()} == {1}
 
 
-@pytest.mark.parametrize("suite", measured("hard", "accuracy"))
+@pytest.mark.parametrize("suite", measured("accuracy"))
 def test_the_same_machine(suite: str) -> None:
     """One for each scene, whose rows follow one another, repeat by repeat."""
     rows = [row for row in rows_of(suite) if row.get("case") is None]

@@ -90,6 +90,21 @@ def test_on_how_many_problems_from_the_literature_clarabel_is_faster() -> None:
     assert len(both) == 10
 
 
+def test_how_large_it_can_get_is_extrapolated_from_the_rows() -> None:
+    """N and b are counted; the rest is of the rows of newton in the sparse form."""
+    rows = results("scaling").rows.query("solver == 'newton' and form == 'sparse'").set_index("n")
+    table = (ROOT / "docs/large.md").read_text("utf-8").partition("| n | N | b |")[2].partition("\n\n")[0]
+    lines = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    assert len(lines) == 4
+    for n, N, b, *said in lines:
+        row, (size, width) = rows.loc[int(n.replace(" ", ""))], (float(t.replace(" ", "")) for t in (N, b))
+        prepared, solved, peak = row["prepare_s"], row["solve_s"], row["peak_rss_mib"] / 1024
+        rates = (1e9 * prepared / (size * width**2), 1e9 * solved / (size * width))
+        figures = (prepared, rates[0], solved, rates[1], peak)
+        for written, figure in zip(said, figures, strict=True):
+            assert float(written) == pytest.approx(figure, rel=0.05), n
+
+
 def test_the_index_is_that_of_the_rows(tmp_path: Path) -> None:
     for directory in PUBLISHED.iterdir():
         if directory.is_dir():
