@@ -51,6 +51,10 @@ def test_medians_and_worst_cases(tmp_path: Path) -> None:
     }
 
 
+def test_load_cases_of_a_series_are_told_elsewhere(tmp_path: Path) -> None:
+    assert drawn_scenes.section(results(tmp_path, [each | {"case": 0} for each in every_row()])) is None
+
+
 @pytest.mark.parametrize("methods", [1, 2])
 def test_the_picture_is_of_what_was_run_on_half_of_the_scenes(tmp_path: Path, methods: int) -> None:
     """Where that is one method only, of all that was run."""

@@ -75,7 +75,7 @@ def measured(scene: str, solver: str, seconds: float, products: int | None, **mo
 
 
 def test_seconds_and_products_stand_together(tmp_path: Path) -> None:
-    rows = [measured(LOW, "newton", 0.2, 15), measured(HIGH, "newton", 0.1, 12)]
+    rows = [measured(LOW, "newton", 0.2, None, iterations=15), measured(HIGH, "newton", 0.1, 12)]
     rows += [measured(LOW, "mprgp", 0.3, 11), measured(HIGH, "mprgp", 0.05, 14)]
     rows += [measured(LOW, "counts once", 0.4, 3), measured(HIGH, "counts once", 0.4, None)]
     rows += [measured(LOW, "slow", 0.0, None) | no_answer("time_limit")]
