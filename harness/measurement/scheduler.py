@@ -54,7 +54,7 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
                 threads_per_worker=1,
                 memory_limit=None,
                 dashboard_address=":0",
-                silence_logs=logging.ERROR,
+                silence_logs=logging.CRITICAL,  # a worker says of an ending that its heartbeat failed
             )
         try:
             with cluster, Client(cluster) as client, _silent_if_interrupted():
