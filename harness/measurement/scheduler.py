@@ -12,7 +12,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 from rich.console import Console
@@ -54,10 +54,10 @@ def workers(scheduler: str, console: Console) -> Iterator[tuple[Executor, int]]:
                 threads_per_worker=1,
                 memory_limit=None,
                 dashboard_address=":0",
-                silence_logs=logging.CRITICAL,  # a worker says of an ending that its heartbeat failed
+                silence_logs=logging.ERROR,
             )
         try:
-            with cluster, Client(cluster) as client, _silent_if_interrupted():
+            with cluster, Client(cluster) as client, _silent_if_interrupted(client):
                 yield _connected(client, scheduler, console)
         finally:
             logging.disable(logging.NOTSET)
@@ -84,12 +84,14 @@ def _uninterrupted() -> Iterator[None]:
 
 
 @contextmanager
-def _silent_if_interrupted() -> Iterator[None]:
-    """Dask logs each task that an interrupt cuts off, while it closes: not after one."""
+def _silent_if_interrupted(client: Any) -> Iterator[None]:
+    """Dask logs each task that an interrupt cuts off, its workers failing heartbeats: not after one."""
     try:
         yield
     except KeyboardInterrupt:
         logging.disable()
+        with suppress(OSError):  # they have ended
+            client.run(logging.disable, on_error="ignore")
         raise
 
 

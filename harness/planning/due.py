@@ -153,8 +153,8 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     measured, if its seconds there, or the limit that they exceeded, times (n/n')² are beyond the limit of m,
     or times n/n' in the sparse form: with dense matrices, time grows at least like n², with sparse ones like
     n, beyond a constant: less than TELLING_S tells nothing. (Not on rungs of ladders, where size is not what
-    makes them hard.) Or else the other scenes of the size
-    of m, if it was left behind on two or more of them, or on one and on all of n', and on none was not.
+    makes them hard.) Or else the other scenes of the size of m, if it was left behind on two or more of
+    them, or on one and on all of n', and on none was not.
     """
     own = [row for row in rows if m.same_settings(row)]
     looser = [row for row in own if row["scene"] == m.scene and row["tolerance"] >= m.tolerance]
@@ -166,9 +166,8 @@ def predicted_timeout(m: Measurement, n: int, rows: list[Row]) -> str:
     smaller = [row for row in own if row["n"] < n]
     alike = _of_largest([row for row in smaller if row["tolerance"] == m.tolerance])
     growth = [(n / row["n"]) ** (2 if m.form in DENSE_FORMS else 1) for row in alike]
-    took = [_least(row) for row in alike]
-    late = [g * s >= m.time_limit_s for g, s in zip(growth, took, strict=True)]
-    if alike and all(late) and min(took) >= TELLING_S:
+    late = [_least(row) >= max(TELLING_S, m.time_limit_s / g) for g, row in zip(growth, alike, strict=True)]
+    if alike and all(late):
         return _listed(alike)
     if m.stop_at_times_fastest is None:
         return ""

@@ -198,7 +198,11 @@ def test_a_start_on_the_same_contacts_needs_a_sweep_and_its_check() -> None:
     np.testing.assert_allclose(two.lam, one.lam + closed, atol=1e-6)
 
 
-@pytest.mark.parametrize(("half_waves", "level"), [(2, 0.2), (4, 0.2), (4, 0.3)])
+#: From a nearly right set, full exchanges circle: 86 sets.
+CIRCLES = pytest.param(6, 0.3, marks=pytest.mark.xfail(strict=True, reason="newton's second answer circles"))
+
+
+@pytest.mark.parametrize(("half_waves", "level"), [(2, 0.2), (4, 0.2), (4, 0.3), CIRCLES])
 def test_an_edge_of_contact_on_a_fine_mesh_moves_in_few_sets(half_waves: int, level: float) -> None:
     """A beam over obstacles; 5 to 9 sets, where pivoting alone tries 103 to 237. The second answer starts
     from forces where contact opens.
