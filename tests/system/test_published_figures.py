@@ -90,6 +90,28 @@ def test_on_how_many_problems_from_the_literature_clarabel_is_faster() -> None:
     assert len(both) == 10
 
 
+def test_the_suite_measured_twice_has_the_same_verdicts_and_these_ratios() -> None:
+    """docs/machine.md: the median over the scenes of solve time to newton's, each from its own rows."""
+    first, again = (results(name).rows.set_index("key").sort_index() for name in ("default", "default-again"))
+    assert list(first.index) == list(again.index)
+    assert list(first["verdict"]) == list(again["verdict"])
+    long = first["solve_s"] > 1
+    slower = (again["solve_s"] / first["solve_s"])[long]
+    least, most = significant(slower.min(), 2), significant(slower.max(), 2)
+    said = f"{least} to {most} times as long, {slower.median():.2f} in the median"
+    assert said in text("docs/machine.md")
+    sides = []
+    for rows in (first, again):
+        within = rows[rows["verdict"] == "within"]
+        spent = within.pivot_table("solve_s", "scene", ["solver", "form"])
+        sides.append(spent.div(spent["newton", "dual"], axis=0).median())
+    for (solver, form), group in first.groupby(["solver", "form"]):
+        count = f"{(group['verdict'] == 'within').sum()} of {len(group)}"
+        ratios = [significant(side[solver, form], 2) if (solver, form) in side else "–" for side in sides]
+        line = " | ".join([f"| `{solver}`", form, count, count, *ratios])
+        assert f"\n{line} |\n" in (ROOT / "docs/machine.md").read_text("utf-8")
+
+
 def test_how_large_it_can_get_is_extrapolated_from_the_rows() -> None:
     """N and b are counted; the rest is of the rows of newton in the sparse form."""
     rows = results("scaling").rows.query("solver == 'newton' and form == 'sparse'").set_index("n")
