@@ -23,12 +23,12 @@ def explore(
     PASS or FAIL with the largest gap, its place and its proven error. A plan can be kept beside the next
     one, and saved as a scene that `solve` answers alike. It is served to this machine only; Ctrl-C ends it.
 
-    \\b
+    \b
     Examples:
       python -m harness explore joint.toml
       python -m harness explore 4386/0107 --allow-gap 0.1 --no-open
 
-    \\b
+    \b
     Exit codes: 2 wrong usage or bad input, 130 ended.
     """
     with error_reporting("", "Ended.") as console:

@@ -93,6 +93,9 @@ def error_reporting(
     except OSError as error:
         errors.print(f"{error}{safe}", style="red")
         raise typer.Exit(WRONG_USAGE) from None
+    except MemoryError as error:
+        errors.print(f"Not enough memory: {error}{safe}", style="red")
+        raise typer.Exit(WRONG_USAGE) from None
     except KeyboardInterrupt:
         errors.print(interrupted, style="yellow")
         raise typer.Exit(INTERRUPTED) from None

@@ -47,13 +47,13 @@ def place(
     of them. DIR has the plan as a scene (plan.toml) and a table (plan.csv), and a report with the gap against
     the number of fasteners. Stop with Ctrl-C, run the same command again, and it continues.
 
-    \\b
+    \b
     Examples:
       python -m harness place joint.toml --allow-gap 0.05 --out results/fewer
       python -m harness place joint.toml --candidates 4x32 --allow-gap 0.3 --cases 200 --out results/plan
       python -m harness place joint.toml --candidates holes.csv --count 12 --scheduler local:2 --out results/b
 
-    \\b
+    \b
     Exit codes: 0 found, 2 wrong usage or bad input, 4 no plan keeps --allow-gap, 130 interrupted.
     """
     with error_reporting(
@@ -61,10 +61,11 @@ def place(
     ) as console:
         from harness.measurement.describe import described
         from harness.placement.candidates import Movable
-        from harness.placement.run import Goal, run
+        from harness.placement.run import OUTPUTS, Goal, run
         from harness.placement.session import Study
         from harness.planning.form_choice import chosen_form
         from harness.scene.allowed_gap import refuse_unusable
+        from harness.scene.atomic_output import refuse_inputs
         from harness.series.given import RANDOM, GivenCases
         from harness.terminal.console import waiting
         from problems.build import load_case
@@ -75,6 +76,8 @@ def place(
 
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         refuse_unusable(allow_gap)
+        inputs = [Path(each) for each in (scene, candidates, around, gaps) if each]
+        refuse_inputs([out / name for name in OUTPUTS], inputs)
         read = read_scene(scene)
         movable = Movable.of(read)
         holes = movable.candidates(candidates)

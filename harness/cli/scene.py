@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
+import shlex
 from pathlib import Path
+from string import Template
 from typing import Annotated, Any
 
+import tomlkit
 import typer
 
 from .options import NOTHING_WRITTEN, AllowGap, FormName, ReferenceLimit, SceneName, error_reporting, option
@@ -130,21 +132,27 @@ def init(
             raise InputError.one("--superelements", "FILE", None, "the file of K of each part")
         if file.exists() or file.is_symlink():
             raise InputError.one("FILE", "path", str(file), "exists: name another")
-        text = _of_parts(parts, file) if superelements else STARTER.read_text("utf-8")
+        path, folder = shlex.quote(str(file)), shlex.quote(f"results/{file.stem}")
+        if not path.isprintable():
+            raise InputError.one("FILE", "path", str(file), "a name on one line")
+        starter = STARTER_OF_PARTS if superelements else STARTER
+        text = Template(starter.read_text("utf-8")).substitute(FILE=path, **_of_parts(parts, file))
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text.replace("FILE", str(file)), "utf-8")
-        console.print(f"{file}: edit it, then `python -m harness solve {file} --out results/{file.stem}`.")
+        file.write_text(text, "utf-8")
+        console.print(f"{file}: edit it, then `python -m harness solve {path} --out {folder}`.")
 
 
-def _of_parts(parts: list[Path], scene: Path) -> str:
-    """The scene of parts whose K are in these files, their nodes beside them."""
+def _of_parts(parts: list[Path], scene: Path) -> dict[str, str]:
+    """What the scene says of parts whose K are in these files, their nodes beside them."""
     tables = ""
     for part in parts:
         there = Path(os.path.relpath(part, scene.parent)).as_posix()
         nodes = Path(there).with_suffix(".csv").as_posix()
-        files = f"superelement = {json.dumps(there)}\nnodes = {json.dumps(nodes)}\n"
-        tables += f"[[joint.part]]\nname = {json.dumps(part.stem)}\n{files}"
+        files = f"superelement = {_quoted(there)}\nnodes = {_quoted(nodes)}\n"
+        tables += f"[[joint.part]]\nname = {_quoted(part.stem)}\n{files}"
         tables += DOFS
-    title = " on ".join(part.stem for part in parts)
-    text = STARTER_OF_PARTS.read_text("utf-8")
-    return text.replace("TITLE", title).replace("PARTS\n", tables)
+    return {"TITLE": _quoted(" on ".join(part.stem for part in parts)), "PARTS": tables.rstrip()}
+
+
+def _quoted(text: str) -> str:
+    return tomlkit.string(text).as_string()

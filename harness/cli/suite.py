@@ -92,6 +92,7 @@ def run(
         from harness.planning.overrides import Overrides, overridden, tolerances_of
         from harness.planning.suite import read_suite, read_written
         from harness.results.records import MEASUREMENTS
+        from harness.scene.atomic_output import refuse_inputs
 
         change = Overrides(
             sizes=tuple(size or ()),
@@ -116,6 +117,8 @@ def run(
                 update={"threads": [threads_per_worker(scheduler) or chosen.threads[0]]}
             )
         directory = out or Path("results") / chosen.name
+        if not (directory / MEASUREMENTS).exists():
+            refuse_inputs([directory / written.name], [Path(suite)])
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         code = run_suite(chosen, directory, console, scheduler, key)
         if (directory / MEASUREMENTS).is_file():

@@ -7,6 +7,7 @@ proven right after. An answer that is not of the settings on the page is shown g
 from __future__ import annotations
 
 import secrets
+import shlex
 from collections.abc import Callable
 from html import escape
 from pathlib import Path
@@ -178,7 +179,8 @@ class Page:
             self.fault.text = "<br>".join(escape(str(fault)) for fault in faults)
             return
         limit = self.sliders["limit"].value
-        said = f"python -m harness solve {path} --allow-gap {limit:g} --out results/{path.stem}"
+        out = shlex.quote(f"results/{path.stem}")
+        said = f"python -m harness solve {shlex.quote(str(path))} --allow-gap {limit:g} --out {out}"
         self.fault.text = f"Saved. <code>{escape(said)}</code>"
 
 

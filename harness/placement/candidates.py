@@ -12,6 +12,7 @@ from problems.effects.fasteners import Fasteners
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix
 from problems.model.effect_tables import read_columns
+from problems.model.positions import MOST
 from problems.model.scene import JointScene, Scene
 
 Place = tuple[float, float]  # mm
@@ -51,6 +52,8 @@ class Movable:
             return self.own
         if pattern := ROWS_AND_COLUMNS.fullmatch(asked):
             rows, columns = map(int, pattern.groups())
+            if rows * columns > MOST:
+                raise InputError.one("--candidates", "holes", rows * columns, f"at most {MOST}")
             points, faults = grid(self.bare, rows, columns), []
         else:
             read = read_columns(Path(asked), {"x": "x", "y": "y"})

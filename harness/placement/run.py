@@ -38,6 +38,7 @@ from problems.scene import read_scene
 
 CONFIDENCE = 0.95  # that a share is shown
 RECORD = "place.json"
+OUTPUTS = (RECORD, PLANS, *(f"{name}.{kind}" for name in ("own", "plan") for kind in ("toml", "csv")))
 SERIES_TOLERANCE = 1e-11
 
 CasesOf = Callable[[Scene], LoadCases]

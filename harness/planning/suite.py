@@ -10,13 +10,13 @@ forms = ["dual"]
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import tomlkit
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -278,19 +278,4 @@ def _of_series(suite: Suite, path: Path) -> Iterator[Fault]:
 
 def to_toml(suite: Suite) -> str:
     """The suite as a TOML file that reads back as the same suite."""
-    data = suite.model_dump(exclude_none=True, exclude={"solver"})
-    lines = [f"{key} = {_value(value)}" for key, value in data.items()]
-    for entry in suite.solver:
-        lines += ["", "[[solver]]"]
-        lines += [f"{key} = {_value(value)}" for key, value in entry.model_dump(exclude_none=True).items()]
-    return "\n".join(lines) + "\n"
-
-
-def _value(value: Any) -> str:
-    match value:
-        case dict():
-            items = (f"{json.dumps(str(key))} = {_value(item)}" for key, item in value.items())
-            return "{" + ", ".join(items) + "}"
-        case list():
-            return "[" + ", ".join(map(_value, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
+    return tomlkit.dumps(suite.model_dump(mode="json", exclude_none=True))

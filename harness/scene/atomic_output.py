@@ -24,7 +24,7 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     whatever the block raises, nothing has changed. Raises InputError if `out` is no regular file or folder,
     is of the other kind, or is one of the inputs.
     """
-    _check([out], inputs)
+    refuse_inputs([out], inputs)
     target = resolved(out)
     target.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=target.parent, prefix=".rivetbench.") as folder:
@@ -34,7 +34,7 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
             kind = "folder" if new.is_dir() else "file"
             raise InputError.one("--out", "path", str(out), f"a {kind} is to be written, and this is none")
         if new.is_dir():
-            _check([out / path.name for path in new.iterdir()], inputs)
+            refuse_inputs([out / path.name for path in new.iterdir()], inputs)
             target.mkdir(exist_ok=True)
             for path in _listed(target):
                 path.unlink(missing_ok=True)
@@ -59,7 +59,8 @@ def _listed(folder: Path) -> set[Path]:
         return set()
 
 
-def _check(targets: Sequence[Path], inputs: Sequence[Path]) -> None:
+def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path]) -> None:
+    """Raise InputError if one of the targets is one of the inputs, or neither a file nor a folder."""
     for path in targets:
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise InputError.one("--out", "path", str(path), "no regular file: name another")

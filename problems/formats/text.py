@@ -65,8 +65,10 @@ def labelled_abaqus(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
     unknowns, place = np.unique(np.vstack(np.hsplit(rows[:, :-1], 2)), axis=0, return_inverse=True)
     i, j = place.reshape(2, -1)
     n = len(unknowns)
+    if twice := len(rows) - len(np.unique(i * n + j)):
+        raise InputError.one(path, "entries that are there already", twice, "each row and column once")
     K = sp.csr_array(sp.coo_array((rows[:, -1], (i, j)), shape=(n, n)))
-    if sp.tril(K, -1).nnz == 0 or sp.triu(K, 1).nnz == 0:
+    if len(np.unique(np.minimum(i, j) * n + np.maximum(i, j))) == len(rows):  # one of (i, j) and (j, i)
         K = K + K.T - sp.diags_array(K.diagonal())
     labels = unknowns.astype(np.intp) if unknowns.shape[1] == 2 else None
     return sp.csr_array(K), labels
@@ -87,6 +89,8 @@ def _rows(path: Path) -> np.ndarray:
             if len(row) not in (3, 5) or (rows and len(row) != len(rows[0])):
                 allowed = "node, dof, node, dof, value; or row, column, value; the same on every line"
                 faults.append(Fault(str(path), f"line {number}", line.strip(), allowed))
+            elif not all(map(float.is_integer, row[:-1])):
+                faults.append(Fault(str(path), f"line {number}", line.strip(), "whole numbers but the last"))
             else:
                 rows.append(row)
     if not rows and not faults:

@@ -25,11 +25,14 @@ from problems.model.effect_tables import read_columns
 from problems.model.interface import AnyJoint
 
 NOISE = 1e-3  # ν
+MOST = 5000  # points of a scan: WCWᵀ is dense
 
 
 def read_scan(path: Path, joint: AnyJoint) -> Matrix:
     """(s, 3) x, y and gap in mm. Raises InputError with all faults, also of points off the junction."""
     read = read_columns(path, {name: name for name in ("x", "y", "gap")})
+    if len(read.rows) > MOST:
+        raise InputError.one(path, "points", len(read.rows), f"at most {MOST}: thin the scan out")
     points = np.array(read.rows).reshape(-1, 3)
     outside = [
         Fault(str(path), f"line {read.lines[k]}", points[k, :2].tolist(), joint.region)

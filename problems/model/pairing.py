@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from problems.forms.assembly import Indices, Matrix, Vector
+from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
 from .surface import Surface, cross
 
@@ -32,7 +32,7 @@ class Pairing:
     """Of faces a and b. nodes (c,) : the contacts, as nodes of a. W (c, nodes of b) : weights of their feet.
 
     apart (c,) : t, mm. beyond : how many nodes of a have no foot on b. far : those too far from it, by t.
-    crossed : triangles of a whose feet go round the other way.
+    crossed : triangles of a whose feet go round the other way. lost : nodes near b whose foot was not found.
     """
 
     nodes: Indices
@@ -41,6 +41,7 @@ class Pairing:
     beyond: int = 0
     far: dict[int, float] = field(default_factory=dict)
     crossed: tuple[tuple[int, ...], ...] = ()
+    lost: tuple[int, ...] = ()
 
 
 def with_tool(a: Face) -> Pairing:
@@ -51,8 +52,10 @@ def with_tool(a: Face) -> Pairing:
 
 def paired(a: Face, b: Face, distance: float) -> Pairing:
     """distance : up to which |t| two surfaces may touch, mm."""
-    t, foot = _feet(a, b)
-    on = b.surface.covers(foot)
+    from scipy.spatial import cKDTree
+
+    t, foot, found = _feet(a, b)
+    on = found & b.surface.covers(foot)
     near = on & (abs(t) <= distance)
     nodes = np.flatnonzero(near)
     far = {int(k): float(t[k]) for k in np.flatnonzero(on & ~near)}
@@ -61,20 +64,33 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
     u, v = (foot[corners[:, k]] - foot[corners[:, 0]] for k in (1, 2))
     turned = corners[cross(u, v) <= 0]
     crossed = tuple(tuple(each) for each in turned.tolist())
-    return Pairing(nodes, b.surface.weights(foot[nodes]), t[nodes], int((~on).sum()), far, crossed)
+    missed = np.flatnonzero(~found)
+    lost = missed[cKDTree(b.xyz).query(a.xyz[missed])[0] <= distance]
+    W = b.surface.weights(foot[nodes])
+    return Pairing(nodes, W, t[nodes], int((~on).sum()), far, crossed, tuple(lost.tolist()))
 
 
-def _feet(a: Face, b: Face) -> tuple[Vector, Matrix]:
-    """t (c,) and the feet (c, 2): from b's nearest node on, the height of b there, again and again."""
+def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask]:
+    """t (c,), the feet (c, 2), and which were found: from b's nearest node on by Newton's method.
+
+    At q = p + tn, b is the plane through its point above q with its normal m there, or beyond its surface
+    that of the node nearest to q: t changes by r·m / n·m, with r from q to the point.
+    """
     from scipy.spatial import cKDTree
 
-    p, n = a.xyz, a.normals
-    t = ((b.xyz[cKDTree(b.xyz).query(p)[1]] - p) * n).sum(axis=1)
+    p, n, tree = a.xyz, a.normals, cKDTree(b.xyz)
+    t = ((b.xyz[tree.query(p)[1]] - p) * n).sum(axis=1)
     for _ in range(STEPS):
         q = p + t[:, None] * n
-        over = b.surface.weights(q[:, :2]) @ b.xyz[:, 2]
-        step = np.where(b.surface.covers(q[:, :2]), over - q[:, 2], 0.0) / n[:, 2]
-        t = t + step
-        if abs(step).max(initial=0.0) <= SETTLED:
+        off = ~b.surface.covers(q[:, :2])
+        W = b.surface.weights(q[:, :2])
+        point, m = W @ b.xyz, W @ b.normals
+        nearest = tree.query(q[off])[1]
+        point[off], m[off] = b.xyz[nearest], b.normals[nearest]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = ((point - q) * m).sum(axis=1) / (n * m).sum(axis=1)
+        found = abs(step) <= SETTLED
+        t = t + np.nan_to_num(step, nan=0.0, posinf=0.0, neginf=0.0)
+        if found.all():
             break
-    return t, (p + t[:, None] * n)[:, :2]
+    return t, (p + t[:, None] * n)[:, :2], found

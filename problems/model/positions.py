@@ -16,11 +16,12 @@ from .interface import AnyJoint
 from .joint import Faults, Table
 
 FORCES = ("preload", "clamping_force")  # keys of the effects that press at points
+MOST = 10_000  # points of a pattern
 TEARS = 400.0  # N/mm² of the square of a thickness: the yield stress of an aluminium alloy
 
 
 class Pattern(Table):
-    """columns × rows points, evenly spaced over the junction up to `edge` mm from its border.
+    """columns × rows points, evenly spaced over the junction up to `edge` mm from its border; at most MOST.
 
     on_nodes : each is moved to the nearest node of the junction.
     """
@@ -29,6 +30,12 @@ class Pattern(Table):
     rows: Annotated[int, Field(ge=1, le=10_000)]
     edge: Annotated[NotNegative, "mm"] = 0.0
     on_nodes: bool = False
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Pattern:
+        if self.columns * self.rows > MOST:
+            raise ValueError(f"must be at most {MOST} points")
+        return self
 
 
 class Positions(ForceEffect):

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 import scipy.linalg as sla
 import scipy.sparse as sp
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from problems import storage
 from problems.errors import InputError
@@ -47,6 +47,13 @@ class SuperelementTable(Table):
     superelement: str
     nodes: str
     dofs: Annotated[tuple[Dof, ...], Field(min_length=1, max_length=6)] = (3,)
+
+    @field_validator("dofs")
+    @classmethod
+    def _each_once(cls, dofs: tuple[Dof, ...]) -> tuple[Dof, ...]:
+        if len(set(dofs)) < len(dofs):
+            raise ValueError("must name each once")
+        return dofs
 
 
 @dataclass(frozen=True, eq=False)

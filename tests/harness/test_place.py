@@ -366,6 +366,7 @@ def test_a_share_needs_cases_to_show_it() -> None:
         ((), ["goal", "--allow-gap MM, or --count N"]),
         (("--count", 4), ["--count", "at most 3"]),
         (("--candidates", "holes.csv", "--count", 1), ["holes.csv", "[900.0, 10.0]", "is there twice"]),
+        (("--candidates", "9999x9999", "--count", 1), ["holes = 99980001", "at most 10000"]),
         (("--candidates", "2by4", "--count", 1), ["2by4", "readable"]),
         (("--count", 1, "--gaps", "g.csv", "--seed", 1), ["random gaps or --gaps"]),
         (("--count", 1, "--cases", 10), ["--share", "take 59"]),
@@ -396,6 +397,15 @@ def test_scenes_whose_fasteners_cannot_move(tmp_path: Path, fasteners: str, said
     path.write_text(two_parts() + GAP.replace("60.0", "50.0") + fasteners)
     with pytest.raises(InputError, match=said):
         Movable.of(read_scene(str(path)))
+
+
+def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:
+    plan = tmp_path / "plan.toml"
+    plan.write_text(strip.read_text())
+    done = harness("place", plan, "--count", 2, "--out", tmp_path)
+    assert done.exit_code == 2
+    assert f"'{plan}': is one of the files that are read" in done.stderr
+    assert [each.name for each in tmp_path.iterdir()] == ["plan.toml"]
 
 
 def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import tiny
+from commands import harness
 
 from harness.planning.overrides import Overrides, overridden
 from harness.planning.plan import Measurement, expand, with_key
@@ -89,7 +90,18 @@ def test_an_entry_may_have_numbers_of_threads_of_its_own(tmp_path: Path) -> None
 
 def test_what_is_written_beside_the_rows_reads_back_the_same(tmp_path: Path) -> None:
     suite = read_suite(str(tiny.write_suite(tmp_path, TWO, title='a "quoted" title — ü')))
+    odd = {"description": "\x7f\n\\ \U0001f600", "time_limit_by_size_s": {12: 1e-9}}
+    suite = suite.model_copy(update=odd)
     assert validated(tomllib.loads(to_toml(suite)), tmp_path / "suite.toml") == suite
+
+
+def test_the_file_of_a_suite_is_not_written(tmp_path: Path) -> None:
+    path = tiny.write_suite(tmp_path, TWO).rename(tmp_path / "suite.toml")
+    before = path.read_text()
+    done = harness("run", path, "--out", tmp_path)
+    assert done.exit_code == 2
+    assert f"'{path}': is one of the files that are read" in done.stderr
+    assert path.read_text() == before
 
 
 def test_all_faults_of_a_suite_come_at_once(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import csv
 import json
 import runpy
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,19 @@ def test_the_starter_needs_one_edit(folder: Path) -> None:
     assert read_scene(str(folder / "edited.toml")).joint.names == ("wing", "frame")
     assert harness("init", "--superelements", folder / "wing.npz", folder / "scene.toml").exit_code == 2
     assert harness("init", "--superelements", folder / "new.toml").exit_code == 2
+
+
+@pytest.mark.parametrize("name", ["PROFILE", "$FILE", 'PARTS "A"', "TITLE\\n", "a\nb = 1", "\x7f\U0001f600"])
+def test_a_part_may_have_any_name(name: str, tmp_path: Path) -> None:
+    scene = tmp_path / "my scene.toml"
+    assert harness("init", "--superelements", tmp_path / f"{name}.npz", scene).exit_code == 0
+    text = scene.read_text("utf-8")
+    assert f"solve '{scene}' --allow-gap" in text
+    written = tomllib.loads(text)
+    (part,) = written["joint"]["part"]
+    assert part["name"] == written["title"] == name
+    assert (part["superelement"], part["nodes"]) == (f"{name}.npz", f"{name}.csv")
+    assert harness("init", tmp_path / "two\nlines.toml").exit_code == 2
 
 
 def test_validate_says_what_there_is(folder: Path) -> None:

@@ -69,6 +69,11 @@ def test_pattern_spreads_evenly_up_to_the_edge() -> None:
     np.testing.assert_allclose(patterned(columns=1, rows=1, edge=20.0).marks(JOINT), [(200.0, 60.0)])
 
 
+def test_a_pattern_has_no_more_points_than_a_structure() -> None:
+    with pytest.raises(ValidationError, match="at most 10000 points"):
+        patterned(columns=10_000, rows=2)
+
+
 def test_a_pattern_on_nodes_has_the_nearest_of_each_axis() -> None:
     free, moved = (patterned(columns=7, rows=3, edge=20.0, on_nodes=on) for on in (False, True))
     x, y = (np.array(sorted(set(free.marks(JOINT)[:, axis]))) for axis in (0, 1))

@@ -110,7 +110,7 @@ def test_a_stiffness_that_nastran_calls_otherwise(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.load(tmp_path / "out.npz")["K"], K)
 
 
-@pytest.mark.parametrize("shape", ["lower", "upper", "both"])
+@pytest.mark.parametrize("shape", ["lower", "upper", "both", "mixed"])
 @pytest.mark.parametrize("labels", [True, False])
 def test_abaqus_text_in_its_shapes(shape: str, labels: bool, tmp_path: Path) -> None:
     """Nodes 7, 12 and 100 with the degrees of freedom 3 and 1 3; by hand, one number without exponent."""
@@ -119,7 +119,7 @@ def test_abaqus_text_in_its_shapes(shape: str, labels: bool, tmp_path: Path) -> 
     lines = ["** made by hand", "*MATRIX INPUT"]
     for i in range(4):
         for j in range(4):
-            wanted = {"lower": i >= j, "upper": i <= j, "both": True}[shape]
+            wanted = {"lower": i >= j, "upper": i <= j, "both": True, "mixed": (i + j) % 2 == (i < j)}[shape]
             if K[i, j] and wanted:
                 where = [*at[i], *at[j]] if labels else [i + 1, j + 1]
                 lines.append(", ".join(map(str, where)) + f", {K[i, j]:.17e}")
@@ -129,10 +129,16 @@ def test_abaqus_text_in_its_shapes(shape: str, labels: bool, tmp_path: Path) -> 
 
 
 def test_bad_lines_of_abaqus_text_are_named(tmp_path: Path) -> None:
-    (tmp_path / "K.mtx").write_text("1,3,1,3,5.0\n1,3,2,3,what\n2,3,2,3\n\n2,2,1.0\n")
+    (tmp_path / "K.mtx").write_text("1,3,1,3,5.0\n1,3,2,3,what\n2,3,2,3\n\n2,2,1.0\n1.5,3,2,3,1.0\n")
     with pytest.raises(InputError) as error:
         formats.read(tmp_path / "K.mtx")
-    assert [fault.key for fault in error.value.faults] == ["line 2", "line 3", "line 5"]
+    assert [fault.key for fault in error.value.faults] == ["line 2", "line 3", "line 5", "line 6"]
+
+
+def test_an_entry_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "K.mtx").write_text("1,1,5.0\n2,2,5.0\n2,1,1.0\n2,1,1.0\n")
+    with pytest.raises(InputError, match="already = 1: each row and column once"):
+        formats.read(tmp_path / "K.mtx")
 
 
 def test_the_format_of_a_file_is_known_without_its_library() -> None:

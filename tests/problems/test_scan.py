@@ -77,6 +77,8 @@ def test_a_scan_off_the_junction_or_beside_a_measured_gap(tmp_path: Path) -> Non
     with pytest.raises(InputError) as error:
         cases(tmp_path, SCAN + np.array([1.0, 0.0, 0.0]))
     assert [(fault.key, fault.value) for fault in error.value.faults] == [("line 5", [401.0, 120.0])]
+    with pytest.raises(InputError, match="points = 5001: at most 5000"):
+        cases(tmp_path, np.zeros((5001, 3)))
     cases(tmp_path)
     measured = MeasuredGap(kind="measured_gap", points=((0, 0, 1), (9, 0, 1), (0, 9, 1)))
     with pytest.raises(InputError, match=r"scan\.csv would be added"):

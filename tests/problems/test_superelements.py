@@ -15,7 +15,9 @@ from superelements import Array, Tables, flat, scene_from, solved, stiffnesses, 
 
 from problems.build import load_case, model_of, prepared
 from problems.errors import InputError
+from problems.model.pairing import Face, paired
 from problems.model.scene import JointScene
+from problems.model.surface import surface_of
 from problems.scene import scene_of
 
 JOINT = two_plates()
@@ -240,6 +242,36 @@ def test_contacts_of_curved_surfaces_are_along_their_normals(tmp_path: Path) -> 
         radial[joint.unknowns(name)] = part.nodes.normal.ravel()
         np.testing.assert_allclose(A.T @ radial, sign, atol=1e-3)
     assert solved(scene).gap.min() > -1e-9
+
+
+@pytest.mark.parametrize("degrees", [40, 50, 80])
+def test_every_node_has_its_foot_on_a_strongly_curved_surface(degrees: float) -> None:
+    """Half cylinders up to 80° from the plane, of meshes that do not match: feet lie straight outside."""
+    y, end = np.linspace(0.0, 40.0, 5), np.radians(degrees)
+    faces = []
+    for radius, lines in ((100.0, 31), (101.0, 38)):
+        xyz, normals = cylinder(radius, np.linspace(-end, end, lines), y)
+        faces.append(Face(xyz, normals, surface_of(xyz[:, :2])))
+    found = paired(*faces, distance=5.0)
+    assert len(found.nodes) == 155
+    assert (found.beyond, found.far, found.crossed, found.lost) == (0, {}, (), ())
+    feet = found.W @ faces[1].xyz
+    wanted = np.arctan2(faces[0].xyz[:, 0], faces[0].xyz[:, 2])
+    np.testing.assert_allclose(np.arctan2(feet[:, 0], feet[:, 2]), wanted, atol=1e-10)
+    np.testing.assert_allclose(np.linalg.norm(feet[:, [0, 2]], axis=1) - 100.0, found.apart, atol=1e-9)
+
+
+def test_a_line_that_meets_no_surface_is_told() -> None:
+    """The normal of one node lies in the plane of the other surface, a millimetre away."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 30, 4), np.linspace(0, 20, 3)))
+    above, below = (np.column_stack([x, y, np.full(12, z)]) for z in (0.0, 1.0))
+    normals = np.tile([0.0, 0.0, 1.0], (12, 1))
+    tilted = normals.copy()
+    tilted[5] = [1.0, 0.0, 0.0]
+    surface = surface_of(above[:, :2])
+    found = paired(Face(above, tilted, surface), Face(below, normals, surface), distance=5.0)
+    assert found.lost == (5,)
+    assert sorted(found.nodes) == [k for k in range(12) if k != 5]
 
 
 @pytest.mark.parametrize("sparse", [False, True])

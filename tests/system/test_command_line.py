@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from harness.cli.app import app
+
 SHOW = """
 import sys
 from harness.cli.app import main
@@ -39,6 +41,15 @@ def test_help_imports_nothing_that_is_slow(tmp_path: Path) -> None:
     assert "Exit codes" in done.stdout
     slow = {"numpy", "scipy", "pandas", "matplotlib", "pydantic", "rich", "problems", "solvers", "report"}
     assert not slow & set(done.stderr.split())
+
+
+def test_the_examples_of_a_help_stand_as_they_are_written() -> None:
+    """Click takes them for paragraphs unless a backspace is before them."""
+    for command in app.registered_commands:
+        assert command.callback is not None
+        for paragraph in (command.callback.__doc__ or "").split("\n\n"):
+            example = "  python -m harness" in paragraph or "Exit codes:" in paragraph
+            assert paragraph.lstrip(" ").startswith("\b\n") == example, paragraph
 
 
 @pytest.mark.parametrize("words", [("list", "scenes"), ("validate", "gallery/three-part-stack"), ("--help",)])

@@ -193,17 +193,24 @@ def test_no_control_character_and_no_line_of_its_own_reaches_the_terminal() -> N
     assert not [line for line in plain.splitlines() if line.strip(" │").startswith("Passed")]
 
 
-def test_a_name_that_no_file_can_hold_is_named() -> None:
+@pytest.mark.parametrize(
+    ("does", "said"),
+    [
+        (lambda: "one\nscene a\udcff\nthree".encode(), "scene a�: a name that is not UTF-8"),
+        (lambda: np.zeros(2**50), "Not enough memory: Unable to allocate"),
+    ],
+)
+def test_what_no_file_or_memory_can_hold_is_named(does: Any, said: str) -> None:
     app = Typer()
 
     @app.command()
     def command() -> None:
         with error_reporting():
-            "one\nscene a\udcff\nthree".encode()
+            does()
 
     outcome = CliRunner().invoke(app)
     assert outcome.exit_code == 2
-    assert "scene a�: a name that is not UTF-8" in outcome.output
+    assert said in outcome.output
 
 
 def test_a_file_name_that_is_not_utf8_is_kept_in_a_row() -> None:
