@@ -139,7 +139,7 @@ def _joint_table(path: Path, data: dict[str, Any], faults: list[Fault]) -> tuple
         if table is not None:
             faults.append(Fault(str(path), "joint", table, "give either joint or assembly"))
         try:
-            found = _assembly_path(path, data.pop("assembly"))
+            found = assembly_path(path, data.pop("assembly"))
             return found, read_toml(found)
         except InputError as error:
             faults += error.faults
@@ -206,7 +206,8 @@ def _floating(path: Path, joint: Joint, effects: tuple[Effect, ...]) -> Iterator
             yield Fault(str(path), f"part.{part.name}", points or "no support", allowed)
 
 
-def _assembly_path(path: Path, name: object) -> Path:
+def assembly_path(path: Path, name: object) -> Path:
+    """The file of the assembly that a scene at `path` names. Raises InputError."""
     choices = (path.parent / str(name), ASSEMBLIES / f"{name}.toml")
     for choice in choices:
         if choice.is_file():

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.placement.candidates import movable_fasteners
-from harness.scene.edited import of_kind, with_fasteners
+from harness.scene.edited import MOVED, of_kind, with_fasteners
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
@@ -33,18 +33,19 @@ from solvers.base import WarmStart
 from solvers.kkt import with_p
 
 TOLERANCE_MM, PROVEN_MM = 1e-5, 1e-9  # until it is proven, and to be
+CHANGED = (*MOVED, "initial_gap", "pressure")
 PAGE = "page"  # where a wrong value was given
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Places of the fasteners, mm, and preload, N; the mean of the initial gap, mm, and the pressures, N/mm²,
-    in the order of the scene; a mean of None: there is no initial gap.
+    """Places of the fasteners, mm, and preload, N; means of the initial gaps, mm, and pressures, N/mm²; in
+    the order of the scene.
     """
 
     places: tuple[tuple[float, float], ...]
     preload: float
-    mean: float | None
+    means: tuple[float, ...]
     pressures: tuple[float, ...]
 
     @classmethod
@@ -53,14 +54,14 @@ class Settings:
         found = movable_fasteners(scene)
         assert isinstance(scene, JointScene)
         marks = np.concatenate([each.marks(scene.joint) for each in found])
-        gap = next(scene.effects_of(InitialGap), None)
+        means = tuple(each.mean for each in scene.effects_of(InitialGap))
         pressures = tuple(each.value for each in scene.effects_of(Pressure))
         places = tuple((x, y) for x, y in marks.tolist())
-        return cls(places, found[0].preload, None if gap is None else gap.mean, pressures)
+        return cls(places, found[0].preload, means, pressures)
 
     def applied(self, scene: JointScene) -> tuple[Effect, ...]:
         """The scene's effects with these values. Raises InputError, as `validate` does."""
-        pressures, faults, made = iter(self.pressures), list[Fault](), list[Effect]()
+        means, pressures, faults, made = iter(self.means), iter(self.pressures), list[Fault](), list[Effect]()
         fasteners = False
         for effect in scene.effects:
             changes: dict[str, Any] = {}
@@ -69,7 +70,7 @@ class Settings:
                     continue
                 fasteners, changes = True, {"points": self.places, "pattern": None, "preload": self.preload}
             elif isinstance(effect, InitialGap):
-                changes = {"mean": self.mean}
+                changes = {"mean": next(means)}
             elif isinstance(effect, Pressure):
                 changes = {"value": next(pressures)}
             try:
@@ -90,8 +91,8 @@ class Settings:
         """Change the document of the scene's file."""
         with_fasteners(self.places)(document)
         of_kind(document, "fasteners")[0]["preload"] = self.preload
-        for table in of_kind(document, "initial_gap"):
-            table["mean"] = self.mean
+        for table, mean in zip(of_kind(document, "initial_gap"), self.means, strict=True):
+            table["mean"] = mean
         for table, value in zip(of_kind(document, "pressure"), self.pressures, strict=True):
             table["value"] = value
 

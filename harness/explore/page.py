@@ -23,10 +23,11 @@ from bokeh.models.tools import PointDrawTool
 from bokeh.plotting import figure
 from bokeh.server.server import Server
 
-from harness.explore.answers import Answer, Explorer, Settings
+from harness.explore.answers import CHANGED, Answer, Explorer, Settings
 from harness.explore.raster import Raster
 from harness.results.records import replace_text
 from harness.scene.edited import edited
+from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
@@ -71,8 +72,9 @@ class Page:
 
     def _sliders(self, settings: Settings, limit_mm: float) -> dict[str, Slider]:
         found = {"limit": _slider("limit, mm", limit_mm), "preload": _slider("preload, N", settings.preload)}
-        if settings.mean is not None:
-            found["mean"] = _slider("mean gap, mm", settings.mean)
+        for k, gap in enumerate(self.explorer.scene.effects_of(InitialGap)):
+            where = "" if gap.between is None else f" {' – '.join(gap.between)}"
+            found[f"mean {k}"] = _slider(f"mean gap{where}, mm", settings.means[k])
         for k, effect in enumerate(self.explorer.scene.effects_of(Pressure)):
             found[f"pressure {k}"] = _slider(f"pressure on {effect.part}, N/mm²", effect.value)
         return found
@@ -121,10 +123,11 @@ class Page:
         """What the page asks for."""
         places = zip(self.fasteners.data["x"], self.fasteners.data["y"], strict=True)
         values = {name: float(slider.value) for name, slider in self.sliders.items()}
-        pressures = tuple(value for name, value in values.items() if name.startswith("pressure"))
-        return Settings(
-            tuple((float(x), float(y)) for x, y in places), values["preload"], values.get("mean"), pressures
+        means, pressures = (
+            tuple(value for name, value in values.items() if name.startswith(f"{what} "))
+            for what in ("mean", "pressure")
         )
+        return Settings(tuple((float(x), float(y)) for x, y in places), values["preload"], means, pressures)
 
     def changed(self, attr: str, old: object, new: object) -> None:
         """Answer what the page asks for, or say what is wrong with it."""
@@ -173,7 +176,7 @@ class Page:
                 raise InputError.one("page", "scene file", str(path), "a name that ends in .toml")
             if path.exists():
                 raise InputError.one("page", "scene file", str(path), "exists: name another")
-            replace_text(path, edited(self.source, path.parent, self.settings.write_to))
+            replace_text(path, edited(self.source, path.parent, self.settings.write_to, CHANGED))
         except (InputError, OSError) as error:
             faults = error.faults if isinstance(error, InputError) else [error]
             self.fault.text = "<br>".join(escape(str(fault)) for fault in faults)

@@ -24,7 +24,7 @@ from harness.placement.search import Search, Step, Values
 from harness.placement.session import THREADS, Study
 from harness.results import records
 from harness.results.provenance import installed_version, provenance
-from harness.scene.edited import edited, with_fasteners
+from harness.scene.edited import MOVED, edited, with_fasteners
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from harness.terminal import DONE, GAP_EXCEEDED
@@ -89,6 +89,11 @@ def run(
     allowed = goal.allowed(study.cases.count)
     nodes = prepared(study.bare, form=study.form).assembly.contact_nodes
     assert nodes is not None  # of a joint
+
+    def text_of(plan: Plan) -> str:
+        return edited(source, directory, with_fasteners(plan), MOVED)
+
+    text_of(movable.own)  # refused now rather than after the search
     with records.locked(directory, (), other=records.MEASUREMENTS):
         pool = workers(scheduler, console) if scheduler else nullcontext()
         with pool as where, _showing(console) as said:
@@ -99,7 +104,7 @@ def run(
         plans = {"own": movable.own} | ({"plan": found.best.plan} if found.best else {})
         for name, plan in plans.items():
             path = directory / f"{name}.toml"
-            records.replace_text(path, edited(source, directory, with_fasteners(plan)))
+            records.replace_text(path, text_of(plan))
             scene = read_scene(str(path))
             job = Job(scene, cases_of(scene), "newton", study.form, SERIES_TOLERANCE, LIMIT_MM, 0, THREADS)
             run_series(job, facts, directory / name, console)

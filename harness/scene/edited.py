@@ -11,15 +11,17 @@ import tomlkit
 
 from problems.drawn import drawn_table
 from problems.errors import InputError
-from problems.scene import SCENES
+from problems.scene import SCENES, assembly_path, read_toml
 
+MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes")  # keys whose values may be paths, as seen from the file
 
 
-def edited(source: str, folder: Path, change: Callable[[Any], None]) -> str:
-    """The text of a scene's file, changed, whose other files are found from `folder`.
+def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequence[str]) -> str:
+    """The text of a scene's file, changed, whose other files are found from `folder`. kinds : of the effects
+    that change.
 
-    Raises InputError if the scene has no file: a rung of a ladder.
+    Raises InputError if the scene has no file, as a rung of a ladder, or if its assembly's has such effects.
     """
     if table := drawn_table(source):
         document, home = tomlkit.parse(tomlkit.dumps(table)), SCENES
@@ -28,6 +30,12 @@ def edited(source: str, folder: Path, change: Callable[[Any], None]) -> str:
         if not path.is_file():
             raise InputError.one("scene", "name", source, "a scene in a file, so that its values can change")
         document, home = tomlkit.parse(path.read_text("utf-8")), path.parent
+    if "assembly" in document:
+        there = read_toml(assembly := assembly_path(home / "scene", document["assembly"])).get("effect", [])
+        if wrong := [table["kind"] for table in there if table.get("kind") in kinds]:
+            raise InputError.one(
+                assembly, "effect", wrong, "these in the scene itself, where they can change"
+            )
     change(document)
     for inner in _tables(document):
         for key in FILES:
@@ -42,8 +50,7 @@ def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], Non
     def change(document: Any) -> None:
         found = of_kind(document, "fasteners")
         if not found:
-            allowed = "in the scene itself, not in the file of its assembly"
-            raise InputError.one("scene", 'effect kind = "fasteners"', "none", allowed)
+            raise InputError.one("scene", 'effect kind = "fasteners"', "none", "at least one")
         for key in ("pattern", "file", "columns", "points"):
             found[0].pop(key, None)
         if points:

@@ -10,6 +10,8 @@ from problems.model.effect import StiffnessEffect
 from problems.model.joint import Faults
 from problems.model.plate import Plate
 
+MOST = 10_000
+
 
 class Stringers(StiffnessEffect):
     """K += Σ EI ∫ w_yy² dy + GJ ∫ w_xy² dy over start ≤ y ≤ stop, at x = 0, pitch, 2·pitch, …
@@ -28,6 +30,8 @@ class Stringers(StiffnessEffect):
         if max(self.start, south) >= min(self.stop, north):
             allowed = f"a length on the part, {south:g} … {north:g} mm"
             yield "start, stop", [self.start, self.stop], allowed
+        if plate.x[-1] > MOST * self.pitch:
+            yield "pitch", self.pitch, f"at least {plate.x[-1] / MOST:g} mm: {MOST} stringers"
 
     def stiffness(self, plate: Plate) -> sp.csr_array:
         EI, GJ = plate.young * self.I, plate.shear_modulus * self.J

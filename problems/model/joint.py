@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import scipy.sparse as sp
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from problems.forms.assembly import Mask, Matrix, Vector
 from problems.input.bounded import Name, Positive
@@ -24,7 +24,7 @@ from problems.input.bounded import Name, Positive
 from .plate import Plate
 from .surface import Grid
 
-MOST = 100_000  # grid lines; what fits in memory is another question
+MOST, MOST_NODES = 100_000, 10**7  # grid lines, nodes; what fits in memory is another question
 Nodes = Annotated[int, Field(ge=2, le=MOST)]
 SHORT = 20.0  # mm, a junction that may have been given in metres
 SLENDER = 50.0  # an element's longer side to its shorter
@@ -47,6 +47,13 @@ class Junction(Table):
     length: Annotated[Positive, "mm"]
     width: Annotated[Positive, "mm"]
     nodes: tuple[Nodes, Nodes]
+
+    @field_validator("nodes")
+    @classmethod
+    def _not_too_many(cls, nodes: tuple[int, int]) -> tuple[int, int]:
+        if nodes[0] * nodes[1] > MOST_NODES:
+            raise ValueError(f"must be at most {MOST_NODES} nodes")
+        return nodes
 
 
 class Extension(Table):

@@ -11,7 +11,7 @@ from joints import two_parts
 from test_place import FASTENERS, GAP
 
 from harness import solve
-from harness.explore.answers import Explorer, Settings
+from harness.explore.answers import CHANGED, Explorer, Settings
 from harness.explore.raster import Raster
 from harness.scene.edited import edited
 from problems.errors import InputError
@@ -48,7 +48,7 @@ def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Pat
         (
             {"places": (*settings.places[:2], (123.4, 40.0))},
             {"places": settings.places[:1], "preload": 65.0},
-            {"mean": 0.08, "pressures": (-2e-4,)},
+            {"means": (0.08,), "pressures": (-2e-4,)},
             {"places": ()},
         )
     ):
@@ -57,7 +57,7 @@ def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Pat
         if not settings.places:
             break
         saved = tmp_path / f"{k}.toml"
-        saved.write_text(edited(str(path), tmp_path, settings.write_to))
+        saved.write_text(edited(str(path), tmp_path, settings.write_to, CHANGED))
         known = solve(str(saved), form=form)
         assert answer.error_mm is not None
         assert abs(answer.gap - known.gap).max() <= answer.error_mm + 1e-7
@@ -67,12 +67,39 @@ def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Pat
     assert answer.gap.max() > 0.05  # with no fastener left
 
 
+def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
+    third = two_parts().replace("[joint]\n", "[joint]\n").split("[[joint.part]]")[2].replace('"b"', '"c"')
+    gap = '[[effect]]\nkind = "initial_gap"\nbetween = {}\nmean = {}\n'
+    gaps = gap.format(["a", "b"], 0.01) + gap.format(["b", "c"], 0.7)
+    path = tmp_path / "three.toml"
+    path.write_text(f"{two_parts()}[[joint.part]]{third}{gaps}{FASTENERS}")
+    explorer = Explorer(scene_of(path), "dual")
+    answer = explorer.proven(explorer.answer(Settings.of(scene_of(path))))
+    assert abs(answer.gap - solve(str(path)).gap).max() <= 1e-7
+    assert answer.settings.means == (0.01, 0.7)
+
+
+def test_what_is_in_the_file_of_the_assembly_cannot_be_saved_changed(tmp_path: Path) -> None:
+    (tmp_path / "joint.toml").write_text(
+        two_parts().replace("[joint]", "").replace("joint.part", "part") + PRESSURE
+    )
+    path = tmp_path / "scene.toml"
+    path.write_text(f'assembly = "joint.toml"\n{GAP}{FASTENERS}')
+    settings = Settings.of(scene_of(path))
+    assert settings.pressures == (1e-4,)
+    with pytest.raises(InputError, match=r"joint\.toml: effect = \['pressure'\]: these in the scene itself"):
+        edited(str(path), tmp_path, settings.write_to, CHANGED)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         ({"places": ((500.0, 10.0),)}, ["fasteners.points[0]", "[500.0, 10.0]", "on the junction"]),
         ({"preload": 0.0}, ["fasteners.preload", "0.0", "greater than 0"]),
-        ({"mean": float("nan"), "preload": -1.0}, ["initial_gap.mean", "nan", "fasteners.preload", "-1.0"]),
+        (
+            {"means": (float("nan"),), "preload": -1.0},
+            ["initial_gap.mean", "nan", "fasteners.preload", "-1.0"],
+        ),
     ],
 )
 def test_wrong_values_are_refused_as_by_validate(path: Path, change: dict[str, Any], said: list[str]) -> None:
@@ -92,7 +119,7 @@ def test_a_saved_scene_finds_its_files(tmp_path: Path) -> None:
     measured = '[[effect]]\nkind = "measured_gap"\nfile = "gap.csv"  # of the scan\n'
     (home / "scene.toml").write_text(two_parts() + measured + FASTENERS)
     settings = Settings.of(scene_of(home / "scene.toml"))
-    text = edited(str(home / "scene.toml"), there, replace(settings, preload=77.0).write_to)
+    text = edited(str(home / "scene.toml"), there, replace(settings, preload=77.0).write_to, CHANGED)
     (there / "scene.toml").write_text(text)
     assert "# of the scan" in text
     assert "../home/gap.csv" in text
@@ -106,7 +133,7 @@ def test_packaged_scenes_are_saved_too(name: str, tmp_path: Path) -> None:
     if not any(effect.kind == "fasteners" for effect in scene.effects):
         pytest.skip("it has no fasteners")
     settings = Settings.of(scene)
-    (tmp_path / "scene.toml").write_text(edited(name, tmp_path, settings.write_to))
+    (tmp_path / "scene.toml").write_text(edited(name, tmp_path, settings.write_to, CHANGED))
     assert Settings.of(scene_of(tmp_path / "scene.toml")) == settings
 
 

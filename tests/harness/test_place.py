@@ -408,6 +408,17 @@ def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["plan.toml"]
 
 
+def test_fasteners_in_the_file_of_the_assembly_are_refused_before_the_search(tmp_path: Path) -> None:
+    joint = two_parts().replace("[joint]", "").replace("joint.part", "part")
+    (tmp_path / "joint.toml").write_text(joint + FASTENERS)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f'assembly = "joint.toml"\n{GAP.replace("60.0", "50.0")}')
+    done = harness("place", scene, "--count", 2, "--cases", 6, "--share", 1, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "joint.toml: effect = ['fasteners']: these in the scene itself" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_scene_without_random_gaps_is_one_case(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(two_parts() + '[[effect]]\nkind = "initial_gap"\nmean = 0.02\n' + FASTENERS)

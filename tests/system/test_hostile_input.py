@@ -45,6 +45,7 @@ def words_of(path: Path) -> str:
 
 
 PRESSURE = 'kind = "pressure"\npart = "a"\nvalue = 1e-3'
+STRINGERS = 'kind = "stringers"\npart = "a"\npitch = 1e-9\nstart = 0\nstop = 9\nI = 1'
 FASTENERS = 'kind = "fasteners"\npreload = 1.0\n'
 
 
@@ -53,6 +54,8 @@ FASTENERS = 'kind = "fasteners"\npreload = 1.0\n'
     [
         ("elements = 2", "elements = 1000000000", "less than or equal to 100000"),
         ("nodes = [4, 3]", "nodes = [4, 99999999]", "less than or equal to 100000"),
+        ("nodes = [4, 3]", "nodes = [40000, 30000]", "at most 10000000 nodes"),
+        (PRESSURE, STRINGERS, "at least 0.0"),
         ("thickness = 2.0", "thickness = 1e200", "less than or equal to 1"),
         ("thickness = 2.0", "thickness = inf", "part.0.thickness"),
         ("value = 1e-3", "value = -1e300", "greater than or equal to -1"),
