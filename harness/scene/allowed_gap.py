@@ -86,13 +86,11 @@ def show_series(directory: Path, allowed_mm: float, console: Console) -> int:
     found = exceeding(series, allowed_mm)
     written = write(directory, series, found)
     within = found.answered - len(found.cases) - found.undecided
-    low, high = (
-        binomtest(within, found.answered).proportion_ci(CONFIDENCE, "exact") if found.answered else (0, 1)
-    )
-    console.print(
-        f"{within} of {found.answered} cases are surely within {allowed_mm:g} mm: the share of joints is "
-        f"between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence."
-    )
+    said = f"{within} of {found.answered} cases are surely within {allowed_mm:g} mm"
+    if found.answered and not series.swept:  # steps are no sample
+        low, high = binomtest(within, found.answered).proportion_ci(CONFIDENCE, "exact")
+        said += f": the share of joints is between {low:.2%} and {high:.2%}, with {CONFIDENCE:.0%} confidence"
+    console.print(f"{said}.")
     if found.undecided:
         where = f"In {found.undecided} of {found.answered} cases"
         code = _undecided(where, allowed_mm, found.uncertainty_mm, console)

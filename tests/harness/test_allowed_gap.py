@@ -182,6 +182,13 @@ def test_series_counts_the_cases(gap: tuple[Path, np.ndarray], tmp_path: Path) -
     assert (unknown.exit_code, "In 12 of 12 cases it cannot be told" in unknown.stdout) == (3, True)
 
 
+def test_steps_of_a_sweep_are_no_sample(gap: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    swept = ("--sweep", "initial_gap.mean=0.1,0.2", "--check", 0, "--threads", 1, "--allow-gap", 9.0)
+    done = harness("series", gap[0], *swept, "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    assert "2 of 2 cases are surely within 9 mm.\n" in done.stdout
+
+
 def test_a_series_whose_rows_do_not_say_how_well_gaps_are_known_cannot_be_told(
     gap: tuple[Path, np.ndarray], tmp_path: Path
 ) -> None:
