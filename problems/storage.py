@@ -58,10 +58,11 @@ def lock(key: str) -> Iterator[None]:
     folder = root()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with FileLock(folder / f"{key}.lock"):
-            yield
-    except (PermissionError, FileExistsError, NotADirectoryError) as error:
+        held = FileLock(folder / f"{key}.lock").acquire()
+    except OSError as error:
         raise InputError.one(folder, "cache folder", str(error), "writable; set RIVETBENCH_CACHE") from error
+    with held:
+        yield
 
 
 def store(key: str, arrays: Mapping[str, NDArray[Any]], facts: dict[str, Any]) -> None:
