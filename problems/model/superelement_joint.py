@@ -166,9 +166,9 @@ class SuperelementJoint:
             near = f", {len(found.far)} too far: {self._distances(pair)}" if found.far else ""
             yield f"contacts, {name}", nothing + near, f"pairing.distance = {self.distance:g} mm or more"
         if found.lost:
-            ids = listed(map(str, a.nodes.ids[a.contacts[list(found.lost)]]))
+            lost = listed(map(str, a.nodes.ids[a.contacts[list(found.lost)]]))
             allowed = f"normals along which a line meets {pair[1]}"
-            yield f"contacts, {name}", f"no foot found of ids {ids}", allowed
+            yield f"contacts, {name}", f"no foot found of ids {lost}", allowed
         if found.crossed:
             ids = [a.nodes.ids[a.contacts[list(each)]] for each in found.crossed]
             value = listed(" and ".join(map(str, each)) for each in ids)
