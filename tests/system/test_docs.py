@@ -179,13 +179,23 @@ def test_the_main_suite_takes_as_long_on_every_page() -> None:
     assert f"the suite `default` ({table[1]} minutes)" in str(get_command(app).help)
 
 
-def test_the_python_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    code = re.search(r"```python\n(.*?)```", (DOCS / "python.md").read_text("utf-8"), re.DOTALL)
+def printed_by(page: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """What the first Python of a page prints."""
+    code = re.search(r"```python\n(.*?)```", (DOCS / page).read_text("utf-8"), re.DOTALL)
     assert code is not None
     exec(code[1], {})
-    first, second = capsys.readouterr().out.splitlines()
+    return capsys.readouterr().out
+
+
+def test_the_python_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = printed_by("python.md", capsys).splitlines()
     assert float(first.split()[1]) < 1e-10
     assert second == "outside"
+
+
+def test_the_bound_of_the_page_is_one(capsys: pytest.CaptureFixture[str]) -> None:
+    error, bound = map(float, printed_by("proof.md", capsys).split(" is at most "))
+    assert 1e-6 < error < bound < 100 * error
 
 
 def test_the_solver_of_the_readme_works(tmp_path: Path) -> None:
