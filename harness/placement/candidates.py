@@ -11,6 +11,7 @@ import numpy as np
 from problems.effects.fasteners import Fasteners
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix
+from problems.model.effect import SpringEffect
 from problems.model.effect_tables import read_columns
 from problems.model.positions import MOST
 from problems.model.scene import JointScene, Scene
@@ -64,10 +65,13 @@ class Movable:
         return plan_of(points)
 
     def faults(self, points: Matrix, source: str) -> list[Fault]:
-        """Of points off the parts, or there twice."""
+        """Of points off the parts, there twice, or where a fastener is installed."""
         joint = self.bare.joint
         on = joint.covers(self.fastener.parts(joint), points)
         found = [Fault(source, "x, y", points[k].tolist(), joint.region) for k in np.flatnonzero(~on)]
+        placed = self.fastener.model_copy(update={"points": tuple(map(tuple, points)), "pattern": None})
+        for installed in self.bare.effects_of(SpringEffect):
+            found += [Fault(source, *fault) for fault in installed.faults(joint, [placed])]
         return found + _twice(points, source)
 
 

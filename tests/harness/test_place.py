@@ -399,6 +399,15 @@ def test_scenes_whose_fasteners_cannot_move(tmp_path: Path, fasteners: str, said
         Movable.of(read_scene(str(path)))
 
 
+def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
+    installed = '[[effect]]\nkind = "installed_fasteners"\npoints = [[30.0, 10.0]]\n'
+    scene = tmp_path / "scene.toml"
+    scene.write_text(two_parts() + GAP.replace("60.0", "50.0") + FASTENERS + installed)
+    (tmp_path / "holes.csv").write_text("x,y\n10,10\n30,10\n")
+    with pytest.raises(InputError, match=r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"):
+        Movable.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
+
+
 def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text(strip.read_text())
