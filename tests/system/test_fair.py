@@ -23,13 +23,6 @@ ROOT = Path(__file__).parents[2]
 FAIR = (ROOT / "docs/fair.md").read_text("utf-8")
 MEASURED = [name for name in NAMES if (PUBLISHED / name / "suite.toml").is_file()]
 Row = dict[str, Any]
-#: What published rows are older than.
-OLDER = pytest.mark.xfail(strict=True, reason="the published rows are older than this rule")
-
-
-def measured(*older: str) -> list[Any]:
-    """The published suites; the rows of some are older than a rule."""
-    return [pytest.param(name, marks=OLDER if name in older else ()) for name in MEASURED]
 
 
 @cache
@@ -178,7 +171,7 @@ def test_the_same_problem(suite: str) -> None:
     assert {len(each) for each in asked.values()} == {1}
 
 
-@pytest.mark.parametrize("suite", measured("accuracy"))
+@pytest.mark.parametrize("suite", MEASURED)
 def test_the_same_machine(suite: str) -> None:
     """One for each scene, whose rows follow one another, repeat by repeat."""
     rows = [row for row in rows_of(suite) if row.get("case") is None]
