@@ -52,9 +52,7 @@ def with_tool(a: Face) -> Pairing:
 
 def paired(a: Face, b: Face, distance: float) -> Pairing:
     """distance : up to which |t| two surfaces may touch, mm."""
-    from scipy.spatial import cKDTree
-
-    t, foot, found = _feet(a, b)
+    t, foot, found, away = _feet(a, b)
     on = found & b.surface.covers(foot)
     near = on & (abs(t) <= distance)
     nodes = np.flatnonzero(near)
@@ -64,14 +62,13 @@ def paired(a: Face, b: Face, distance: float) -> Pairing:
     u, v = (foot[corners[:, k]] - foot[corners[:, 0]] for k in (1, 2))
     turned = corners[cross(u, v) <= 0]
     crossed = tuple(tuple(each) for each in turned.tolist())
-    missed = np.flatnonzero(~found)
-    lost = missed[cKDTree(b.xyz).query(a.xyz[missed])[0] <= distance]
+    lost = np.flatnonzero(~found & (away <= distance))
     W = b.surface.weights(foot[nodes])
     return Pairing(nodes, W, t[nodes], int((~on).sum()), far, crossed, tuple(lost.tolist()))
 
 
-def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask]:
-    """t (c,), the feet (c, 2), and which were found: from b's nearest node on by Newton's method.
+def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask, Vector]:
+    """t (c,), the feet (c, 2), which were found, how far b's nearest node is: from that by Newton's method.
 
     At q = p + tn, b is the plane through its point above q with its normal m there, or beyond its surface
     that of the node nearest to q: t changes by r·m / n·m, with r from q to the point.
@@ -79,7 +76,8 @@ def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask]:
     from scipy.spatial import cKDTree
 
     p, n, tree = a.xyz, a.normals, cKDTree(b.xyz)
-    t = ((b.xyz[tree.query(p)[1]] - p) * n).sum(axis=1)
+    away, nearest = tree.query(p)
+    t = ((b.xyz[nearest] - p) * n).sum(axis=1)
     for _ in range(STEPS):
         q = p + t[:, None] * n
         off = ~b.surface.covers(q[:, :2])
@@ -93,4 +91,4 @@ def _feet(a: Face, b: Face) -> tuple[Vector, Matrix, Mask]:
         t = t + np.nan_to_num(step, nan=0.0, posinf=0.0, neginf=0.0)
         if found.all():
             break
-    return t, (p + t[:, None] * n)[:, :2], found
+    return t, (p + t[:, None] * n)[:, :2], found, away

@@ -68,7 +68,7 @@ def test_an_answer_is_that_of_the_scene_as_it_is_saved(path: Path, tmp_path: Pat
 
 
 def test_each_initial_gap_keeps_its_own_mean(tmp_path: Path) -> None:
-    third = two_parts().replace("[joint]\n", "[joint]\n").split("[[joint.part]]")[2].replace('"b"', '"c"')
+    third = two_parts().split("[[joint.part]]")[2].replace('"b"', '"c"')
     gap = '[[effect]]\nkind = "initial_gap"\nbetween = {}\nmean = {}\n'
     gaps = gap.format(["a", "b"], 0.01) + gap.format(["b", "c"], 0.7)
     path = tmp_path / "three.toml"
