@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from harness.results.schema import STEPS
 from report.document.blocks import Table
-from report.document.numbers import listed, power, significant
+from report.document.numbers import listed, power, significant, tidy_power
 from report.results.reader import Results, read
 from report.sections import speed
 from report.sections.series import compared
@@ -42,6 +43,32 @@ def test_the_speed_of_the_readme_is_the_table_of_the_index() -> None:
     assert table.startswith("| question ")
     for page in ("README.md", "docs/speed.md"):
         assert f"\n\n{table}\n\n" in (ROOT / page).read_text("utf-8"), page
+
+
+def settings_of(library: str) -> list[str]:
+    """The lines of docs/libraries.md of a library: form, setting, seconds of all steps at the loosest tolerance that
+    suffices, and that tolerance; or the limit that stopped it; or that none suffices.
+    """
+    rows = results("libraries").rows
+    lines = []
+    for (form, variant), cell in rows[rows["solver"] == library].groupby(["form", "variant"], sort=False):
+        within = cell[cell["verdict"] == "within"]
+        late = cell[cell["status"].isin(["time_limit", "not_run"])]
+        said, at = "no tolerance suffices", "–"
+        if len(within):
+            best = within.loc[within["tolerance"].idxmax()]
+            said, at = significant(best[list(STEPS)].sum(), 3), tidy_power(best["tolerance"])
+        elif len(late):
+            said = f"more than {significant(late['time_limit_s'].max(), 2)}"
+        lines.append(f"| {form} | {variant or 'as set'} | {said} | {at} |")
+    return lines
+
+
+def test_the_settings_of_the_libraries_are_those_of_the_rows() -> None:
+    page = (ROOT / "docs/libraries.md").read_text("utf-8")
+    said = {part.split("`")[0]: re.findall(r"^\| (?!form|---).*\|$", part, re.M) for part in page.split("\n## `")[1:]}
+    assert said == {library: settings_of(library) for library in said}
+    assert set(said) == set(results("libraries").rows["solver"])
 
 
 def test_the_rates_of_a_series_are_those_of_the_rows() -> None:
