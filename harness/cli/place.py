@@ -64,8 +64,8 @@ def place(
         from harness.placement.run import OUTPUTS, Goal, run
         from harness.placement.session import Study
         from harness.planning.form_choice import chosen_form
+        from harness.results.atomic_output import refuse_inputs
         from harness.scene.allowed_gap import refuse_unusable
-        from harness.scene.atomic_output import refuse_inputs
         from harness.series.given import RANDOM, GivenCases
         from harness.terminal.console import waiting
         from problems.build import load_case

@@ -119,6 +119,7 @@ def init(
     Exit codes: 0 written, 2 the file exists, or is no .toml.
     """
     with error_reporting(*NOTHING_WRITTEN) as console:
+        from harness.results.atomic_output import refuse_unwritable
         from problems.errors import InputError
 
         given = files or []
@@ -132,6 +133,7 @@ def init(
             raise InputError.one("--superelements", "FILE", None, "the file of K of each part")
         if file.exists() or file.is_symlink():
             raise InputError.one("FILE", "path", str(file), "exists: name another")
+        refuse_unwritable(file, (), "FILE")
         path, folder = shlex.quote(str(file)), shlex.quote(f"results/{file.stem}")
         if not path.isprintable():
             raise InputError.one("FILE", "path", str(file), "a name on one line")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .options import FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
+from .options import NOTHING_WRITTEN, FormName, Plugin, ReferenceLimit, Scheduler, error_reporting, option
 
 
 def run(
@@ -91,8 +91,8 @@ def run(
         from harness.measurement.scheduler import threads_per_worker
         from harness.planning.overrides import Overrides, overridden, tolerances_of
         from harness.planning.suite import read_suite, read_written
+        from harness.results.atomic_output import refuse_inputs
         from harness.results.records import MEASUREMENTS
-        from harness.scene.atomic_output import refuse_inputs
 
         change = Overrides(
             sizes=tuple(size or ()),
@@ -140,11 +140,14 @@ def report(
     with error_reporting() as console:
         from harness.planning.suite import read_written
         from harness.results import records
+        from harness.results.atomic_output import refuse_unwritable
         from harness.results.kinds import refuse_unreadable
         from harness.results.schema import SERIES
         from harness.results.series_file import refuse_damaged
         from problems.errors import InputError
 
+        if directory.is_dir():
+            refuse_unwritable(directory / "report", (), "DIR")
         if (directory / SERIES).exists():
             from report.writers.series import write as write_series
 
@@ -193,7 +196,7 @@ def gate(
       3  nothing could be judged
       5  the baseline has none of these measurements, other problems or other limits
     """
-    with error_reporting() as console:
+    with error_reporting(*NOTHING_WRITTEN) as console:
         from harness.verification.gate import gate as judge_directory
 
         code = judge_directory(directory, console, reference_limit, baseline, margin, json, junit)

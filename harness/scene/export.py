@@ -22,6 +22,7 @@ import scipy.sparse as sp
 from rich.console import Console
 
 from harness.planning.form_choice import chosen_form
+from harness.results.atomic_output import atomic_output, refuse_unwritable
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem, opened, reference_problem
 from problems import formats
@@ -35,7 +36,6 @@ from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import MatricesScene, Scene
 from problems.scene import read_scene
 
-from .atomic_output import atomic_output
 from .validate import digits_sentence, print_facts
 
 Arrays = dict[str, Any]
@@ -65,16 +65,19 @@ def export(
         raise InputError.one("--format", "format", format, allowed)
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
-    with atomic_output(out, [Path(source), *own]) as new:
-        if format is not None:
-            problem = opened(scene)
-            data = matrices(problem.prepared, problem.load)
+    inputs = [Path(source), *own]
+    refuse_unwritable(out, inputs)
+    if format is not None:
+        problem = opened(scene)
+        data = matrices(problem.prepared, problem.load)
+        with atomic_output(out, inputs) as new:
             formats.FORMATS[format].write(new, data)
-            said = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
-        elif form is not None:
-            arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
+        said = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
+    elif form is not None:
+        arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
+        with atomic_output(out, inputs) as new:
             (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
-            said = f"{form} form, {len(arrays['q'])} unknowns, {about['m']} contacts"
+        said = f"{form} form, {len(arrays['q'])} unknowns, {about['m']} contacts"
     console.print(f"{out}: {scene.name}, {said}.")
 
 

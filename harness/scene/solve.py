@@ -24,6 +24,7 @@ import scipy.sparse as sp
 from rich.console import Console
 from rich.text import Text
 
+from harness.results.atomic_output import atomic_output, refuse_unwritable, write_record
 from harness.results.provenance import machine, provenance, resident_mib
 from harness.terminal import DONE, FAILED
 from harness.verification.assess import GapError
@@ -40,7 +41,6 @@ from problems.model.scene import JointScene, MatricesScene, Scene
 from problems.scene import read_scene
 
 from . import allowed_gap, grid_error, solution
-from .atomic_output import atomic_output, write_record
 from .solution import Solution
 from .validate import digits_sentence, print_unusual
 
@@ -65,6 +65,7 @@ def solve(
     if not 0 < tolerance < inf:
         raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
     allowed_gap.refuse_unusable(allow_gap_mm)
+    refuse_unwritable(out, [Path(source)])
     scene = read_scene(source)
     print_unusual(scene, console)
     built: dict[str, float] = {}  # what the cache did not hold, and how far it is
@@ -96,17 +97,14 @@ def solve(
     code = DONE if record["verdict"] == "within" else FAILED
     if allow_gap_mm is not None:
         code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
-    try:
-        with console.status(Text("pictures and files")), atomic_output(out, [Path(source)]) as new:
-            from report.writers.solution import write  # slow to import: not before the answer is shown
+    with console.status(Text("pictures and files")), atomic_output(out, [Path(source)]) as new:
+        from report.writers.solution import write  # slow to import: not before the answer is shown
 
-            new.mkdir()
-            np.savez(new / "solution.npz", **_arrays(found))
-            write_record(new, record)
-            written = out / write(new).name
-            write_record(new, record)  # with the files that were added
-    except OSError as error:
-        raise InputError.one("--out", "directory", str(out), f"cannot be written: {error}") from error
+        new.mkdir()
+        np.savez(new / "solution.npz", **_arrays(found))
+        write_record(new, record)
+        written = out / write(new).name
+        write_record(new, record)  # with the files that were added
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
     return code
 

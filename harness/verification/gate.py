@@ -16,6 +16,7 @@ from harness.planning.plan import expand
 from harness.planning.suite import RandomCases, read_written
 from harness.results import records
 from harness.results.answer_files import is_kept
+from harness.results.atomic_output import refuse_unwritable
 from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
@@ -52,6 +53,9 @@ def gate(
     """
     if not directory.is_dir():
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
+    for option, file in (("--json", json_file), ("--junit", junit_file)):
+        if file is not None:
+            refuse_unwritable(file, (), option)
     rows = gated_rows(directory / records.MEASUREMENTS)
     standard = read_baseline(baseline, margin, str(directory), rows.values()) if baseline else None
     found = judged(rows, directory, reference_limit_s, standard)

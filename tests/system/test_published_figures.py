@@ -46,8 +46,8 @@ def test_the_speed_of_the_readme_is_the_table_of_the_index() -> None:
 
 
 def settings_of(library: str) -> list[str]:
-    """The lines of docs/libraries.md of a library: form, setting, seconds of all steps at the loosest tolerance that
-    suffices, and that tolerance; or the limit that stopped it; or that none suffices.
+    """The lines of docs/libraries.md of a library: form, setting, seconds of all steps at the loosest
+    tolerance that suffices, and that tolerance; or the limit that stopped it; or that none suffices.
     """
     rows = results("libraries").rows
     lines = []
@@ -66,7 +66,10 @@ def settings_of(library: str) -> list[str]:
 
 def test_the_settings_of_the_libraries_are_those_of_the_rows() -> None:
     page = (ROOT / "docs/libraries.md").read_text("utf-8")
-    said = {part.split("`")[0]: re.findall(r"^\| (?!form|---).*\|$", part, re.M) for part in page.split("\n## `")[1:]}
+    said = {
+        part.split("`")[0]: re.findall(r"^\| (?!form|---).*\|$", part, re.M)
+        for part in page.split("\n## `")[1:]
+    }
     assert said == {library: settings_of(library) for library in said}
     assert set(said) == set(results("libraries").rows["solver"])
 

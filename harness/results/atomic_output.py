@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,9 +23,18 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
 
     Files of the same names are replaced, and those that an older answer left (see `write_record`) removed;
     whatever the block raises, nothing has changed. Raises InputError if `out` is no regular file or folder,
-    is of the other kind, or is one of the inputs.
+    is of the other kind, is one of the inputs, or cannot be written. The block only writes.
     """
-    refuse_inputs([out], inputs)
+    refuse_unwritable(out, inputs)
+    try:
+        with _beside(out, inputs) as new:
+            yield new
+    except OSError as error:
+        raise _unwritable("--out", out, error.strerror or str(error)) from error
+
+
+@contextmanager
+def _beside(out: Path, inputs: Sequence[Path]) -> Iterator[Path]:
     target = resolved(out)
     target.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=target.parent, prefix=".rivetbench.") as folder:
@@ -57,6 +67,22 @@ def _listed(folder: Path) -> set[Path]:
         return {folder / name for name in names if Path(name).name == name}
     except (OSError, ValueError, KeyError, TypeError):
         return set()
+
+
+def refuse_unwritable(out: Path, inputs: Sequence[Path] = (), option: str = "--out") -> None:
+    """Raise InputError if `out` may not be written, or is one of the inputs: to be asked before long work."""
+    refuse_inputs([out], inputs)
+    target = resolved(out)
+    folder = next(each for each in target.parents if each.exists())
+    if not folder.is_dir():
+        raise _unwritable(option, out, f"{folder} is no folder")
+    for path in (folder, *([target] if target.is_dir() else [])):
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise _unwritable(option, out, f"no permission to write to {path}")
+
+
+def _unwritable(option: str, out: Path, why: str) -> InputError:
+    return InputError.one(option, "path", str(out), f"cannot be written: {why}")
 
 
 def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path]) -> None:

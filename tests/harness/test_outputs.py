@@ -1,0 +1,56 @@
+"""What a command may not write is said before its work, in one line that names the option and the path."""
+
+import os
+from pathlib import Path
+
+import pytest
+from commands import harness
+
+from harness.results.atomic_output import atomic_output
+from problems.errors import InputError
+
+COMMANDS = [
+    "solve gallery/sheet-over-former --out OUT",
+    "export gallery/sheet-over-former --format npz --out OUT/scene.npz",
+    "import K.mtx --out OUT/own.npz",
+    "init OUT/joint.toml",
+    "gate . --junit OUT/gate.xml",
+    "gate . --json OUT/gate.json",
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("out", ["file/out", "locked/out"])
+def test_what_cannot_be_written_is_said_before_the_work(
+    command: str, out: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    Path("locked").mkdir()
+    monkeypatch.setattr(os, "access", lambda path, _: Path(path).name != "locked")  # root may write anywhere
+    monkeypatch.setattr("harness.scene.solution.solve", None)  # not called
+    done = harness(*command.replace("OUT", out).split())
+    assert done.exit_code == 2
+    assert "cannot be written" in done.stderr
+    assert out in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "locked"]
+
+
+def test_a_report_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "access", lambda _, mode: not mode & os.W_OK)
+    done = harness("report", tmp_path)
+    assert done.exit_code == 2
+    assert "no permission to write" in done.stderr
+
+
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
+    out = tmp_path / "answer"
+    out.mkdir()
+    (out / "old").touch()
+    with pytest.raises(InputError, match="--out: .*cannot be written: No space left"):  # noqa: SIM117
+        with atomic_output(out) as new:
+            new.mkdir()
+            (new / "half").touch()
+            raise OSError(28, "No space left on device", str(new / "half"))
+    assert [path.name for path in tmp_path.rglob("*")] == ["answer", "old"]
