@@ -14,6 +14,7 @@ from hostile_draws import OF_SUFFIX
 from long import Fault
 from runs import rows_of, said_by
 from small import make_load, make_prepared, solve_by_nnls
+from superelements import flat, stiffnesses, two_plates, write_part
 from synthetic_results import row, write_rows
 from test_hostile_input import SCENE
 from typer.testing import CliRunner
@@ -186,6 +187,48 @@ def series(root: Path) -> Target:
     return Target("series", 0.04, folder, names, commands, lambda name: not name.startswith("done/"))
 
 
+def placed(root: Path) -> Target:
+    """A finished search for a plan: what it says is what it said, whatever was done to what it kept."""
+    folder = original = made(root / "placed")
+    (folder / "scene.toml").write_text(JOINT)
+    (folder / "points.csv").write_text(POINTS)
+    (folder / "holes.csv").write_text(POINTS + "35.0,35.0\n")
+    words = ("place", "@scene.toml", "--candidates", "@holes.csv", "--cases", "3", "--share", "1")
+    words += ("--count", "2", "--out", "@done")
+    code, said = invoke(folder, words)
+    assert code == 0
+    (folder / "done" / ".lock").unlink(missing_ok=True)
+
+    def same_plan(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
+        inputs = ("scene.toml", "points.csv", "holes.csv")
+        same = all((folder / name).read_bytes() == (original / name).read_bytes() for name in inputs)
+        if code == 0 and same and output.splitlines()[-1] != said.splitlines()[-1]:
+            raise Fault("wrong", output[-200:])
+
+    names = ("done/plans.jsonl", "done/plans.jsonl", "done/place.json", "done/plan.toml")
+    names += ("done/plan/series.sqlite", "holes.csv", "scene.toml")
+    return Target(
+        "placed", 0.05, folder, names, (words,), lambda name: not name.startswith("done/"), same_plan
+    )
+
+
+def superelements(root: Path) -> Target:
+    """Two parts whose K are files, with the tables of their nodes."""
+    folder, joint = made(root / "parts"), two_plates((5, 3))
+    ends = zip(("a", "b"), stiffnesses(joint), ("op4", "mtx"), strict=True)
+    parts = [write_part(folder, name, K, flat(joint.nodes), format=form) for name, K, form in ends]
+    keys = ("name", "superelement", "nodes")
+    text = "".join(
+        "[[joint.part]]\n"
+        + "".join(f'{key} = "{str(part[key]).replace(f"{folder}/", "")}"\n' for key in keys)
+        for part in parts
+    )
+    (folder / "scene.toml").write_text(text + SCENE[SCENE.index("[[effect]]") :])
+    files = ("scene.toml", "a.op4", "a.csv", "b/K.mtx", "b.csv")
+    commands = (*[("validate", "@scene.toml")] * 2, ("solve", "@scene.toml", "--out", "@out"))
+    return Target("parts", 0.08, folder, files, commands, checked=says_numbers)
+
+
 def suite(root: Path) -> Target:
     """Read and refused: no scene has that name."""
     folder = root / "suite"
@@ -229,7 +272,10 @@ def judged(root: Path) -> Target:
     return Target("judged", 0.05, folder, files, commands, checked=says_numbers)
 
 
+MAKERS = (scene, cached, results, series, placed, superelements, suite, compared, judged)
+
+
 def all_targets(root: Path) -> list[Target]:
     forms = {"npz": ".npz", "mtx": ".mtx", "abaqus": ".mtx", "op4": ".op4", "dmig": ".pch"}
     of_formats = [own(root, form, suffix) for form, suffix in forms.items()]
-    return [*(make(root) for make in (scene, cached, results, series, suite, compared, judged)), *of_formats]
+    return [*(make(root) for make in MAKERS), *of_formats]

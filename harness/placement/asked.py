@@ -13,6 +13,8 @@ from harness.measurement.scheduler import done_as_completed
 from harness.placement.session import Outcome, Question, Study, answer
 from harness.results import records
 from harness.results.records import to_line
+from problems.errors import InputError
+from problems.storage import digest
 
 PLANS = "plans.jsonl"
 
@@ -21,7 +23,7 @@ class Asked:
     """identity : what must be the same for kept answers to be answers. executor, count : the workers, or None
     for this process.
 
-    Raises InputError if PATH has the answers of another search.
+    Raises InputError if PATH has the answers of another search, or a damaged line: nothing proves them anew.
     """
 
     def __init__(
@@ -34,6 +36,9 @@ class Asked:
             records.append(path, identity)
         else:
             records.refuse_other(path, first, identity)
+        for number, row in enumerate(rows, start=2):
+            if row.pop("hash", None) != digest(row):
+                raise InputError.one(path, f"line {number}", "damaged", "remove it: it is answered anew")
         self.known = {to_line(row["question"]): list(map(_outcome, row["outcomes"])) for row in rows}
 
     def __call__(self, questions: Sequence[Question]) -> list[list[Outcome]]:
@@ -51,7 +56,8 @@ class Asked:
         return [self.known[text] for text in texts]
 
     def _keep(self, text: str, question: Question, found: list[Outcome]) -> None:
-        records.append(self.path, {"question": asdict(question), "outcomes": list(map(asdict, found))})
+        row = records.parsed(to_line({"question": asdict(question), "outcomes": list(map(asdict, found))}))
+        records.append(self.path, row | {"hash": digest(row)})
         self.known[text] = found
 
 

@@ -48,9 +48,13 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
     out = tmp_path / "answer"
     out.mkdir()
     (out / "old").touch()
-    with pytest.raises(InputError, match="--out: .*cannot be written: No space left"):  # noqa: SIM117
+
+    def fills_the_disk() -> None:
         with atomic_output(out) as new:
             new.mkdir()
             (new / "half").touch()
             raise OSError(28, "No space left on device", str(new / "half"))
+
+    with pytest.raises(InputError, match=r"--out: .*cannot be written: No space left"):
+        fills_the_disk()
     assert [path.name for path in tmp_path.rglob("*")] == ["answer", "old"]
