@@ -200,9 +200,10 @@ def placed(root: Path) -> Target:
     (folder / "done" / ".lock").unlink(missing_ok=True)
 
     def same_plan(folder: Path, words: tuple[str, ...], code: int, output: str) -> None:
-        inputs = ("scene.toml", "points.csv", "holes.csv")
-        same = all((folder / name).read_bytes() == (original / name).read_bytes() for name in inputs)
-        if code == 0 and same and output.splitlines()[-1] != said.splitlines()[-1]:
+        inputs = [folder / name for name in ("scene.toml", "points.csv", "holes.csv")]
+        regular = code == 0 and all(path.is_file() for path in inputs)
+        same = regular and all(path.read_bytes() == (original / path.name).read_bytes() for path in inputs)
+        if same and output.splitlines()[-1] != said.splitlines()[-1]:
             raise Fault("wrong", output[-200:])
 
     names = ("done/plans.jsonl", "done/plans.jsonl", "done/place.json", "done/plan.toml")

@@ -16,6 +16,7 @@ from .surface import SAME
 
 NORMAL = ("nx", "ny", "nz")
 UNIT = 1e-3  # by which the length of a normal may miss 1
+FARTHEST = 1e9  # mm from the origin: beyond, doubles hardly tell places apart by SAME
 SHOWN = 10  # nodes of a message
 
 
@@ -65,6 +66,9 @@ def _wrong_nodes(
         yield "contact", f"ids {listed(f'{each:.0f}' for each in wrong)}", "0 or 1"
     if (wrong := ids[abs(length - 1) > UNIT]).size:
         yield "nx, ny, nz", f"ids {listed(f'{each:.0f}' for each in wrong)}", "a normal of length 1"
+    if (wrong := ids[abs(xyz).max(axis=1) > FARTHEST]).size:
+        yield "x, y, z", f"ids {listed(f'{each:.0f}' for each in wrong)}", f"at most {FARTHEST:g} mm"
+        return
     own = np.flatnonzero(contact)
     if len(own) < 3:
         yield "contact", len(own), "at least three nodes of the contact surface"

@@ -23,6 +23,7 @@ import scipy.sparse as sp
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
 SAME = 1e-6  # mm: closer points are one
+THIN = 1e-6  # of its length: a narrower strip of nodes is a line
 BRIDGE = 2.5  # times the usual edge at a corner
 ROUNDING = 1e-9  # of a triangle's size, by which a point on its border may be outside
 FLAT = 1e-9  # of its longest edge squared: a triangle without area
@@ -174,7 +175,7 @@ def surface_of(nodes: Matrix) -> Surface:
     Raises ValueError if they are on a line.
     """
     spread = np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)
-    if len(nodes) < 3 or spread[1] <= SAME:
+    if len(nodes) < 3 or spread[1] <= max(SAME, THIN * spread[0]):
         raise ValueError("all on one line")
     edge = _shortest_edge(nodes)
     for turn in (None, np.column_stack([edge, [-edge[1], edge[0]]])):

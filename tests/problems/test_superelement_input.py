@@ -62,6 +62,7 @@ FILES: dict[str, tuple[Callable[[Path], list[Tables]], str, str, str]] = {
     ),
     "an id twice": (lambda f: two(f, id=[1, 2, 3, 3, *range(5, 25)]), "id", "3", "each id once"),
     "an id that is no number": (lambda f: two(f, id=[1.5, *range(2, 25)]), "id", "1.5", "whole numbers"),
+    "another planet": (lambda f: two(f, xyz=_beyond()), "x, y, z", "ids 4", "at most 1e+09 mm"),
     "two nodes at one place": (lambda f: two(f, xyz=_doubled()), "x, y, z", "1 and 2", "one node at each"),
     "asymmetric": (lambda f: two(f, asymmetric()), "max|K − Kᵀ|", "0.06", "1e-10"),
     "not finite": (lambda f: two(f, infinite()), "K", "NaN or infinity", "finite"),
@@ -86,6 +87,12 @@ def _shorter(folder: Path) -> Tables:
 def _doubled() -> Array:
     xyz = NODES.copy()
     xyz[1] = xyz[0] + 1e-7
+    return xyz
+
+
+def _beyond() -> Array:
+    xyz = NODES.copy()
+    xyz[3, 0] = 2.0**63
     return xyz
 
 
@@ -118,6 +125,11 @@ PAIRS: dict[str, tuple[Callable[[Path], list[Tables]], str, str]] = {
     "beside": (lambda f: two(f, xyz=NODES + np.array([900.0, 0, 0])), "24 are beyond its surface", "pairing"),
     "on a line": (
         lambda f: two(f, xyz=NODES * [1, 0, 1] + np.arange(24)[:, None] * [1, 0, 0]),
+        "one line",
+        "off a",
+    ),
+    "nearly on a line": (
+        lambda f: two(f, xyz=NODES * [1, 1e-6, 1] + np.arange(24)[:, None] * [1, 0, 0]),
         "one line",
         "off a",
     ),
