@@ -227,7 +227,7 @@ def superelements(root: Path) -> Target:
     (folder / "scene.toml").write_text(text + SCENE[SCENE.index("[[effect]]") :])
     files = ("scene.toml", "a.op4", "a.csv", "b/K.mtx", "b.csv")
     commands = (*[("validate", "@scene.toml")] * 2, ("solve", "@scene.toml", "--out", "@out"))
-    return Target("parts", 0.08, folder, files, commands, checked=says_numbers)
+    return Target("parts", 0.08, folder, files, commands)
 
 
 def suite(root: Path) -> Target:

@@ -19,7 +19,7 @@ from problems.model.scene import JointScene, Scene
 Place = tuple[float, float]  # mm
 Plan = tuple[Place, ...]  # sorted
 
-ROWS_AND_COLUMNS = re.compile(r"([1-9]\d{0,3})x([1-9]\d{0,3})")
+ROWS_AND_COLUMNS = re.compile(r"(\d{0,9})x(\d{0,9})")
 ROWS = range(1, 5)  # of uniform plans
 DIGITS = 6  # of a place in mm: to the nanometre
 
@@ -52,9 +52,10 @@ class Movable:
         if asked is None:
             return self.own
         if pattern := ROWS_AND_COLUMNS.fullmatch(asked):
-            rows, columns = map(int, pattern.groups())
-            if rows * columns > MOST:
-                raise InputError.one("--candidates", "holes", rows * columns, f"at most {MOST}")
+            rows, columns = (int(each or 0) for each in pattern.groups())
+            if not 0 < rows * columns <= MOST:
+                allowed = f"rows x columns, 1 to {MOST} holes, or a CSV file"
+                raise InputError.one("--candidates", "holes", asked, allowed)
             points, faults = grid(self.bare, rows, columns), []
         else:
             read = read_columns(Path(asked), {"x": "x", "y": "y"})

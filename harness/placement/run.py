@@ -186,7 +186,10 @@ def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
     """The outcome in words, and the exit code."""
     of = f"in {100 * goal.share:.4g} % of the cases" if goal.share < 1 else "in every case"
     step = found.best or found.steps[0]
-    left = f"{len(step.plan)} fasteners leave at most {step.gap_mm:.3g} mm {of}, proven"
+    count = len(step.plan)
+    left = (
+        f"{count} fastener{' leaves' if count == 1 else 's leave'} at most {step.gap_mm:.3g} mm {of}, proven"
+    )
     if goal.limit_mm is None or step.gap_mm <= goal.limit_mm:
         return f"{left}.", DONE
     x, y = nodes[step.outcome.contact[step.worst]]

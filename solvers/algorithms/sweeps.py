@@ -199,8 +199,8 @@ class Sweeps:
             loads = [case.load - case.load if k else case.load for case, k in zip(left, kept, strict=True)]
             y = self.gaps(moved, loads)[order].T
             for case, (lam, same), gap, k in zip(left, found, y, kept, strict=True):
-                # λ and y of a start from outside need not belong together; a part of a step leaves λ off C.
-                same &= np.isfinite(case.doubt) and not case.trial.lam[~case.C].any()
+                # A part of a step would leave λ off C, or keep a part of a y that is not that of its λ.
+                same &= k and not case.trial.lam[~case.C].any()
                 if not k:
                     case.doubt = rounding_of(case.load.p[order], gap)
                 self._take(case, lam, case.trial.y + gap if k else gap, same, tolerance)

@@ -281,6 +281,13 @@ def test_the_command_finds_a_plan_that_solve_confirms(strip: Path, tmp_path: Pat
     other = place(strip, tmp_path / "out", "--allow-gap", 0.05, "--seed", 1)
     assert other.exit_code == 2
     assert "cases_key" in other.output
+    damaged = plans.replace('"largest": [0.0', '"largest": [0.1', 1)
+    assert damaged != plans
+    (tmp_path / "out" / PLANS).write_text(damaged)
+    refused = place(strip, tmp_path / "out", "--allow-gap", 0.05)
+    assert refused.exit_code == 2
+    assert "line 2" in refused.output
+    assert "damaged" in refused.output
 
 
 @pytest.mark.slow
@@ -366,7 +373,9 @@ def test_a_share_needs_cases_to_show_it() -> None:
         ((), ["goal", "--allow-gap MM, or --count N"]),
         (("--count", 4), ["--count", "at most 3"]),
         (("--candidates", "holes.csv", "--count", 1), ["holes.csv", "[900.0, 10.0]", "is there twice"]),
-        (("--candidates", "9999x9999", "--count", 1), ["holes = 99980001", "at most 10000"]),
+        (("--candidates", "9999x9999", "--count", 1), ["holes = '9999x9999'", "1 to 10000"]),
+        (("--candidates", "0x5", "--count", 1), ["holes = '0x5'", "rows x columns"]),
+        (("--candidates", "4x", "--count", 1), ["holes = '4x'", "or a CSV file"]),
         (("--candidates", "2by4", "--count", 1), ["2by4", "readable"]),
         (("--count", 1, "--gaps", "g.csv", "--seed", 1), ["random gaps or --gaps"]),
         (("--count", 1, "--cases", 10), ["--share", "take 59"]),
