@@ -249,6 +249,19 @@ def test_forces_at_contacts_of_unlike_lengths_are_the_contacts_own() -> None:
     np.testing.assert_allclose(begun.trial.lam, w[own.order], rtol=1e-9)
 
 
+@pytest.mark.parametrize("opened", range(12))
+def test_a_contact_that_a_change_of_load_opens_has_no_force_left(opened: int) -> None:
+    """λ + αw is below zero there, and the set stays as it is: the step is taken whole."""
+    data, w = make_prepared(3, 12), np.random.default_rng(opened).uniform(1.0, 2.0, 12)
+    other = np.where(np.arange(12) == opened, -3 * w, w)
+    pressed, less = with_p(data, [LoadCase(data.assembly.A @ v, np.zeros(12)) for v in (w, other)])
+    own = Sweeps(data)
+    (begun,) = own._begun([own.solved(pressed, TOLERANCE)], [less])
+    assert (begun.trial.lam[~begun.C] < 0).any()
+    (case,) = own._sweep([begun], TOLERANCE)
+    assert not case.trial.lam[~case.C].any()
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.1])
 def test_a_start_whose_forces_and_gaps_do_not_belong_together_costs_sweeps_alone(scale: float) -> None:
     Q, random = decaying(), np.random.default_rng(0)
