@@ -39,7 +39,7 @@ def section(results: Results) -> Section | None:
 
 
 def _figure(cells: pd.DataFrame, whose: str = "") -> Figure:
-    dots = {"markersize": 4.0, "linestyle": ""}
+    dots = {"markersize": 6.0, "markeredgewidth": 0.8, "linestyle": ""}
     styles = {name: look | dots for name, look in styles_of(cells).items()}
     drawing, panels = style.panels(cells["n"].nunique(), PANEL, entries(cells, styles))
     for axes, (n, of_size) in zip(panels, cells.groupby("n"), strict=True):
