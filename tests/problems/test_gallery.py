@@ -148,8 +148,7 @@ def test_padded_panel() -> None:
     sheet, pad = (2780e-9 * G * volume for volume in (1000.0 * 700.0 * 3.0, 500.0 * 200.0 * 6.0))
     assert lam.size == 0
     reactions = 500.0 * x[[0, 32, 264, 296]]
-    # The rounding of K's entries acts like springs to the ground: Σ ε|K||x| is 7e-8 of the weight, of which
-    # one BLAS shows less than 2e-9, another more.
-    assert reactions.sum() == pytest.approx(sheet + pad, rel=1e-8)
+    # The rounding of K's entries acts like springs to the ground: Σ ε|K||x| is 7e-8 of the weight.
+    assert reactions.sum() == pytest.approx(sheet + pad, rel=7e-8)
     far = reactions[2:].sum()
-    assert far * 200.0 == pytest.approx(sheet * -150.0 + pad * 100.0, rel=1e-8)
+    assert far * 200.0 == pytest.approx(sheet * -150.0 + pad * 100.0, rel=7e-8)
