@@ -37,7 +37,7 @@ class Asked:
         else:
             records.refuse_other(path, first, identity)
         for number, row in enumerate(rows, start=2):
-            if row.pop("hash", None) != digest(row):
+            if row.pop("hash", None) != digest(to_line(row)):
                 raise InputError.one(path, f"line {number}", "damaged", "remove it: it is answered anew")
         self.known = {to_line(row["question"]): list(map(_outcome, row["outcomes"])) for row in rows}
 
@@ -56,8 +56,8 @@ class Asked:
         return [self.known[text] for text in texts]
 
     def _keep(self, text: str, question: Question, found: list[Outcome]) -> None:
-        row = records.parsed(to_line({"question": asdict(question), "outcomes": list(map(asdict, found))}))
-        records.append(self.path, row | {"hash": digest(row)})
+        row = {"question": asdict(question), "outcomes": list(map(asdict, found))}
+        records.append(self.path, row | {"hash": digest(to_line(row))})
         self.known[text] = found
 
 

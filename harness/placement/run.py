@@ -187,9 +187,8 @@ def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
     of = f"in {100 * goal.share:.4g} % of the cases" if goal.share < 1 else "in every case"
     step = found.best or found.steps[0]
     count = len(step.plan)
-    left = (
-        f"{count} fastener{' leaves' if count == 1 else 's leave'} at most {step.gap_mm:.3g} mm {of}, proven"
-    )
+    leave = "1 fastener leaves" if count == 1 else f"{count} fasteners leave"
+    left = f"{leave} at most {step.gap_mm:.3g} mm {of}, proven"
     if goal.limit_mm is None or step.gap_mm <= goal.limit_mm:
         return f"{left}.", DONE
     x, y = nodes[step.outcome.contact[step.worst]]

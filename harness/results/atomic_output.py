@@ -27,31 +27,27 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     """
     refuse_unwritable(out, inputs)
     try:
-        with _beside(out, inputs) as new:
+        target = resolved(out)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=target.parent, prefix=".rivetbench.") as folder:
+            new = Path(folder) / target.name
             yield new
+            if target.exists() and new.is_dir() != target.is_dir():
+                kind = "folder" if new.is_dir() else "file"
+                raise InputError.one(
+                    "--out", "path", str(out), f"a {kind} is to be written, and this is none"
+                )
+            if new.is_dir():
+                refuse_inputs([out / path.name for path in new.iterdir()], inputs)
+                target.mkdir(exist_ok=True)
+                for path in _listed(target):
+                    path.unlink(missing_ok=True)
+                for path in new.iterdir():
+                    path.replace(target / path.name)
+            else:
+                new.replace(target)
     except OSError as error:
         raise _unwritable("--out", out, error.strerror or str(error)) from error
-
-
-@contextmanager
-def _beside(out: Path, inputs: Sequence[Path]) -> Iterator[Path]:
-    target = resolved(out)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=target.parent, prefix=".rivetbench.") as folder:
-        new = Path(folder) / target.name
-        yield new
-        if target.exists() and new.is_dir() != target.is_dir():
-            kind = "folder" if new.is_dir() else "file"
-            raise InputError.one("--out", "path", str(out), f"a {kind} is to be written, and this is none")
-        if new.is_dir():
-            refuse_inputs([out / path.name for path in new.iterdir()], inputs)
-            target.mkdir(exist_ok=True)
-            for path in _listed(target):
-                path.unlink(missing_ok=True)
-            for path in new.iterdir():
-                path.replace(target / path.name)
-        else:
-            new.replace(target)
 
 
 def write_record(folder: Path, record: dict[str, Any]) -> None:

@@ -61,13 +61,13 @@ def _wrong_nodes(
         return
     names, counts = np.unique(ids, return_counts=True)
     if (counts > 1).any():
-        yield "id", listed(f"{each:.0f}" for each in names[counts > 1]), "each id once"
+        yield "id", _ids(names[counts > 1]), "each id once"
     if (wrong := ids[~np.isin(given, (0, 1))]).size:
-        yield "contact", f"ids {listed(f'{each:.0f}' for each in wrong)}", "0 or 1"
+        yield "contact", f"ids {_ids(wrong)}", "0 or 1"
     if (wrong := ids[abs(length - 1) > UNIT]).size:
-        yield "nx, ny, nz", f"ids {listed(f'{each:.0f}' for each in wrong)}", "a normal of length 1"
+        yield "nx, ny, nz", f"ids {_ids(wrong)}", "a normal of length 1"
     if (wrong := ids[abs(xyz).max(axis=1) > FARTHEST]).size:
-        yield "x, y, z", f"ids {listed(f'{each:.0f}' for each in wrong)}", f"at most {FARTHEST:g} mm"
+        yield "x, y, z", f"ids {_ids(wrong)}", f"at most {FARTHEST:g} mm"
         return
     own = np.flatnonzero(contact)
     if len(own) < 3:
@@ -77,6 +77,10 @@ def _wrong_nodes(
     if len(pairs):
         twice = listed(f"{ids[own[i]]:.0f} and {ids[own[j]]:.0f}" for i, j in pairs)
         yield "x, y, z", f"ids {twice}", "one node at each place of the contact surface"
+
+
+def _ids(ids: Vector) -> str:
+    return listed(f"{each:.0f}" for each in ids)
 
 
 def listed(items: Iterable[str]) -> str:
