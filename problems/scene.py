@@ -20,7 +20,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from problems.drawn import EXAMPLES, drawn_table
-from problems.input.bounded import regular_file, resolved, unknown, validation_faults
+from problems.input.bounded import resolved, unknown, validation_faults
+from problems.input.text_files import read_text
 from problems.ladders import make_rung, prefix_of, rung_names
 from problems.model.effect import Effect, StiffnessEffect
 from problems.model.effect_tables import EffectTable
@@ -99,9 +100,7 @@ def _unknown_scene(name: str, known: list[str]) -> InputError:
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a dict; InputError if it cannot be read."""
     try:
-        return tomllib.loads(regular_file(path, "file", TOML_MIB).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError.one(path, "file", str(error.strerror), "a readable file") from error
+        return tomllib.loads(read_text(path, "file", TOML_MIB, strict=True))
     except InputError:
         raise
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits

@@ -189,10 +189,24 @@ def test_a_fault_in_the_assembly_names_the_assembly_file(path: Path) -> None:
     assert fault.key == "part.0.thickness"
 
 
-@pytest.mark.parametrize("text", ["a = = 3", '[effect\nkind="x"', b"\xff\xfe\x00", 'title = "no end'])
-def test_malformed_toml(path: Path, text: str | bytes) -> None:
+@pytest.mark.parametrize("text", ["a = = 3", '[effect\nkind="x"', 'title = "no end'])
+def test_malformed_toml(path: Path, text: str) -> None:
     (fault,) = faults(path, text)
     assert (fault.where, fault.key) == (str(path), "TOML")
+
+
+@pytest.mark.parametrize(
+    ("content", "key", "value"),
+    [
+        ('title = "a"'.encode("utf-16"), "file", "UTF-16 text"),
+        ('title = "a"'.encode("utf-16-be"), "file", "UTF-16 text"),
+        ('title = "a"'.encode("utf-32"), "file", "UTF-32 text"),
+        (b'title = "a"\r\nx = "\xb5m"', "line 2", "byte \\xb5, not UTF-8"),
+    ],
+)
+def test_other_encodings_are_named(path: Path, content: bytes, key: str, value: str) -> None:
+    (fault,) = faults(path, content)
+    assert (fault.key, fault.value) == (key, value)
 
 
 @pytest.mark.parametrize("value", ['{ kind = "initial_gap", mean = 0.6 }', "3", '["initial_gap"]', "[3]"])
