@@ -78,11 +78,10 @@ class Settings:
             except ValidationError as error:
                 faults += validation_faults(PAGE, type(effect), error, effect.kind)
                 continue
-            others = [each for each in scene.effects if type(each) is not type(effect)]
-            if changes:
-                found = new.faults(scene.joint, others)
-                faults += [Fault(PAGE, f"{new.kind}.{key}", value, allowed) for key, value, allowed in found]
             made.append(new)
+        for effect in made:
+            wrong = effect.faults(scene.joint, [other for other in made if other is not effect])
+            faults += [Fault(PAGE, f"{effect.kind}.{key}", value, allowed) for key, value, allowed in wrong]
         if faults:
             raise InputError(faults)
         return tuple(made)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import secrets
 import shlex
+import tomllib
 from collections.abc import Callable
 from html import escape
 from pathlib import Path
@@ -31,8 +32,11 @@ from problems.effects.initial_gap import InitialGap
 from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
+from problems.scene import scene_of
 
 NOTHING = "rgba(0, 0, 0, 0)"
+DIGITS = 3  # of mm, where a fastener is dropped
+EXACT = ".12g"  # of a slider: without the rounding of its steps
 OVER = "#D55E00"  # gaps above the limit
 STALE = 0.35  # opacity of an answer to other settings
 WIDE = 760  # pixels of a map
@@ -47,7 +51,7 @@ class Page:
         self, explorer: Explorer, source: str, limit_mm: float, first: Answer, document: Any
     ) -> None:
         self.explorer, self.source, self.document = explorer, source, document
-        self.answer, self.pending = first, None
+        self.answer, self.first, self.pending = first, first.settings, None
         assembly = explorer.data.assembly
         assert assembly.contact_nodes is not None  # of a joint
         self.places: Matrix = assembly.contact_nodes
@@ -121,13 +125,19 @@ class Page:
     @property
     def settings(self) -> Settings:
         """What the page asks for."""
-        places = zip(self.fasteners.data["x"], self.fasteners.data["y"], strict=True)
-        values = {name: float(slider.value) for name, slider in self.sliders.items()}
+        data = self.fasteners.data
+        places = ((float(x), float(y)) for x, y in zip(data["x"], data["y"], strict=True))
+        values = {name: float(format(slider.value, EXACT)) for name, slider in self.sliders.items()}
         means, pressures = (
             tuple(value for name, value in values.items() if name.startswith(f"{what} "))
             for what in ("mean", "pressure")
         )
-        return Settings(tuple((float(x), float(y)) for x, y in places), values["preload"], means, pressures)
+        return Settings(tuple(map(self.rounded, places)), values["preload"], means, pressures)
+
+    def rounded(self, place: tuple[float, float]) -> tuple[float, float]:
+        """A place to the micrometre; one of the scene's own as it is there."""
+        x, y = place
+        return place if place in self.first.places else (round(x, DIGITS), round(y, DIGITS))
 
     def changed(self, attr: str, old: object, new: object) -> None:
         """Answer what the page asks for, or say what is wrong with it."""
@@ -176,7 +186,9 @@ class Page:
                 raise InputError.one("page", "scene file", str(path), "a name that ends in .toml")
             if path.exists():
                 raise InputError.one("page", "scene file", str(path), "exists: name another")
-            replace_text(path, edited(self.source, path.parent, self.settings.write_to, CHANGED))
+            text = edited(self.source, path.parent, self.settings.write_to, CHANGED)
+            scene_of(tomllib.loads(text), str(path))  # refused now, in the words of `solve`
+            replace_text(path, text)
         except (InputError, OSError) as error:
             faults = error.faults if isinstance(error, InputError) else [error]
             self.fault.text = "<br>".join(escape(str(fault)) for fault in faults)

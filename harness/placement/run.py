@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
-from itertools import islice
+from itertools import count, islice
 from math import ceil, floor, log
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from rich.console import Console
 
 from harness.measurement.scheduler import workers
 from harness.placement.asked import PLANS, Asked
-from harness.placement.candidates import Movable, Plan, uniform_plans
+from harness.placement.candidates import Movable, Plan
 from harness.placement.search import Search, Step, Values
 from harness.placement.session import THREADS, Study
 from harness.results import records
@@ -35,10 +35,12 @@ from problems.forms.assembly import Matrix
 from problems.load_cases import LoadCases
 from problems.model.scene import Scene
 from problems.scene import read_scene
+from problems.storage import digest
 
 CONFIDENCE = 0.95  # that a share is shown
 RECORD = "place.json"
-OUTPUTS = (RECORD, PLANS, *(f"{name}.{kind}" for name in ("own", "plan") for kind in ("toml", "csv")))
+SERIES = ("own", "plan")
+OUTPUTS = (RECORD, PLANS, *(f"{name}.{kind}" for name in SERIES for kind in ("toml", "csv")))
 SERIES_TOLERANCE = 1e-11
 
 CasesOf = Callable[[Scene], LoadCases]
@@ -94,10 +96,15 @@ def run(
         return edited(source, directory, with_fasteners(plan), MOVED)
 
     text_of(movable.own)  # refused now rather than after the search
+    identity = _identity(study, movable.own, candidates, goal) | facts
+    there = [name for name in (*OUTPUTS, *SERIES) if (directory / name).exists()]
+    if there and PLANS not in there:
+        allowed = f"has {there[0]} of another command: name another directory"
+        raise InputError.one("--out", "directory", str(directory), allowed)
     with records.locked(directory, (), other=records.MEASUREMENTS):
         pool = workers(scheduler, console) if scheduler else nullcontext()
         with pool as where, _showing(console) as said:
-            ask = Asked(study, directory / PLANS, _identity(study), where)
+            ask = Asked(study, directory / PLANS, identity, where)
             limit_mm = goal.limit_mm or 0.0
             search = Search(ask, study.bare, nodes, candidates, study.cases.count, allowed, limit_mm, said)
             found = searched(search, movable.own, goal)
@@ -136,13 +143,17 @@ def searched(search: Search, own: Plan, goal: Goal) -> Found:
         best = [steps[0], *way][-1]
         if more:
             steps.append(best := search.fewer(best, before)[0])
-        steps += search.wholes(uniform_plans(search.bare, goal.count), "uniform")
+        steps += search.wholes(search.even(goal.count), "uniform")
     order = [best, *search.removal(best, {})]
     return Found(steps, best, order[::-1])
 
 
-def _identity(study: Study) -> dict[str, Any]:
+def _identity(study: Study, own: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:
+    """All that decides what is written, so that one directory holds one search."""
+    holes = {"candidates": candidates, "the scene's fasteners": own}
     return {
+        **asdict(goal),
+        **{name: f"{_counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
         "scene_key": study.bare.key,
         "fastener": study.fastener.model_dump(mode="json", include={"preload", "between"}),
         "cases_key": study.cases.key,
@@ -198,16 +209,23 @@ def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
     return f"FAIL: {all_set}{left}, {more}; {worst}.", GAP_EXCEEDED
 
 
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}{'s' * (number != 1)}"
+
+
 @contextmanager
 def _showing(console: Console) -> Iterator[Callable[[Step], None]]:
-    """Shows each plan that is kept."""
+    """Shows each plan that is kept, as a line of its own if the console is no terminal."""
     with console.status("all candidates") as status:
-        kept = 0
+        numbers = count(1)
 
         def said(step: Step) -> None:
-            nonlocal kept
-            kept += 1
-            plan = f"{len(step.plan)} fasteners, {step.moved}: {step.gap_mm:.3g} mm"
-            status.update(f"{plan} ({kept} plans proven)")
+            proven = _counted(next(numbers), "plan")
+            plan = f"{_counted(len(step.plan), 'fastener')}, {step.moved}"
+            line = f"{plan}: {step.gap_mm:.3g} mm ({proven} proven)"
+            if console.is_terminal:
+                status.update(line)
+            else:
+                console.print(line)
 
         yield said

@@ -107,13 +107,14 @@ class Search:
         ]
 
     def uniform(self) -> list[Step]:
-        """What is tried to find the fewest fasteners in a uniform pattern: for each number of rows the most
-        columns, then by bisection, as if gaps shrank with more of them.
+        """Plans in the holes nearest to uniform patterns, tried to find the fewest fasteners: of each number
+        of rows the most columns, then by bisection, as if gaps shrank with more of them.
         """
         tried: list[Step] = []
 
         def enough(columns: int) -> bool:
-            tried.append(self.whole(plan_of(grid(self.bare, rows, columns)), "uniform"))
+            pattern = plan_of(grid(self.bare, rows, columns))
+            tried.append(self.whole(onto(pattern, self.candidates), "uniform"))
             return tried[-1].gap_mm <= self.limit_mm
 
         fewest = len(self.candidates) + 1
@@ -122,6 +123,10 @@ class Search:
             if most and enough(most):
                 fewest = rows * (1 + bisect_left(range(1, most), True, key=enough))
         return tried
+
+    def even(self, count: int) -> list[Plan]:
+        """The holes nearest to uniform patterns of so many fasteners."""
+        return [onto(plan, self.candidates) for plan in uniform_plans(self.bare, count)]
 
     def fewest(self, start: Step) -> tuple[Step, list[Step]]:
         """The smallest plan found that keeps the limit, as `start`, all candidates, does; all on the way."""
@@ -147,8 +152,7 @@ class Search:
 
     def fewer(self, step: Step, before: Values) -> tuple[Step, Values]:
         """The best that exchange makes of plans with one fastener less, and the values on its way."""
-        even = uniform_plans(self.bare, len(step.plan) - 1)
-        starts: dict[Plan, Values] = {onto(plan, self.candidates): {} for plan in even}
+        starts: dict[Plan, Values] = {plan: {} for plan in self.even(len(step.plan) - 1)}
         starts[without(step.plan, self._least(step, before, 1)[0])] = before
         found = self.wholes(list(starts), "exchange")
         start = min(found, key=lambda each: (round(each.gap_mm, DIGITS), each.plan))

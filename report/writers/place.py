@@ -24,7 +24,7 @@ FAMILIES = {
     "removal": ("after removal", style.BLUE, ".", "-"),
     "exchange": ("after exchanges", style.BLACK, "*", ""),
     "own": ("the scene's own", style.GREEN, "D", ""),
-    "uniform": ("uniform patterns", style.VERMILLION, "s", ""),
+    "uniform": ("in the holes nearest to uniform patterns", style.VERMILLION, "s", ""),
 }
 
 
@@ -54,8 +54,9 @@ def _summary(record: dict[str, Any]) -> Table:
     }
     if best is not None:
         if limit is not None:
-            failing = ", ".join(map(str, best["failing"])) or "none"
-            known["cases beyond the limit"] = f"{len(best['failing'])} of {record['cases']}: {failing}"
+            failing = best["failing"]
+            which = f"{len(failing)} of {record['cases']}: {', '.join(map(str, failing))}"
+            known["cases beyond the limit"] = which if failing else f"none of {record['cases']}"
         known["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
         known["lower bound"] = "none is known: this is the best plan found"
     lines = pd.DataFrame(known.items(), columns=["what", "value"])

@@ -110,6 +110,52 @@ def test_wrong_values_are_refused_as_by_validate(path: Path, change: dict[str, A
         assert word in str(caught.value)
 
 
+INSTALLED = """
+[[effect]]
+kind = "installed_fasteners"
+points = [[150.0, 25.0]]
+"""
+
+
+def page_of(path: Path, text: str) -> Any:
+    """A page of a scene as in a browser, without one."""
+    module = pytest.importorskip("harness.explore.page")
+    path.write_text(text)
+    explorer, settings = Explorer(scene_of(path), "dual"), Settings.of(scene_of(path))
+    document = pytest.importorskip("bokeh.document").Document()
+    return module.Page(explorer, str(path), 0.05, explorer.answer(settings), document)
+
+
+def dragged(page: Any, x: float, y: float) -> None:
+    page.fasteners.data = {"x": [x, 50.0, 80.0], "y": [y, 25.0, 40.0]}
+
+
+def test_what_solve_would_refuse_is_refused_on_the_page(path: Path, tmp_path: Path) -> None:
+    """A fastener on an installed one, whose own effect does not change; nothing is saved then."""
+    page = page_of(tmp_path / "scene.toml", path.read_text() + INSTALLED)
+    page.path.value = str(tmp_path / "moved.toml")
+    dragged(page, 150.0000004, 25.0)
+    said = "points = [[150.0, 25.0]]: separate places: fasteners acts at the same ones"
+    assert f"page: installed_fasteners.{said}" in page.fault.text
+    page.save()
+    assert said in page.fault.text
+    assert "moved.toml: effect[" in page.fault.text
+    assert not (tmp_path / "moved.toml").exists()
+    dragged(page, 149.0, 25.0)
+    assert page.fault.text == ""
+
+
+def test_a_dropped_fastener_is_solved_and_saved_to_the_micrometre(path: Path, tmp_path: Path) -> None:
+    """Those that were not moved stay where they are, to the last bit."""
+    text = path.read_text().replace("[50.0, 25.0]", "[50.123456789, 25.0]")
+    page = page_of(tmp_path / "scene.toml", text)
+    page.fasteners.data = {"x": [77.0101465599032, 50.123456789], "y": [12.3456789, 25.0]}
+    assert page.answer.settings.places == ((77.01, 12.346), (50.123456789, 25.0))
+    page.path.value = str(tmp_path / "moved.toml")
+    page.save()
+    assert Settings.of(scene_of(tmp_path / "moved.toml")) == page.answer.settings
+
+
 def test_a_saved_scene_finds_its_files(tmp_path: Path) -> None:
     """From another folder; comments and the title stay."""
     home, there = tmp_path / "home", tmp_path / "there"

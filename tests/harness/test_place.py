@@ -169,11 +169,13 @@ def test_the_fewest_uniform_fasteners(strip: Path, monkeypatch: pytest.MonkeyPat
     holes = tuple((float(k), 0.0) for k in range(24))
 
     def whole(plan: Plan, moved: str) -> Any:
-        rows = len({y for _, y in plan})
+        rows = rows_of[plan]
         return search_module.Step(plan, rows / len(plan) + 0.02 * rows, Outcome((), (), ()), moved)
 
     monkeypatch.setattr(Search, "whole", lambda self, plan, moved: whole(plan, moved))
-    patterns = [whole(plan_of(grid(bare, r, c)), "") for r in range(1, 5) for c in range(1, 24 // r + 1)]
+    sizes = [(r, c) for r in range(1, 5) for c in range(1, 24 // r + 1)]
+    rows_of = {search_module.onto(plan_of(grid(bare, r, c)), holes): r for r, c in reversed(sizes)}
+    patterns = [whole(plan, "") for plan in rows_of]
     for enough in (0.1, 0.2, 0.3, 0.5, 2.0):
         fewest = min((len(p.plan) for p in patterns if p.gap_mm <= enough), default=None)
         tried = Search(lambda asked: [], bare, np.zeros((1, 2)), holes, 1, 0, enough).uniform()
@@ -193,6 +195,14 @@ def test_uniform_plans_of_any_number(strip: Path) -> None:
             assert {len(line) for line in lines} <= {count // rows, count // rows + 1}
             assert all(line[0] == pytest.approx(100 / len(line), abs=1e-6) for line in lines)
     assert plan_of(grid(bare, 3, 4)) == uniform_plans(bare, 12)[2]
+
+
+def test_uniform_patterns_are_in_holes_that_can_be_drilled(strip: Path, session: PlanSession) -> None:
+    holes = plans_of(strip, 2, 5)[1:]
+    search = searched(session, 0.03, holes)
+    tried = [*search.uniform(), *search.wholes(search.even(3))]
+    assert all(set(step.plan) <= set(holes) for step in tried)
+    assert {len(step.plan) for step in tried} > {3, 9}
 
 
 def told(strip: Path, candidates: Plan, gap_of: Any, cases: int = 1) -> Search:
@@ -271,6 +281,10 @@ def test_the_command_finds_a_plan_that_solve_confirms(strip: Path, tmp_path: Pat
     assert [list(p) for p in Movable.of(read_scene(str(plan))).own] == best["plan"]
     series = harness("series", plan, "--cases", 6, "--allow-gap", 0.05, "--out", tmp_path / "again")
     assert series.exit_code == 0, series.output
+    assert "12 fasteners, all candidates: " in done.output  # progress, though this is no terminal
+    assert "(1 plan proven)" in done.output
+    drawn = harness("report", tmp_path / "out" / "plan")
+    assert drawn.exit_code == 0, drawn.output
     assert [step["fasteners"] for step in record["order"]] == [*range(best["fasteners"] + 1)]
     for name in ("report.md", "gap-against-fasteners.png", "before-and-after.png", "order.csv"):
         assert (tmp_path / "out" / "report" / name).is_file()
@@ -278,9 +292,17 @@ def test_the_command_finds_a_plan_that_solve_confirms(strip: Path, tmp_path: Pat
     plans = (tmp_path / "out" / PLANS).read_text()
     assert place(strip, tmp_path / "out", "--allow-gap", 0.05).exit_code == 0
     assert (tmp_path / "out" / PLANS).read_text() == plans
-    other = place(strip, tmp_path / "out", "--allow-gap", 0.05, "--seed", 1)
-    assert other.exit_code == 2
-    assert "cases_key" in other.output
+    # Another search is refused before its work, and leaves the files as they are.
+    scene = plan.read_text()
+    for words, said in (
+        (("--allow-gap", 0.05, "--seed", 1), "cases_key"),
+        (("--allow-gap", 0.04), "limit_mm = 0.05: now 0.04: name another directory with --out"),
+        (("--allow-gap", 0.05, "--candidates", "2x5"), "candidates = '12 places"),
+    ):
+        other = place(strip, tmp_path / "out", *words)
+        assert other.exit_code == 2
+        assert said in other.output
+        assert (plan.read_text(), (tmp_path / "out" / PLANS).read_text()) == (scene, plans)
     damaged = plans.replace('"largest": [0.0', '"largest": [0.1', 1)
     assert damaged != plans
     (tmp_path / "out" / PLANS).write_text(damaged)
@@ -415,6 +437,15 @@ def test_no_candidate_is_where_a_fastener_is_installed(tmp_path: Path) -> None:
     (tmp_path / "holes.csv").write_text("x,y\n10,10\n30,10\n")
     with pytest.raises(InputError, match=r"holes\.csv: points = \[\[30\.0, 10\.0\]\]: separate places"):
         Movable.of(read_scene(str(scene))).candidates(str(tmp_path / "holes.csv"))
+
+
+def test_files_of_another_command_are_left_alone(strip: Path, tmp_path: Path) -> None:
+    """A series in DIR/plan, which the end of the search would meet."""
+    (tmp_path / "plan").mkdir()
+    done = place(strip, tmp_path, "--count", 2)
+    assert done.exit_code == 2
+    assert "has plan of another command: name another directory" in done.output
+    assert not (tmp_path / PLANS).exists()
 
 
 def test_no_file_that_is_read_is_written(strip: Path, tmp_path: Path) -> None:
