@@ -37,7 +37,8 @@ from problems.forms import FORMS, Form
 from problems.forms.assembly import LoadCase, Vector
 from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
-from problems.input.user_matrices import SMALL, SYMMETRY, checked
+from problems.input.entries import SYMMETRY, contradictions
+from problems.input.user_matrices import SMALL, checked
 from problems.load_cases import Listed, LoadCases
 from problems.load_cases.random_gaps import random_gaps
 from problems.model.scene import ManufacturedProblem, ManufacturedScene, Scene
@@ -117,8 +118,9 @@ def solve_dual(
     if not np.isfinite(Q).all():
         raise InputError.one("solve_dual", "Q", NOT_FINITE, "every entry must be finite")
     p = _vector("solve_dual", "p", p, len(Q))
-    if abs(Q - Q.T).max(initial=0) > SYMMETRY * abs(Q).max(initial=0):
-        raise InputError.one("solve_dual", "Q", "asymmetric", "must be symmetric")
+    for i, j in contradictions(sp.csr_array(Q))[:1]:
+        key, allowed = f"Q[{i}, {j}] and Q[{j}, {i}]", f"must be symmetric, within {SYMMETRY:g} √(Q_ii Q_jj)"
+        raise InputError.one("solve_dual", key, [Q[i, j].item(), Q[j, i].item()], allowed)
     try:
         sla.cholesky(Q)
     except np.linalg.LinAlgError as error:
@@ -170,6 +172,6 @@ def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:
         raise InputError.one(where, name, value, "must be numbers") from error
     if vector.shape != (size,):
         raise InputError.one(where, f"{name}.shape", vector.shape, f"must be ({size},)")
-    if not np.isfinite(vector).all():
-        raise InputError.one(where, name, NOT_FINITE, "every entry must be finite")
+    for k in np.flatnonzero(~np.isfinite(vector))[:1]:
+        raise InputError.one(where, f"{name}[{k}]", NOT_FINITE, "every entry must be finite")
     return vector

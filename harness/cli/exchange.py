@@ -47,21 +47,24 @@ def export(
 def import_(
     files: Annotated[
         list[str],
-        typer.Argument(metavar="[NAME=]FILE...", help="K, A, f, g: .mtx, .npz, .op4, .pch or .bdf."),
+        typer.Argument(
+            metavar="[NAME=]FILE[:MATRIX]...", help="K, A, f, g: .mtx, .mtx.gz, .npz, .op4, .pch or .bdf."
+        ),
     ],
     out: Annotated[Path, option("FILE.npz", "Output file.")],
 ) -> None:
     """Read K, A, f, g from other programs' files, check them, and write one .npz for `run` and `solve`.
 
     Matrix Market and Abaqus matrix text (.mtx) hold one matrix, named by the file or by NAME=; .npz,
-    Nastran .op4 and DMIG (.pch, .bdf) name theirs. K is checked for symmetry, definiteness and apparent
-    precision.
+    Nastran .op4 and DMIG (.pch, .bdf) name theirs; NAME=FILE:MATRIX takes one of several. K is checked for
+    symmetry, definiteness and apparent precision. What is understood and refused: docs/exchange.md.
 
     \b
     Examples:
       python -m harness import K.mtx A.mtx f.mtx g.mtx --out mine.npz
       python -m harness import K=job_STIF2.mtx A.mtx f.mtx g.mtx --out mine.npz
       python -m harness import joint.op4 --out mine.npz
+      python -m harness import K=job.op4:KAA A.mtx f.mtx g.mtx --out mine.npz
 
     \b
     Exit codes: 0 read and written, 2 wrong usage or bad input.

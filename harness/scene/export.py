@@ -13,7 +13,9 @@ per array and with 17 digits, or as one .npz; about.json, or the texts in the .n
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +65,7 @@ def export(
             "none with --form: it holds K, A, f, g; PATH.npz is one file, any other PATH a folder of .mtx"
         )
         raise InputError.one("--format", "format", format, allowed)
+    _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     scene = read_scene(source)
     own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
     inputs = [Path(source), *own]
@@ -79,6 +82,16 @@ def export(
             (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
         said = f"{form} form, {len(arrays['q'])} unknowns, {about['m']} contacts"
     console.print(f"{out}: {scene.name}, {said}.")
+
+
+def _refuse_suffix(out: Path, kind: formats.Format, program: bool) -> None:
+    """Raise InputError for a folder named like a file, or a file named like one of another kind."""
+    folder = not kind.suffix or (program and out.suffix != ".npz")
+    if folder and out.suffix[1:2].isalpha():
+        allowed = "no suffix: a folder is written" + (", or one file PATH.npz" if program else "")
+        raise InputError.one("--out", "path", str(out), allowed)
+    if not folder and out.suffix.lower() not in kind.suffixes:
+        raise InputError.one("--out", "path", str(out), f"must end in {' or '.join(kind.suffixes)}")
 
 
 def matrices(data: Prepared, load: LoadCase) -> formats.Data:
@@ -129,18 +142,20 @@ def _write_mtx(path: Path, arrays: Arrays, about: Arrays) -> None:
 def import_(files: list[str], out: Path, console: Console) -> None:
     """Read K, A, f, g from files, check them, and write them as one .npz, which is a scene.
 
-    files : paths, or NAME=PATH if the matrix has another name in its file; their order does not matter.
+    files : PATH, NAME=PATH for a file of one matrix, NAME=PATH:MATRIX for one of several; in any order.
     Raises InputError, with what is at `out` unchanged.
     """
     if out.suffix != ".npz":
         raise InputError.one("--out", "path", str(out), "must end in .npz, which makes it a scene")
-    given = [(name, Path(path)) for name, _, path in (file.rpartition("=") for file in files)]
-    with atomic_output(out, [path for _, path in given]) as new:
-        data, origin = _read_all(given)
+    given = [*map(_source, files)]
+    with atomic_output(out, [path for _, path, _ in given]) as new:
+        data, origin, rows = _read_all(given)
         checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)
         formats.FORMATS["npz"].write(new, data | {name: sp.csr_array(data[name]) for name in "KA"})
         problem = _opened(new, origin)
     print_facts(str(out), problem.prepared.assembly, console)
+    if rows:
+        console.print(rows, style="yellow")
     about = ("about ", " in balanced units") if problem.form == "sparse" else ("", "")
     condition = f"{problem.prepared.condition:.1e}".join(about)
     console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
@@ -148,45 +163,67 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     console.print(f"{sentence}.", style="yellow" if few else None)
 
 
-def _read_all(given: list[tuple[str, Path]]) -> tuple[formats.Data, dict[str, Path]]:
-    """K, A, f, g and perhaps nodes, and the file that each comes from; what is named overrides the rest."""
+def _source(text: str) -> tuple[str, Path, str]:
+    """The parts of [NAME=]PATH[:MATRIX]. A path may hold both signs, such as run=3/K.mtx and C:\\K.mtx."""
+    name, _, path = text.partition("=")
+    if name not in NAMES or Path(text).exists():
+        name, path = "", text
+    file, _, matrix = path.rpartition(":")
+    if len(file) < 2 or Path(path).exists() or set(matrix) & set("/\\"):
+        return name, Path(path), ""
+    return name, Path(file), matrix
+
+
+def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[str, Path], str]:
+    """K, A, f, g and perhaps nodes, their files, and a sentence on the rows of a K that has labels.
+
+    What is named overrides the rest.
+    """
     data: formats.Data = {}
     origin: dict[str, Path] = {}
     faults: list[Fault] = []
+    rows = ""
     for named in (False, True):
         of_rank: dict[str, Path] = {}
-        for name, path in given:
+        for name, path, matrix in given:
             if bool(name) != named:
                 continue
-            found = formats.read(path)
             if name:
-                matrix = _named(found, name, path)
-                found = {name: formats.vector(matrix) if name in ("f", "g") else matrix}
-            for key in found:
-                if key not in NAMES:
-                    allowed = "K, A, f, g or nodes; say K=FILE where the file has another name"
-                    faults.append(Fault(str(path), "matrix", key, allowed))
-                elif key in of_rank:
+                found = {name: formats.read_stiffness(path, matrix, name)}
+            else:
+                found = formats.read_labelled(path, partial(_of_problem, faults, path))
+            for key, (values, labels) in found.items():
+                if key in of_rank:
                     allowed = f"is in {of_rank[key]} too; say {key}=FILE for the one that counts"
                     faults.append(Fault(str(path), "matrix", key, allowed))
-            data |= found
+                data[key] = formats.vector(values) if key in ("f", "g") else values
+                if key == "K":
+                    rows = _order(labels)
             of_rank |= dict.fromkeys(found, path)
         origin |= of_rank
     for name, matrix, axis in (("f", "K", 0), ("g", "A", 1)):
         if name not in data and matrix in data and formats.format_of(origin[matrix]).omits_zeros:
             data[name], origin[name] = np.zeros(data[matrix].shape[axis]), origin[matrix]
-    files = ", ".join(str(path) for _, path in given)
+    files = ", ".join(str(path) for _, path, _ in given)
     faults += [Fault(files, name, None, "is in none of the files") for name in "KAfg" if name not in data]
     if faults:
         raise InputError(faults)
-    return data, origin
+    return data, origin, rows
 
 
-def _named(found: formats.Data, name: str, path: Path) -> object:
-    """The matrix meant by NAME=PATH: the one of this name, or the only one in the file."""
-    if name not in found and len(found) != 1:
-        raise InputError.one(path, "matrices", list(found), f"a matrix {name}, or one matrix alone")
-    return found.get(name, next(iter(found.values())))
+def _of_problem(faults: list[Fault], path: Path, names: Sequence[str]) -> list[str]:
+    """The names of a problem; others are added to the faults."""
+    allowed = "K, A, f, g or nodes; say K=FILE, or K=FILE:NAME where the matrix has another name"
+    faults += [Fault(str(path), "matrix", name, allowed) for name in names if name not in NAMES]
+    return [name for name in names if name in NAMES]
+
+
+def _order(labels: formats.Labels) -> str:
+    """The order of the rows of a labelled K, unless it is plain: nodes 1 … n, each with the same dof."""
+    if labels is None or labels.tolist() == [[k + 1, labels[0, 1]] for k in range(len(labels))]:
+        return ""
+    first, last = ("node {}, dof {}".format(*labels[k]) for k in (0, -1))
+    return f"Rows of K ascend by node, then dof, from {first} to {last}: those of A and f must, too."
 
 
 def _opened(path: Path, origin: dict[str, Path]) -> ReferenceProblem:

@@ -3,23 +3,25 @@
 Data are a dict: K (n, n) and A (n, m) sparse, f (n,), g (m,), and nodes (n, 2) if known.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.input import matrix_files
+from problems.input.entries import refuse_no_stiffness, refuse_twice
+from problems.input.matrix_files import Choose
 from problems.input.user_matrices import NAMES, SMALL
 
-from . import nastran, text
+from . import dmig, nastran, text
 
 Data = dict[str, Any]
 Labels = np.ndarray | None
-T = TypeVar("T")
+Read = dict[str, tuple[Any, Labels]]
 DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 
 
@@ -27,18 +29,19 @@ DENSEST = 0.25  # of K's entries: a sparser one of some size is stored so
 class Format:
     """description : of what is written, a file or a folder of one per matrix. suffixes : of files to read.
 
-    read : the matrices of a file by their names in it; a single one by the file's stem. accepts : whether a
-    file is of this format, where another has its suffix. omits_zeros : f and g that are zero everywhere.
-    labelled : K of a file, and the node and degree of freedom of each row (n, 2), None if it does not say so.
+    read : the chosen matrices of a file by their names in it, a single one by the file's stem; and the node
+    and degree of freedom of each row (n, 2), None if the file does not say so. accepts : whether a file is of
+    this format, where another has its suffix. omits_zeros : f and g that are zero everywhere. words : for a
+    node and a degree of freedom.
     """
 
     description: str
     suffixes: tuple[str, ...]
     write: Callable[[Path, Data], None]
-    read: Callable[[Path], Data]
+    read: Callable[[Path, Choose], Read]
     accepts: Callable[[Path], bool] = lambda path: True
     omits_zeros: bool = False
-    labelled: Callable[[Path], tuple[Any, Labels]] | None = None
+    words: tuple[str, str] = ("node", "dof")
 
     @property
     def suffix(self) -> str:
@@ -54,6 +57,10 @@ def _write_npz(path: Path, data: Data) -> None:
     matrix_files.write(path, data)
 
 
+def _read_npz(path: Path, choose: Choose) -> Read:
+    return {name: (M, None) for name, M in matrix_files.read(path, choose, NAMES).items()}
+
+
 FORMATS = {
     "abaqus": Format(
         "a folder: K as Abaqus matrix text, the others as Matrix Market, bit for bit",
@@ -61,15 +68,14 @@ FORMATS = {
         text.write_abaqus,
         text.read_abaqus,
         lambda path: not text.is_matrix_market(path),
-        labelled=text.labelled_abaqus,
     ),
     "dmig": Format(
         "a file .pch (Nastran DMIG), 10 digits",
         (".pch", ".bdf", ".nas", ".dat"),
-        nastran.write_dmig,
-        nastran.read_dmig,
+        dmig.write_dmig,
+        dmig.read_dmig,
         omits_zeros=True,
-        labelled=nastran.labelled_dmig,
+        words=("point", "component"),
     ),
     "mtx": Format(
         "a folder of Matrix Market files, bit for bit",
@@ -78,9 +84,7 @@ FORMATS = {
         text.read_matrix_market,
         text.is_matrix_market,
     ),
-    "npz": Format(
-        "a file .npz, bit for bit", (".npz",), _write_npz, lambda path: matrix_files.read(path, NAMES)
-    ),
+    "npz": Format("a file .npz, bit for bit", (".npz",), _write_npz, _read_npz),
     "op4": Format(
         "a file .op4 (Nastran OUTPUT4, binary), bit for bit", (".op4",), nastran.write_op4, nastran.read_op4
     ),
@@ -92,39 +96,56 @@ def read(path: Path) -> Data:
 
     Raises InputError if it is not readable.
     """
-    if not path.is_file():
-        raise InputError.one(path, "file", str(path), "no such file")
-    found = _read(path, format_of(path).read)
-    return {name: vector(M) if name in ("f", "g") else M for name, M in found.items()}
+    return {name: vector(M) if name in ("f", "g") else M for name, (M, _) in read_labelled(path).items()}
 
 
-def read_stiffness(path: Path) -> tuple[Any, Labels]:
-    """K of a file, or its only matrix, and the node and degree of freedom of each row, if the file says them.
+def read_stiffness(path: Path, matrix: str | None = None, name: str = "K") -> tuple[Any, Labels]:
+    """One matrix of a file, that of the name `matrix`, or else `name`, or the only one; and the node and
+    degree of freedom of each row, if the file says them.
 
     Raises InputError.
     """
-    if path.is_file() and (labelled := format_of(path).labelled):
-        return _read(path, labelled)
-    found = read(path)
-    if "K" not in found and len(found) != 1:
-        raise InputError.one(path, "matrices", list(found), "a matrix K, or one matrix alone")
-    return found.get("K", next(iter(found.values()))), None
+
+    def choose(names: Sequence[str]) -> list[str]:
+        hits = [one for one in names if one == (matrix or name)]
+        if not hits:
+            hits = [one for one in names if not matrix or one.lower() == matrix.lower()]
+        if len(hits) == 1:
+            return hits
+        wanted = matrix or f"{name}, or one matrix alone"
+        how = f'choose one by matrix = "NAME" in a part, {name}=FILE:NAME for import'
+        raise InputError.one(path, "matrices", list(names), f"a matrix {wanted}; {how}")
+
+    ((M, labels),) = read_labelled(path, choose).values()
+    return M, labels
 
 
-def _read(path: Path, read: Callable[[Path], T]) -> T:
+def read_labelled(path: Path, choose: Choose = list) -> Read:
+    """The chosen matrices of a file by their names in it, and the labels of their rows. Raises InputError."""
+    if not path.is_file():
+        raise InputError.one(path, "file", str(path), "no such file")
+    format = format_of(path)
     try:
-        return read(path)
+        found = format.read(path, choose)
     except InputError:
         raise
     except Exception as error:  # of the libraries, which raise whatever a damaged file leads to
-        said = f"{type(error).__name__}: {error}"
-        raise InputError.one(path, "file", said, "a readable matrix file") from error
+        raise InputError.one(path, "file", matrix_files.damage(error), "a readable matrix file") from error
+    for name, (M, labels) in found.items():
+        if sp.issparse(M):
+            refuse_twice(path, name, M)
+        if labels is not None and np.isfinite(M.data).all():
+            node, dof = format.words
+            rows = [f"{node} {at}, {dof} {k}" for at, k in labels.tolist()]
+            refuse_no_stiffness(path, sp.csr_array(M), name, rows)
+    return found
 
 
 def format_of(path: Path) -> Format:
     """The format of a file, from its suffix and, if that is ambiguous, its content."""
+    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     for each in FORMATS.values():
-        if path.suffix.lower() in each.suffixes and each.accepts(path):
+        if suffix in each.suffixes and each.accepts(path):
             return each
     allowed = ", ".join(dict.fromkeys(known for each in FORMATS.values() for known in each.suffixes))
     raise InputError.one(path, "suffix", path.suffix, allowed)

@@ -14,16 +14,20 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from problems.errors import Fault, InputError
-from problems.input.matrix_files import read_mtx
+from problems.errors import InputError
+from problems.input.entries import from_entries, mirrored, one_sided
+from problems.input.matrix_files import BANNER, MIB, Choose, read_mtx
+from problems.input.text_files import read_bytes, read_text
 
-HEADER = b"%%MatrixMarket"
 NORMAL = 3  # the degree of freedom under which displacements are written to Abaqus
+LINES = "node, dof, node, dof, value; or row, column, value; the same on every line"
+ELEMENT = ("*USERELEMENT", "*MATRIX,TYPE=")
+ASK = "*MATRIX OUTPUT, STIFFNESS, FORMAT=MATRIX INPUT or COORDINATE: ask Abaqus for that"
 
 
 def is_matrix_market(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(HEADER)) == HEADER
+    start = read_bytes(path, "file", MIB)[: len(BANNER)]
+    return start.decode("latin-1").lower() == BANNER
 
 
 def write_matrix_market(path: Path, data: dict[str, Any]) -> None:
@@ -40,8 +44,13 @@ def write_one(path: Path, matrix: object, symmetry: str) -> None:
     scipy.io.mmwrite(path, matrix, precision=17, symmetry=symmetry)
 
 
-def read_matrix_market(path: Path) -> dict[str, Any]:
-    return {path.stem: read_mtx(path)}
+def stem(path: Path) -> str:
+    """The name of a file without its suffix, and without that of its compression."""
+    return Path(path.name.removesuffix(".gz")).stem
+
+
+def read_matrix_market(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | None]]:
+    return {name: (read_mtx(path), None) for name in choose([stem(path)])}
 
 
 def write_abaqus(path: Path, data: dict[str, Any]) -> None:
@@ -55,46 +64,47 @@ def write_abaqus(path: Path, data: dict[str, Any]) -> None:
         file.writelines(lines)
 
 
-def read_abaqus(path: Path) -> dict[str, Any]:
-    return {path.stem: labelled_abaqus(path)[0]}
+def read_abaqus(path: Path, choose: Choose) -> dict[str, tuple[sp.csr_array, np.ndarray | None]]:
+    """K, and (n, 2) the node and dof of each row where the file says them. Raises InputError."""
+    return {name: _read(path) for name in choose([stem(path)])}
 
 
-def labelled_abaqus(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
-    """K, and (n, 2) the node and degree of freedom of each row where the file says them."""
-    rows = _rows(path)
-    unknowns, place = np.unique(np.vstack(np.hsplit(rows[:, :-1], 2)), axis=0, return_inverse=True)
+def _read(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
+    values, places, lines = _entries(path)
+    unknowns, place = np.unique(np.vstack(np.hsplit(places, 2)), axis=0, return_inverse=True)
     i, j = place.reshape(2, -1)
     n = len(unknowns)
-    if twice := len(rows) - len(np.unique(i * n + j)):
-        raise InputError.one(path, "entries that are there already", twice, "each row and column once")
-    K = sp.csr_array(sp.coo_array((rows[:, -1], (i, j)), shape=(n, n)))
-    if len(np.unique(np.minimum(i, j) * n + np.maximum(i, j))) == len(rows):  # one of (i, j) and (j, i)
-        K = K + K.T - sp.diags_array(K.diagonal())
-    labels = unknowns.astype(np.intp) if unknowns.shape[1] == 2 else None
-    return sp.csr_array(K), labels
+    if (unknowns[:, 0] < 1).any():
+        allowed = "1 or more: what is below is made by Abaqus, such as a multiplier, and no unknown of a part"
+        raise InputError.one(path, "nodes or rows", int(unknowns[0, 0]), allowed)
+    labelled = unknowns.shape[1] == 2
+    if not labelled and n < unknowns[-1, 0]:
+        missing = int(np.setdiff1d(np.arange(1, unknowns[-1, 0]), unknowns)[0])
+        raise InputError.one(path, f"row {missing}", None, f"rows are 1 … {unknowns[-1, 0]}, none left out")
+    K = from_entries(path, (values, i, j), (n, n), lambda k: f"line {lines[k]}")
+    return (mirrored(K) if one_sided(K) else K), unknowns if labelled else None
 
 
-def _rows(path: Path) -> np.ndarray:
-    """(k, 5) or (k, 3) numbers. Raises InputError with the invalid lines."""
+def _entries(path: Path) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Values, (k, 4) or (k, 2) whole numbers, and the line of each. Raises InputError."""
     rows: list[list[float]] = []
-    faults: list[Fault] = []
-    with path.open(encoding="ascii", errors="replace") as file:
-        for number, line in enumerate(file, start=1):
-            if not line.strip() or line.startswith("*"):  # ** comments, *MATRIX ASSEMBLE, …
-                continue
-            try:
-                row = [float(word) for word in line.replace(",", " ").split()]
-            except ValueError:
-                row = []
-            if len(row) not in (3, 5) or (rows and len(row) != len(rows[0])):
-                allowed = "node, dof, node, dof, value; or row, column, value; the same on every line"
-                faults.append(Fault(str(path), f"line {number}", line.strip(), allowed))
-            elif not all(map(float.is_integer, row[:-1])):
-                faults.append(Fault(str(path), f"line {number}", line.strip(), "whole numbers but the last"))
-            else:
-                rows.append(row)
-    if not rows and not faults:
-        faults.append(Fault(str(path), "lines", 0, "at least one"))
-    if faults:
-        raise InputError(faults)
-    return np.array(rows)
+    lines: list[int] = []
+    for number, line in enumerate(read_text(path, "file", MIB).split("\n"), start=1):
+        if "".join(line.upper().split()).startswith(ELEMENT):
+            raise InputError.one(path, f"line {number}", line.strip(), f"is of a user element; read is {ASK}")
+        if not line.strip() or line.startswith("*"):  # ** comments, *MATRIX ASSEMBLE, …
+            continue
+        try:
+            row = [float(word) for word in line.replace(",", " ").split()]
+        except ValueError:
+            row = []
+        if len(row) not in (3, 5) or (rows and len(row) != len(rows[0])):
+            raise InputError.one(path, f"line {number}", line.strip(), LINES)
+        if not all(map(float.is_integer, row[:-1])):
+            raise InputError.one(path, f"line {number}", line.strip(), "whole numbers but the last")
+        rows.append(row)
+        lines.append(number)
+    if not rows:
+        raise InputError.one(path, "lines", 0, "at least one")
+    table = np.array(rows)
+    return table[:, -1], table[:, :-1].astype(np.intp), lines

@@ -5,25 +5,43 @@ In an .npz a sparse matrix X is its compressed columns, X_data, X_indices, X_ind
 files of one sparse matrix are read too.
 """
 
+import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from problems.forms.assembly import Vector
+from problems.errors import InputError
+from problems.forms.assembly import Indices, Vector
 from problems.forms.prepared import Prepared
 
+from .entries import from_entries, refuse_twice
+from .text_files import read_bytes
+
 PARTS = ("data", "indices", "indptr", "shape")
-LONGEST_LINE = 60  # characters quoted in a message
+MIB = 16_384  # of a text file of one matrix
 CHUNK = 2**20  # bytes of lines that are checked at once
 INTEGER = rb"[-+]?+\d++"
 REAL = rb"(?:[-+]?+(?:\d++\.?+\d*+|\.\d++)(?:[eE][-+]?+\d++)?+|[-+]?+(?i:nan|inf(?:inity)?+))"
 #: The number of an entry, by the field in the header.
-NUMBER = {"real": [REAL], "double": [REAL], "complex": [REAL, REAL], "integer": [INTEGER], "pattern": []}
+NUMBER = {"real": REAL, "double": REAL, "integer": INTEGER, "unsigned-integer": INTEGER}
+#: By the symmetry in the header, the sign with which (i, j) stands for (j, i), too.
+SIGNS = {"general": None, "symmetric": 1, "hermitian": 1, "skew-symmetric": -1}
+BANNER = "%%matrixmarket"
+LAYOUTS = {"coordinate": 2, "array": 1}  # spaces in the line of sizes
+Choose = Callable[[Sequence[str]], Sequence[str]]
+
+
+def damage(error: Exception) -> str:
+    """What is wrong with a file, in words: without Python's, which a library raises for whatever it meets."""
+    plain = isinstance(error, ValueError | OSError | Warning) and not isinstance(error, UnicodeError)
+    if not plain or "invalid literal" in str(error):
+        return "damaged, or of another format"
+    return getattr(error, "strerror", None) or str(error)
 
 
 def packed(arrays: Mapping[str, Any]) -> dict[str, Any]:
@@ -50,25 +68,40 @@ def write(path: Path, arrays: Mapping[str, Any]) -> None:
         np.savez(file, **packed(arrays))
 
 
-def read(path: Path, names: Sequence[str]) -> dict[str, Any]:
-    """Those of the names that are there; the only matrix of a file of SciPy's is named by the file's stem.
+def read(path: Path, choose: Choose, expected: Sequence[str]) -> dict[str, Any]:
+    """The arrays of a file that are chosen from all names in it; SciPy's matrix is named by the file's stem.
 
-    Raises ValueError if the parts of a sparse matrix do not fit together, and what NumPy and zipfile raise.
+    expected : names that are there whatever they hold; others need numbers, and a dimension.
+    Raises ValueError if the parts of a sparse matrix do not fit together, InputError if one lists an entry
+    twice, and what NumPy and zipfile raise.
     """
-    found: dict[str, Any] = {}
     with np.load(path) as archive:
-        for name in names:
-            if name in archive.files:
-                found[name] = archive[name]
-            elif all(f"{name}_{part}" in archive.files for part in PARTS):
-                found[name] = unpacked(archive, name)
-        of_scipy = {"format", "shape", "data"} <= set(archive.files)
-    if not found and of_scipy:
-        found[path.stem] = sp.load_npz(path)
+        files = set(archive.files)
+        if {"format", "shape", "data"} <= files and not files & set(expected):
+            M = {path.stem: sp.load_npz(path)}
+            found = {name: M[name] for name in choose(list(M))}
+        else:
+            stems = [name.removesuffix("_indptr") for name in archive.files if name.endswith("_indptr")]
+            stems = [name for name in stems if all(f"{name}_{part}" in files for part in PARTS)]
+            parts = {f"{name}_{part}" for name in stems for part in PARTS}
+            plain = [name for name in archive.files if name not in parts]
+            names = stems + [name for name in plain if name in expected or _numeric(archive, name)]
+            found = {
+                name: unpacked(archive, name) if name in stems else archive[name] for name in choose(names)
+            }
     for name, M in found.items():
         if sp.issparse(M):
             _refuse_damaged(name, M)
+            refuse_twice(path, name, M)
     return found
+
+
+def _numeric(archive: Any, name: str) -> bool:
+    """Whether an array has numbers and a dimension."""
+    try:
+        return bool(archive[name].dtype.kind in "fiubc" and archive[name].ndim)
+    except ValueError:  # of objects
+        return False
 
 
 def _refuse_damaged(name: str, M: Any) -> None:
@@ -80,65 +113,115 @@ def _refuse_damaged(name: str, M: Any) -> None:
                 raise ValueError(f"{name}: an index of axis {axis} is not below {size}")
 
 
+def mtx_header(path: Path) -> tuple[list[str], list[int], int, bytes]:
+    """Of a Matrix Market file: layout, field and symmetry, the sizes, their line, and all lines after them.
+
+    Raises InputError.
+    """
+    content = read_bytes(path, "file", MIB)
+    lines, number = io.BytesIO(content), 1
+    banner = lines.readline()
+    words = banner.decode("latin-1").lower().split()
+    if words[:2] != [BANNER, "matrix"] or len(words) != 5 or words[4] not in SIGNS or words[2] not in LAYOUTS:
+        _refuse_line(path, 1, banner, "the header is %%MatrixMarket matrix LAYOUT FIELD SYMMETRY")
+    for number, line in enumerate(lines, start=2):
+        if line.strip() and not line.startswith(b"%"):
+            if not re.fullmatch(rb"\s*+\d++(?:[ \t]++\d++){%d}\s*+" % LAYOUTS[words[2]], line):
+                _refuse_line(path, number, line, "the sizes are ROWS COLUMNS, and ENTRIES if coordinate")
+            return words[2:], [*map(int, line.split())], number, content[lines.tell() :]
+    raise InputError.one(path, "lines", number, "truncated: the line of sizes is missing")
+
+
 def read_mtx(path: Path) -> Any:
     """A Matrix Market file, array or sparse.
 
-    Raises ValueError if entries are missing, a line holds anything else than one entry, a number is out of
-    range, or a symmetric matrix is not square. mmread would take missing entries for zeros, read 3,5 and 3D5
-    as 3, and crash on a NUL, on an array without entries, and on a symmetric one that is not square.
+    Raises InputError if an entry is listed twice or a line holds anything else than one entry, or ValueError
+    if entries are missing, a number is out of range, or a symmetric matrix is not square. mmread would take
+    missing entries for zeros, read 3,5 and 3D5 as 3, add up what is listed twice, and crash on a NUL.
     """
+    (layout, field, symmetry), sizes, number, body = mtx_header(path)
+    (rows, columns), sign = sizes[:2], SIGNS[symmetry]
+    if sign and rows != columns:
+        raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
+    if field not in NUMBER:
+        raise ValueError(f"{field} entries, where real numbers are needed")
+    words = [NUMBER[field]]
+    if layout == "coordinate":
+        words = [INTEGER, INTEGER, *words]
+    elif sign:  # its lower triangle, column by column
+        sizes = [rows * (rows + sign) // 2, 1]
+    count = sizes[-1] if layout == "coordinate" else sizes[0] * sizes[1]
+    filled = _entry_lines(path, body, number, count, rb"[ \t]++".join(words))
+    if not rows * columns:
+        return np.zeros((rows, columns))
+    banner = f"%%MatrixMarket matrix {layout} {field} general\n"
+    header = banner + "%\n" * (number - 2) + " ".join(map(str, sizes)) + "\n"
     try:
-        rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(path)
-        if symmetry != "general" and rows != columns:
-            raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
-        words = NUMBER[field]
-        if layout == "array":
-            entries = rows * columns if symmetry == "general" else rows * (rows + 1) // 2
-        else:
-            words = [INTEGER, INTEGER, *words]
-        _refuse_wrong_lines(path, entries, rb"[ \t]++".join(words))
-        return scipy.io.mmread(path) if rows * columns else np.zeros((rows, columns))
+        M = scipy.io.mmread(io.BytesIO(header.encode() + body))
     except OverflowError as error:
         raise ValueError(str(error)) from error
+    if layout == "coordinate":
+        return from_entries(path, (M.data, *M.coords), M.shape, lambda k: f"line {filled[k]}", sign)
+    if sign:
+        j, i = np.triu_indices(rows, k=int(sign < 0))
+        listed, M = M.ravel(), np.zeros((rows, rows), dtype=M.dtype)
+        M[i, j], M[j, i] = listed, sign * listed
+    return M
 
 
-def _refuse_wrong_lines(path: Path, entries: int, entry: bytes) -> None:
-    """Raise ValueError unless the lines after the sizes are `entries` times `entry`, or empty."""
-    line = rb"[ \t]*+(?:%b)?+[ \t\r]*+\n" % entry
+def _entry_lines(path: Path, body: bytes, before: int, entries: int, entry: bytes) -> Indices:
+    """The numbers of the lines of entries. Raises InputError for other lines, ValueError for too few."""
+    line = rb"[ \t]*+(?:%b)?+[ \t]*+\n" % entry
     one, many = re.compile(line), re.compile(rb"(?:%b)*+" % line)
-    with path.open("rb") as file:
-        before = 1 + next(k for k, text in enumerate(file) if text.strip() and not text.startswith(b"%"))
-        found = 0
-        while lines := file.readlines(CHUNK):
-            lines[-1] = lines[-1].removesuffix(b"\n") + b"\n"
-            if not many.fullmatch(b"".join(lines)):
-                number, wrong = next((k, text) for k, text in enumerate(lines) if not one.fullmatch(text))
-                text = wrong[:LONGEST_LINE].decode(errors="replace").rstrip()
-                raise ValueError(f"line {before + number + 1}: {text!r}; each line must hold one entry")
-            found += sum(map(bool, map(bytes.strip, lines)))
-            before += len(lines)
-    if found != entries:
-        raise ValueError(f"truncated: {found} of {entries} entries")
+    file, filled = io.BytesIO(body), np.zeros(0, dtype=np.intp)
+    while lines := file.readlines(CHUNK):
+        lines[-1] = lines[-1].removesuffix(b"\n") + b"\n"
+        if not many.fullmatch(b"".join(lines)):
+            at, wrong = next((k, text) for k, text in enumerate(lines) if not one.fullmatch(text))
+            _refuse_line(path, before + at + 1, wrong, "each line must hold one entry")
+        filled = np.append(filled, before + 1 + np.flatnonzero([*map(bytes.strip, lines)]))
+        before += len(lines)
+    if len(filled) < entries:
+        raise ValueError(f"truncated: {len(filled)} of {entries} entries")
+    if len(filled) > entries:
+        _refuse_line(path, filled[entries], b"an entry", f"the line of sizes says that there are {entries}")
+    return filled
+
+
+def _refuse_line(path: Path, number: int, line: bytes, allowed: str) -> NoReturn:
+    raise InputError.one(path, f"line {number}", line.decode(errors="replace").rstrip(), allowed)
 
 
 SAMPLE_SIZE = 20_000
 DOUBLE, SINGLE = 16, 7  # significant digits of the two floating-point formats
+FEWEST = 6  # digits that a program prints
 DRAWS = 3
 
 
 def apparent_digits(values: Vector) -> int:
     """The smallest d with every value equal to itself rounded to d significant digits, at most 16.
 
-    7 if all values are in single precision. Examines a sample of 20 000.
+    7 if all values are in single precision, also as decimals of more digits. 16 for integers, unless all end
+    in zeros after six digits or more. Examines a sample of 20 000.
     """
     v = values[values != 0]
     if len(v) > SAMPLE_SIZE:
         v = np.random.default_rng(0).choice(v, SAMPLE_SIZE, replace=False)
-    some = v.tolist()
-    for d in range(1, DOUBLE):
-        if all(float(f"{value:.{d - 1}e}") == value for value in some):
-            return d
-    return SINGLE if np.array_equal(v, v.astype(np.float32)) else DOUBLE
+    digits = next((d for d in range(1, DOUBLE) if _are_rounded(v, v, d)), DOUBLE)
+    with np.errstate(over="ignore"):
+        single = v.astype(np.float32)
+    if digits > SINGLE and _are_rounded(v, single, digits):
+        return SINGLE
+    exact = np.array_equal(v, np.rint(v)) and (digits < FEWEST or abs(v).max(initial=0) < 10.0**digits)
+    return DOUBLE if exact else digits
+
+
+def _are_rounded(values: Vector, exact: Vector, digits: int) -> bool:
+    """Whether the values are exact ones rounded to so many significant digits; at 16 not rounded at all."""
+    if digits == DOUBLE:
+        return np.array_equal(values, exact)
+    pairs = zip(values.tolist(), exact.tolist(), strict=True)
+    return all(float(f"{b:.{digits - 1}e}") == a for a, b in pairs)
 
 
 def expected_error(prepared: Prepared, x: Vector, lam: Vector, digits: int) -> float:

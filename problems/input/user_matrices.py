@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.io
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
 
 from problems import storage
 from problems.errors import Fault, InputError
@@ -24,12 +24,14 @@ from problems.storage import fingerprint
 
 from . import matrix_files
 from .bounded import LARGEST
+from .entries import refuse_no_stiffness
 
 NAMES = ("K", "A", "f", "g", "nodes")
 SCALE = 1e50  # of K and of each contact; beyond it products such as AᵀK⁻¹A overflow or underflow
 SMALL = 2000  # unknowns up to which a K is solved in the dense forms
 LOST = 2.0**-44  # of ‖a_j‖₂², per contact and entry: 256 ulps, for ‖z‖²
-SYMMETRY = 1e-10  # largest |K − Kᵀ| / max|K| attributed to rounding
+SHOWN = 5  # columns named in a message
+SLIGHT = 1e-6  # of the largest: a coefficient that is rounding
 
 
 def stored_matrices(
@@ -67,9 +69,9 @@ def holds_sparse(files: dict[str, Path]) -> bool:
         if "problem" in files:
             with np.load(files["problem"]) as archive:
                 return "K_shape" in archive.files and archive["K_shape"][0] > SMALL
-        rows, _, _, layout, _, _ = scipy.io.mminfo(files["K"])
-        return bool(layout == "coordinate" and rows > SMALL)
-    except Exception:  # zipfile, pickle and mminfo raise their own kinds; whoever reads it says what is wrong
+        (layout, _, _), sizes, _, _ = matrix_files.mtx_header(files["K"])
+        return layout == "coordinate" and sizes[0] > SMALL
+    except Exception:  # zipfile and pickle raise their own kinds; whoever reads it says what is wrong
         return False
 
 
@@ -85,11 +87,13 @@ def read_matrices(files: dict[str, Path], sparse: bool = False) -> tuple[Assembl
     data: dict[str, Any] = {}
     for key, path in files.items():
         try:
-            found = matrix_files.read(path, NAMES) if key == "problem" else {key: matrix_files.read_mtx(path)}
+            one = key == "problem"
+            found = matrix_files.read(path, list, NAMES) if one else {key: matrix_files.read_mtx(path)}
+        except InputError:
+            raise
         except Exception as error:  # zipfile and pickle raise their own kinds
-            kind = ".npz with K, A, f, g" if key == "problem" else "Matrix Market file"
-            where = "file" if key == "problem" else key
-            raise InputError.one(path, where, str(error), f"a readable {kind}") from error
+            kind, where = (".npz with K, A, f, g", "file") if one else ("Matrix Market file", key)
+            raise InputError.one(path, where, matrix_files.damage(error), f"a readable {kind}") from error
         data |= found
     data |= {key: data[key].toarray() for key in "fg" if sp.issparse(data.get(key))}
     return checked(data, {key: str(files.get("problem") or files.get(key)) for key in NAMES}, sparse)
@@ -117,14 +121,17 @@ def checked(
     refuse([("K", "K.shape", K.shape, "at least one unknown")] if K.shape[0] == 0 else [])
     refuse(_wrong_entries(K, A, f, g, nodes))
     refuse(_wrong_units(K, A))
+    strays = [key for key in data if key not in NAMES]
+    refuse(_wrong_strays({key: data[key] for key in strays}, A.shape))
+    K.sum_duplicates()
+    K.eliminate_zeros()
+    refuse_no_stiffness(where.get("K", "matrices"), K, "K")
     skew = abs(K - K.T).max()
-    asymmetry = float(skew / abs(K).max())
-    allowed = f"must be ≤ {SYMMETRY:g}"
-    refuse([("K", "max|K − Kᵀ| / max|K|", asymmetry, allowed)] if asymmetry > SYMMETRY else [])
     notes = []
+    if strays:
+        notes.append(f"Of the file, {', '.join(strays)} was not read: a problem is K, A, f, g and nodes")
     if rounded := [key for key in "KAfg" if not _fits(data[key])]:
         notes.append(f"Numbers of {', '.join(rounded)} that float64 cannot hold were rounded to the nearest")
-    K.eliminate_zeros()
     if skew:
         K = sp.csr_array(K / 2 + K.T / 2)
         notes.append(f"K, asymmetric by {skew:.1e} N/mm, was replaced by (K + Kᵀ)/2")
@@ -153,9 +160,11 @@ def _wrong_entries(K: sp.csr_array, A: sp.csr_array, f: Vector, g: Vector, nodes
     for key, (found, wanted) in shapes.items():
         if found != wanted:
             yield key, f"{key}.shape", found, f"must be {wanted}"
-    for key, values in {"K": K.data, "A": A.data, "f": f, "g": g}.items():
-        if not np.isfinite(values).all():
-            yield key, key, "NaN or infinity", "every entry must be finite"
+    for key, values in {"K": K, "A": A, "f": f, "g": g}.items():
+        listed = sp.coo_array(values)
+        if (wrong := np.flatnonzero(~np.isfinite(listed.data))).size:
+            at = ", ".join(str(index[wrong[0]]) for index in listed.coords)
+            yield key, f"{key}[{at}]", "NaN or infinity", "every entry must be finite"
     if nodes is not None and not (abs(nodes) <= LARGEST).all():
         yield "nodes", "nodes", "NaN or too far away", f"mm, at most {LARGEST:g}"
 
@@ -173,6 +182,14 @@ def _wrong_units(K: sp.csr_array, A: sp.csr_array) -> Faults:
         yield "A", f"max|A[:, {j}]|", float(sizes[j]), f"{allowed} this contact's gap"
 
 
+def _wrong_strays(data: Mapping[str, Any], shape: tuple[int, int]) -> Faults:
+    """Arrays that may be meant as a part of a problem with A of this shape; answers and ids are not."""
+    allowed = "is no part of a problem: a bound is a column of A with its g; take out what is not meant"
+    for key, M in data.items():
+        if key not in ("x", "lam") and (M.ndim == 2 or M.dtype.kind in "fc") and {*M.shape} & {*shape}:
+            yield key, key, f"array of shape {M.shape}", allowed
+
+
 def _fits(given: Any) -> bool:
     """Whether float64 holds each of these finite numbers exactly."""
     values = sp.coo_array(given).data if sp.issparse(given) else given
@@ -186,23 +203,35 @@ def _fits(given: Any) -> bool:
 
 
 def refuse_dependent(A: sp.csc_array, where: object) -> None:
-    """Raise InputError naming the first column of A (n, m), none zero, that depends on those before it.
+    """Raise InputError naming the first column of A (n, m), none zero, that depends on others before it.
 
     By the pivots of AᵀA = LLᵀ, l_jj² = min_z ‖a_j − Σ_{i<j} z_i a_i‖₂². AᵀA is block diagonal, a block per
     group of contacts that share unknowns, and is factored as a band or a sparse matrix. The rounding of l_jj²
     is some k + (entries of a_j) ulps of ‖a_j‖₂² in a group of k contacts, times ‖z‖².
     """
-    if _dependent(A):
-        first = bisect_left(range(A.shape[1]), True, key=lambda j: _dependent(A[:, : j + 1]))
-        allowed = "must not depend on the columns before it"
-        raise InputError.one(where, f"A[:, {first}]", "dependent", allowed)
+    if not _dependent(A):
+        return
+    first = bisect_left(range(A.shape[1]), True, key=lambda j: _dependent(A[:, : j + 1]))
+    scaled = _scaled(A)
+    before = scaled[:, :first]
+    z = abs(spsolve(sp.csc_array(before.T @ before), (before.T @ scaled[:, [first]]).toarray().ravel()))
+    others = np.flatnonzero(z > z.max() * SLIGHT).tolist()
+    names = ", ".join(f"A[:, {j}]" for j in others[:SHOWN])
+    more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+    allowed = "must not depend on the columns before it"
+    raise InputError.one(where, f"A[:, {first}]", f"dependent on {names}{more}", allowed)
+
+
+def _scaled(A: sp.csc_array) -> sp.csc_array:
+    """A with columns of similar sizes, without rounding, so that no square overflows."""
+    exponents = np.frexp(abs(A).max(axis=0).toarray().ravel())[1]
+    return sp.csc_array(A @ sp.diags_array(np.exp2(-exponents.astype(float))))
 
 
 def _dependent(A: sp.csc_array) -> bool:
     if A.shape[1] == 0:
         return False
-    exponents = np.frexp(abs(A).max(axis=0).toarray().ravel())[1]
-    scaled = A @ sp.diags_array(np.exp2(-exponents.astype(float)))  # without rounding; no square overflows
+    scaled = _scaled(A)
     G = sp.csc_array(scaled.T @ scaled)
     terms = np.bincount(connected_components(G, directed=False)[1]).max() + np.diff(A.indptr).max()
     block = sparse_block(G)

@@ -42,7 +42,7 @@ def column_of(A: sp.csc_array) -> int | None:
         refuse_dependent(A, "A.mtx")
     except InputError as error:
         (fault,) = error.faults
-        assert (fault.where, fault.value) == ("A.mtx", "dependent")
+        assert (fault.where, str(fault.value)[:18]) == ("A.mtx", "dependent on A[:, ")
         assert fault.allowed == "must not depend on the columns before it"
         found = re.fullmatch(r"A\[:, (\d+)\]", fault.key)
         assert found
@@ -112,7 +112,7 @@ def test_every_command_refuses_them_alike(words: str, tmp_path: Path) -> None:
     done = harness(*given)
     assert done.exit_code == 2, done.output
     said = " ".join(done.output.split())
-    assert f"{own}: A[:, 2] = 'dependent': must not depend on the columns before it" in said
+    assert f"{own}: A[:, 2] = 'dependent on A[:, 0]': must not depend on the columns before it" in said
 
 
 def test_contacts_that_the_rounding_of_Q_makes_dependent_are_said() -> None:

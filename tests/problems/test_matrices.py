@@ -125,10 +125,10 @@ def changed(key: str, index: Any, value: float) -> dict[str, Any]:
 
 
 BAD: dict[str, tuple[dict[str, Any], str]] = {
-    "NaN in K": (changed("K", (2, 2), np.nan), "K = 'NaN or infinity'"),
-    "infinity in g": (changed("g", 1, np.inf), "g = 'NaN or infinity'"),
-    "NaN in A": (changed("A", (0, 0), np.nan), "A = 'NaN or infinity'"),
-    "asymmetric": (changed("K", (0, 1), 9.0), "max|K − Kᵀ|"),
+    "NaN in K": (changed("K", (2, 2), np.nan), "K[2, 2] = 'NaN or infinity'"),
+    "infinity in g": (changed("g", 1, np.inf), "g[1] = 'NaN or infinity'"),
+    "NaN in A": (changed("A", (0, 0), np.nan), "A[0, 0] = 'NaN or infinity'"),
+    "asymmetric": (changed("K", (0, 1), 9.0), "K[0, 1] and K[1, 0] = [9.0, "),
     "indefinite": (changed("K", (5, 5), -1.0), "the pivot of unknown 5"),
     "negative": ({"K": -DATA["K"]}, "K of part 1"),
     "singular": ({"K": sla.block_diag(K1, np.ones((4, 4)))}, "positive definite"),
@@ -163,7 +163,7 @@ def test_bad_arrays_are_named_with_their_file(tmp_path: Path, case: str) -> None
 def test_several_wrong_shapes_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as error:
         opened(write_npz(tmp_path, K=DATA["K"][:, :5], f=np.ones(3), g=changed("g", 0, np.nan)["g"]))
-    assert [fault.key for fault in error.value.faults] == ["K.shape", "f.shape", "g"]
+    assert [fault.key for fault in error.value.faults] == ["K.shape", "f.shape", "g[0]"]
 
 
 @pytest.mark.parametrize("key", ["K", "A", "f", "g"])
@@ -180,7 +180,7 @@ def test_truncated_matrix_market(tmp_path: Path, key: str, form: str) -> None:
 
 
 @pytest.mark.parametrize("form", ["dense", "sparse"])
-@pytest.mark.parametrize("entry", ["3k", "3,5", "3D5", "0x3", "1_0", "1e", "3 4", "3\0", "3\r4"])
+@pytest.mark.parametrize("entry", ["3k", "3,5", "3D5", "0x3", "1_0", "1e", "3 4", "3\0"])
 def test_an_entry_that_mmread_would_misread_is_named(tmp_path: Path, form: str, entry: str) -> None:
     """It reads 3,5 and 3D5 as 3, and crashes on a NUL."""
     value = DATA["f"][:, None]

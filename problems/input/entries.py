@@ -1,0 +1,112 @@
+"""Matrices from entries as files list them: one rule for every format and for K, A, f and g.
+
+An entry that is listed twice is refused. Where a file says that (i, j) stands for (j, i) too, both may be
+listed if they agree; where it does not, a triangle alone is refused. |K_ij − K_ji| ≤ SYMMETRY · √(K_ii K_jj).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from problems.errors import Fault, InputError
+from problems.forms.assembly import Indices
+
+SYMMETRY = 1e-10  # largest |K_ij − K_ji| / √(K_ii K_jj) attributed to rounding
+HELD = 1e36  # N/mm, what Abaqus writes on the diagonal for a degree of freedom that is held
+Place = Callable[[int], str]
+ONCE = "each entry must be listed once"
+
+
+def from_entries(
+    where: object,
+    entries: tuple[Any, Indices, Indices],
+    shape: tuple[int, int],
+    place: Place,
+    sign: int | None = None,
+) -> sp.csr_array:
+    """The matrix of entries (values, rows, columns), those of value 0 kept.
+
+    place : of entry k in the file. sign : ±1 if (i, j) stands for (j, i) too, with that sign; None if not.
+    Raises InputError naming two entries at one place, or two that contradict each other.
+    """
+    values, i, j = entries
+    M = sp.csr_array(sp.coo_array((values, (i, j)), shape=shape))
+    if M.nnz < len(values):
+        order = np.lexsort((j, i))
+        first = np.flatnonzero((np.diff(i[order]) == 0) & (np.diff(j[order]) == 0))[0]
+        at = order[first : first + 2]
+        raise InputError.one(where, " and ".join(map(place, at.tolist())), values[at].tolist(), ONCE)
+    if sign is not None:
+        M = mirrored(M, sign)
+        for row, column in contradictions(M, sign)[:1]:
+            at = np.flatnonzero(((i == row) & (j == column)) | ((i == column) & (j == row)))
+            allowed = "must be equal: the file says that one stands for both"
+            allowed = allowed if sign == 1 else "must be opposite, and zero on the diagonal: skew-symmetric"
+            raise InputError.one(where, " and ".join(map(place, at.tolist())), values[at].tolist(), allowed)
+    return M
+
+
+def refuse_twice(where: object, name: str, M: Any) -> None:
+    """Raise InputError naming an entry that a sparse matrix lists twice."""
+    if not getattr(M, "has_canonical_format", True):
+        listed = sp.coo_array(M)
+        i, j = listed.coords
+        from_entries(where, (listed.data, i, j), M.shape, lambda k: f"{name}[{i[k]}, {j[k]}]")
+
+
+def one_sided(K: sp.csr_array) -> bool:
+    """Whether K has entries off the diagonal, and of no pair (i, j), (j, i) both."""
+    pairs = _pattern(K).multiply(_pattern(K).T)
+    return bool(pairs.nnz == np.count_nonzero(_pattern(K).diagonal()) < K.nnz)
+
+
+def mirrored(M: sp.csr_array, sign: int = 1) -> sp.csr_array:
+    """M with each entry that is listed on one side of the diagonal alone on the other, too."""
+    if M.shape[0] != M.shape[1]:
+        return M
+    alone = _pattern(M) - _pattern(M).multiply(_pattern(M).T)
+    return sp.csr_array(M + sign * M.multiply(alone).T)
+
+
+def contradictions(K: sp.csr_array, sign: int = 1) -> list[tuple[int, int]]:
+    """The pairs (i, j), i ≤ j, whose two entries differ by more than rounding, in the order of their rows."""
+    apart, sizes = sp.coo_array(sp.triu(K - sign * K.T)), np.sqrt(abs(K.diagonal().astype(float)))
+    i, j = apart.coords
+    wrong = ~(abs(apart.data) <= SYMMETRY * sizes[i] * sizes[j])
+    return sorted(zip(i[wrong].tolist(), j[wrong].tolist(), strict=True))
+
+
+def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequence[str] | None = None) -> None:
+    """Raise InputError if K (n, n), finite, is asymmetric, or has Abaqus' mark on its diagonal.
+
+    name, rows : of the matrix and its rows in the file.
+    """
+
+    def entry(i: int, j: int) -> str:
+        return f"{name}, {rows[i]}, column {rows[j]}" if rows else f"{name}[{i}, {j}]"
+
+    pairs, held = contradictions(K), np.flatnonzero(np.isclose(K.diagonal(), HELD, rtol=1e-6, atol=0))
+    faults = []
+    for i, j in pairs[:1]:
+        more = f"; {len(pairs) - 1} more pairs are not" if len(pairs) > 1 else ""
+        if one_sided(K):
+            more = (
+                ": only a triangle is there. Write both, or in a format that says that one is meant for both"
+            )
+        allowed = f"K must be symmetric, both within {SYMMETRY:g} √(K_ii K_jj){more}"
+        values = [float(K[i, j]), float(K[j, i])]
+        faults.append(Fault(str(where), f"{entry(i, j)} and {entry(j, i)}", values, allowed))
+    if 0 < len(held) < K.shape[0]:
+        more = f"; {len(held)} have it" if len(held) > 1 else ""
+        allowed = f"Abaqus' mark of a degree of freedom that is held: leave its row and column out{more}"
+        faults.append(Fault(str(where), entry(held[0], held[0]), HELD, allowed))
+    if faults:
+        raise InputError(faults)
+
+
+def _pattern(M: sp.csr_array) -> sp.csr_array:
+    return sp.csr_array((np.ones(len(M.data), dtype=np.int8), M.indices, M.indptr), shape=M.shape)
