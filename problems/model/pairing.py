@@ -13,7 +13,8 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
-from .surface import Surface, cross
+from .cells import cross
+from .surface import Surface
 
 STEPS, SETTLED = 50, 1e-10  # of the search for a foot; mm
 

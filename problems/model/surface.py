@@ -4,16 +4,15 @@ Points and nodes are in a plane, mm. With the weights W of points, Wv are the va
 values v at the nodes, and Wᵀp are nodal forces with the resultant and the moments of forces p at the points.
 
     a grid      bilinear on its rectangles; areas by the trapezoidal rule
-    triangles   barycentric on Delaunay's triangles; each gives a third of its area to its corners
+    triangles   Wachspress' on the cells of `cells`: barycentric on triangles, bilinear on rectangles
 
-Delaunay's triangles fill the convex hull. One whose longest edge is more than 2.5 times the usual edge at any
-of its corners bridges a hole or a bay of the part, and is dropped.
+The triangles between the edges of a cell and the mean of its corners give a third of their area to each of
+their corners, and that of the mean to all corners of the cell alike. Bays and holes are no surface.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,11 +21,11 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
+from .cells import cells_of, cross, means, wachspress
+
 SAME = 1e-6  # mm: closer points are one
 THIN = 1e-6  # of its length: a narrower strip of nodes is a line
-BRIDGE = 2.5  # times the usual edge at a corner
 ROUNDING = 1e-9  # of a triangle's size, by which a point on its border may be outside
-FLAT = 1e-9  # of its longest edge squared: a triangle without area
 
 
 class Surface(ABC):
@@ -103,70 +102,102 @@ class Grid(Surface):
 
 @dataclass(frozen=True, eq=False)
 class Triangles(Surface):
-    """Delaunay's triangles of the nodes (c, 2) but those that bridge a bay. kept : which of the mesh's."""
+    """The cells between nodes (c, 2): to the last bit the same, whatever the order of the nodes.
 
+    order : the nodes by x, then y. nodes, mesh (Delaunay's), tree : of these, about their middle.
+    cell, kept (t,) : the cell of each triangle of the mesh, and whether it is of the surface.
+    start, corner : corner[start[k]:start[k + 1]] are those of cell k, anticlockwise.
+    """
+
+    order: Indices
+    middle: Vector
     nodes: Matrix
-    mesh: Any
-    kept: Mask
+    mesh: Any = field(repr=False)
     tree: Any = field(repr=False)
+    cell: Indices
+    kept: Mask
+    start: Indices
+    corner: Indices
 
     @classmethod
-    def of(cls, nodes: Matrix) -> Triangles:
+    def of(cls, nodes: Matrix, holes: bool = True) -> Triangles:
+        """holes : whether to leave out bays and holes. No two nodes may be closer than `SAME`."""
         from scipy.spatial import Delaunay, cKDTree
 
-        mesh = Delaunay(nodes - nodes.mean(axis=0))
-        return cls(nodes, mesh, _no_bridges(nodes, mesh.simplices), cKDTree(nodes))
+        order = np.lexsort(nodes.T[::-1])
+        middle = nodes[order].mean(axis=0)
+        nodes = nodes[order] - middle
+        mesh = Delaunay(nodes)
+        cell, solid, bridge = cells_of(nodes, mesh.simplices, mesh.neighbors)
+        kept = solid & ~(bridge & holes)
+        of, corner = np.unique(
+            np.column_stack([np.repeat(cell[kept], 3), mesh.simplices[kept].ravel()]), axis=0
+        ).T
+        start = np.searchsorted(of, np.arange(cell.max() + 2))
+        about = nodes[corner] - means(of, nodes[corner])[of]
+        corner = corner[np.lexsort((np.arctan2(about[:, 1], about[:, 0]), of))]
+        return cls(order, middle, nodes, mesh, cKDTree(nodes), cell, kept, start, corner)
 
     @property
     def triangles(self) -> Indices:  # type: ignore[override]
         found = self.mesh.simplices[self.kept].astype(np.intp)
-        turned = _areas(self.nodes, found) < 0
+        a, b, c = (self.nodes[found[:, j]] for j in range(3))
+        turned = cross(b - a, c - a) < 0
         found[turned] = found[turned, ::-1]
-        return found
+        return self.order[found]
 
     def weights(self, points: Matrix) -> sp.csr_array:
-        k, count = len(points), len(self.nodes)
+        points = points - self.middle
         near, node = self.tree.query(points)
         owner = np.where(near <= SAME, -1, self._owners(points))
-        inside = np.flatnonzero(owner >= 0)
-        shares = np.clip(self._barycentric(points[inside], owner[inside]), 0.0, 1.0)
-        shares = np.round(shares / shares.sum(axis=1, keepdims=True), 12)
-        at = np.flatnonzero(near <= SAME)
-        values = np.concatenate([np.ones(len(at)), shares.ravel()])
-        rows = np.concatenate([at, np.repeat(inside, 3)])
-        columns = np.concatenate([node[at], self.mesh.simplices[owner[inside]].ravel()])
-        W = sp.csr_array(sp.coo_array((values, (rows, columns)), shape=(k, count)))
+        rows, columns, values = [at := np.flatnonzero(near <= SAME)], [node[at]], [np.ones(len(at))]
+        cell = np.where(owner >= 0, self.cell[owner], -1)
+        count = np.where(cell >= 0, np.diff(self.start)[cell], 0)
+        for n in np.unique(count[count > 0]):
+            own = np.flatnonzero(count == n)
+            corners = self.corner[self.start[cell[own], None] + np.arange(n)]
+            rows.append(np.repeat(own, n))
+            columns.append(corners.ravel())
+            values.append(wachspress(self.nodes[corners], points[own]).ravel())
+        places = np.concatenate(rows), self.order[np.concatenate(columns)]
+        W = sp.csr_array(sp.coo_array((np.concatenate(values), places), shape=(len(points), len(self.nodes))))
         W.eliminate_zeros()
         return W
 
     def covers(self, points: Matrix) -> Mask:
+        points = points - self.middle
         inside: Mask = (self.tree.query(points)[0] <= SAME) | (self._owners(points) >= 0)
         return inside
 
     @property
     def areas(self) -> Vector:
+        count = np.diff(self.start)
+        of = np.repeat(np.arange(len(count)), count)
+        after = np.arange(len(of)) + 1
+        after[self.start[1:][count > 0] - 1] = self.start[:-1][count > 0]
+        corners = self.nodes[self.corner]
+        about = corners - means(of, corners)[of]
+        piece = cross(about, about[after]) / 2
+        shares = means(of, piece)[of] + piece
+        shares[after] += piece
         found = np.zeros(len(self.nodes))
-        corners = self.triangles
-        np.add.at(found, corners, _areas(self.nodes, corners)[:, None] / 3)
+        np.add.at(found, self.order[self.corner], shares / 3)
         return found
 
     def _owners(self, points: Matrix) -> Indices:
-        """The triangle of each point, −1 off the surface; of a border, the one that is kept."""
-        owner = np.asarray(
-            self.mesh.find_simplex(points - self.nodes.mean(axis=0), tol=ROUNDING), dtype=np.intp
-        )
-        for k in np.flatnonzero((owner >= 0) & ~self.kept[owner]):
-            beside = [t for t in self.mesh.neighbors[owner[k]] if t >= 0 and self.kept[t]]
-            touched = [t for t in beside if (self._barycentric(points[[k]], [t]) >= -ROUNDING).all()]
-            owner[k] = touched[0] if touched else -1
-        return owner
-
-    def _barycentric(self, points: Matrix, triangles: Sequence[int] | Indices) -> Matrix:
-        """(k, 3) of each point in its triangle, by the areas that it spans with the edges."""
-        corners = self.nodes[self.mesh.simplices[np.asarray(triangles, dtype=np.intp)]]
-        a, b, c = (corners[:, j] - points for j in range(3))
-        shares = np.column_stack([cross(b, c), cross(c, a), cross(a, b)])
-        return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+        """A triangle of the surface of each point, −1 off it; of several that touch it, the first."""
+        owner = self.mesh.find_simplex(points, tol=ROUNDING)
+        best = np.full(len(points), len(self.cell))
+        for triangle in np.column_stack([owner, self.mesh.neighbors[owner]]).T:
+            inside = np.flatnonzero((owner >= 0) & (triangle >= 0) & self.kept[triangle] & (triangle < best))
+            a, b, c = (
+                self.nodes[self.mesh.simplices[triangle[inside], j]] - points[inside] for j in range(3)
+            )
+            shares = np.column_stack([cross(b, c), cross(c, a), cross(a, b)])
+            shares = shares / shares.sum(axis=1, keepdims=True)
+            on = inside[(shares >= -ROUNDING).all(axis=1)]
+            best[on] = triangle[on]
+        return np.where(best < len(self.cell), best, -1)
 
 
 def surface_of(nodes: Matrix) -> Surface:
@@ -174,10 +205,11 @@ def surface_of(nodes: Matrix) -> Surface:
 
     Raises ValueError if they are on a line.
     """
-    spread = np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)
+    ordered = nodes[np.lexsort(nodes.T[::-1])]
+    spread = np.linalg.svd(ordered - ordered.mean(axis=0), compute_uv=False)
     if len(nodes) < 3 or spread[1] <= max(SAME, THIN * spread[0]):
         raise ValueError("all on one line")
-    edge = _shortest_edge(nodes)
+    edge = _shortest_edge(ordered)
     for turn in (None, np.column_stack([edge, [-edge[1], edge[0]]])):
         (x, column), (y, row) = (_lines(axis) for axis in (nodes if turn is None else nodes @ turn).T)
         place = row * len(x) + column
@@ -221,30 +253,3 @@ def _tributary_lengths(grid: Vector) -> Vector:
     """The tributary length of each grid point (trapezoidal rule)."""
     h = np.diff(grid)
     return 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
-
-
-def cross(u: Matrix, v: Matrix) -> Vector:
-    """(k,) u × v of vectors (k, 2)."""
-    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-
-
-def _areas(nodes: Matrix, triangles: Indices) -> Vector:
-    """Signed, mm²."""
-    a, b, c = (nodes[triangles[:, j]] for j in range(3))
-    return cross(b - a, c - a) / 2
-
-
-def _no_bridges(nodes: Matrix, triangles: Indices) -> Mask:
-    """Which triangles have an area, and no edge that is long beside the median edge at one of its corners."""
-    edges = np.stack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]], axis=1)
-    lengths = np.linalg.norm(nodes[edges[:, :, 0]] - nodes[edges[:, :, 1]], axis=2)
-    longest = lengths.max(axis=1)
-    solid = abs(_areas(nodes, triangles)) > FLAT * longest**2
-    ends, size = edges[solid].reshape(-1, 2), lengths[solid].ravel()
-    node, size = np.concatenate([ends[:, 0], ends[:, 1]]), np.tile(size, 2)
-    order = np.lexsort((size, node))
-    start = np.searchsorted(node[order], np.arange(len(nodes) + 1))
-    middle = np.minimum((start[:-1] + start[1:]) // 2, max(len(order) - 1, 0))
-    usual = np.where(start[1:] > start[:-1], size[order][middle], np.inf)
-    kept: Mask = solid & (longest <= BRIDGE * usual[triangles].max(axis=1))
-    return kept

@@ -74,6 +74,61 @@ def test_a_mesh_that_grows_coarser_keeps_its_triangles() -> None:
     assert surface.areas.sum() == pytest.approx((x[-1] - x[0]) * 30 - (x[-1] - x[-2]) * 5 / 2)
 
 
+@pytest.mark.parametrize("moved", [0.0, 0.3])
+def test_the_order_of_the_nodes_changes_no_bit(moved: float) -> None:
+    """In a grid without a node, whose diagonals are free, and in scattered nodes."""
+    random = np.random.default_rng(7)
+    nodes = crossings(np.arange(12.0), np.arange(9.0)) + moved * random.uniform(-1, 1, (108, 2))
+    nodes = np.delete(nodes, 40, axis=0)
+    points, order = random.uniform(-0.5, 12, (400, 2)), random.permutation(len(nodes))
+    plain, shuffled = surface_of(nodes), surface_of(nodes[order])
+    np.testing.assert_array_equal(
+        shuffled.weights(points).toarray(), plain.weights(points).toarray()[:, order]
+    )
+    np.testing.assert_array_equal(shuffled.areas, plain.areas[order])
+    np.testing.assert_array_equal(shuffled.covers(points), plain.covers(points))
+
+
+def test_a_missing_node_changes_the_elements_around_it_alone() -> None:
+    """Elsewhere weights stay bilinear, and areas a quarter of each rectangle."""
+    nodes = crossings(np.arange(12.0), 0.7 * np.arange(9.0))
+    whole, holed = surface_of(nodes), surface_of(np.delete(nodes, 40, axis=0))
+    x, y = np.random.default_rng(8).uniform([0, 0], [11, 5.6], (300, 2)).T
+    points = np.column_stack([x, y])[(abs(x - 4) > 1) | (abs(y - 2.1) > 0.7)]
+    wanted = np.delete(whole.weights(points).toarray(), 40, axis=1)
+    np.testing.assert_allclose(holed.weights(points).toarray(), wanted, atol=1e-11)
+    assert holed.areas.sum() == pytest.approx(whole.areas.sum())
+    assert (abs(holed.areas - np.delete(whole.areas, 40)) > 1e-12).sum() == 8
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.3])
+@pytest.mark.parametrize("long", [1.0, 4.0])
+@pytest.mark.parametrize("count", [8, 11, 16, 24])
+@pytest.mark.parametrize("radius", [9.0, 15.0, 24.0])
+def test_a_round_hole_stays_open(radius: float, count: int, long: float, moved: float) -> None:
+    """Nodes on a circle in a mesh of 6 mm, regular or not, its elements square or four times longer."""
+    random = np.random.default_rng(9)
+    nodes = crossings(np.arange(0, 151, 6 * long), np.arange(0, 121, 6.0))
+    inner = ((nodes > 0) & (nodes < nodes.max(axis=0))).all(axis=1)
+    nodes[inner] += 6 * moved * random.uniform(-1, 1, (inner.sum(), 2))
+    assert surface_of(nodes[:-1]).covers(nodes).sum() >= len(nodes) - 1
+    middle, angles = np.array([70.3, 61.8]), 0.3 + np.arange(count) * 2 * np.pi / count
+    ring = middle + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    away = np.linalg.norm(nodes - middle, axis=1)
+    near = max(3.0, 2 * radius * np.sin(np.pi / count) * 0.6)  # the first elements are no flatter
+    surface = surface_of(np.concatenate([nodes[away > radius + near], ring]))
+    filled = np.prod(nodes.max(axis=0)) - count / 2 * radius**2 * np.sin(2 * np.pi / count)
+    assert surface.areas.sum() == pytest.approx(filled, rel=1e-9)
+    inside = middle + 0.9 * np.outer(random.uniform(0, np.cos(np.pi / count), 50), [0.6, 0.8]) * radius
+    assert not surface.covers(inside).any()
+
+
+def test_a_square_cut_out_stays_open_to_its_corners() -> None:
+    x, y = crossings(np.arange(0, 101, 5.0), np.arange(0, 81, 5.0)).T
+    out = (abs(x - 50) < 10) & (abs(y - 40) < 10)
+    assert surface_of(np.column_stack([x, y])[~out]).areas.sum() == pytest.approx(100 * 80 - 400)
+
+
 def test_nodes_on_a_line_are_no_surface() -> None:
     line = np.linspace(0, 9, 10)[:, None] * [1.0, 2.0]
     with pytest.raises(ValueError, match="one line"):
