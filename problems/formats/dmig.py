@@ -13,7 +13,7 @@ have all its rows, 1 … r, unless it is square.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,56 +27,25 @@ from problems.input.matrix_files import MIB, Choose
 from problems.input.text_files import read_text
 
 OF_PROBLEM = {"F": "f", "G": "g"}
-SQUARE, SYMMETRIC, COLUMNS = 1, 6, 9  # forms
-REAL = ("1", "2")  # types
-WHOLE = re.compile(r"\d+")
+SQUARE, RECTANGULAR, SYMMETRIC, COLUMNS = 1, 2, 6, 9  # forms
+REAL = (1, 2)  # types
+WHOLE = re.compile(r"(\d+)")
 NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([-+]\d+)|[eEdD](\d+))?")
 Point = tuple[int, int]
 
 
 @dataclass
 class Cards:
-    """A matrix: of each entry the points of its row and column, its value, and its line in the file."""
+    """A matrix: its form, the line of its header, and of each entry row, column, value and line."""
 
-    path: Path
-    name: str
     form: int
     line: int
-    rows: list[Point] = field(default_factory=list)
-    columns: list[Point] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
-
-    def place(self, k: int) -> str:
-        """Of an entry, in a message."""
-        return f"{self.name}, {shown(self.rows[k])}, column {shown(self.columns[k])} (line {self.lines[k]})"
+    entries: list[tuple[Point, Point, float, int]] = field(default_factory=list)
 
     @property
     def points(self) -> list[Point]:
-        """The unknowns of a square matrix. Raises InputError for one without an entry on the diagonal."""
-        points = sorted({*self.rows, *self.columns})
-        diagonal = {a for a, b in zip(self.rows, self.columns, strict=True) if a == b}
-        if missing := [point for point in points if point not in diagonal]:
-            allowed = "K needs an entry there: is the file cut off?"
-            key = f"{self.name}, {shown(missing[0])}, on the diagonal"
-            raise InputError.one(self.path, key, None, allowed)
-        return points
-
-    def over(self, rows: Sequence[Point], columns: Sequence[Point], what: str) -> sp.csr_array:
-        """The entries in these rows and columns. Raises InputError for one that is elsewhere, or twice."""
-        places = [{point: k for k, point in enumerate(points)} for points in (rows, columns)]
-        for k, (row, column) in enumerate(zip(self.rows, self.columns, strict=True)):
-            if row not in places[0] or column not in places[1]:
-                raise InputError.one(self.path, self.place(k), self.values[k], f"not among the {what}")
-        i = np.array([places[0][row] for row in self.rows], dtype=np.intp)
-        j = np.array([places[1][column] for column in self.columns], dtype=np.intp)
-        sign = 1 if self.form == SYMMETRIC else None
-        shape = len(rows), len(columns)
-        return from_entries(self.path, (np.array(self.values), i, j), shape, self.place, sign)
-
-
-def shown(point: Point) -> str:
-    return f"point {point[0]}, component {point[1]}"
+        """Of the rows and columns of a square matrix, which has no others."""
+        return sorted({point for row, column, *_ in self.entries for point in (row, column)})
 
 
 def write_dmig(path: Path, data: dict[str, Any]) -> None:
@@ -105,93 +74,115 @@ def _field(value: float) -> str:
 def read_dmig(path: Path, choose: Choose) -> dict[str, tuple[Any, np.ndarray | None]]:
     """The chosen matrices, and point and component of the rows of a square one. Raises InputError."""
     cards = _cards(path)
-    names = {OF_PROBLEM.get(name, name): matrix for name, matrix in cards.items()}
-    return {name: _read(names[name], cards) for name in choose(list(names))}
+    names = {OF_PROBLEM.get(name, name): name for name in cards}
+    return {name: _read(path, names[name], cards) for name in choose(list(names))}
 
 
-def _read(one: Cards, cards: dict[str, Cards]) -> tuple[Any, np.ndarray | None]:
-    if one.form in (SQUARE, SYMMETRIC) and one.name not in "AFG":
-        points = one.points
-        return one.over(points, points, "points"), np.array(points, dtype=np.intp).reshape(-1, 2)
-    if one.name == "G" and "A" in cards:
-        rows, what = _first(max(column for column, _ in cards["A"].columns)), "contacts of A"
+def _read(path: Path, name: str, cards: dict[str, Cards]) -> tuple[Any, np.ndarray | None]:
+    form, entries = cards[name].form, cards[name].entries
+    if form in (SQUARE, SYMMETRIC) and name not in "AFG":
+        points = cards[name].points
+        labels = np.array(points, dtype=np.intp)
+        return _over(path, name, cards[name], points, points, "points"), labels
+    if name == "G" and "A" in cards:
+        rows, what = _first(max(column for _, (column, _), *_ in cards["A"].entries)), "contacts of A"
     elif "K" in cards:
         rows, what = cards["K"].points, "points of K"
     else:
-        rows = _first(len(set(one.rows)))
+        rows = _first(len({row for row, *_ in entries}))
         what = f"rows 1 … {len(rows)}, as {len(rows)} are present"
-    if one.name in ("F", "G") and len(set(one.columns)) != 1:
-        raise InputError.one(one.path, f"columns of {one.name}", len(set(one.columns)), "must be 1")
-    columns = [one.columns[0]] if one.name in ("F", "G") else _first(max(j for j, _ in one.columns))
-    return one.over(rows, columns, f"{what}, or in a column 1 … {len(columns)}"), None
+    columns = sorted({column for _, column, *_ in entries})
+    if name in "FG" and len(columns) > 1:
+        raise InputError.one(path, f"columns of {name}", len(columns), "must be 1")
+    if name not in "FG":
+        columns = _first(max(number for number, _ in columns))
+    what = f"{what}, or of columns 1 … {len(columns)}"
+    return _over(path, name, cards[name], rows, columns, what), None
 
 
 def _first(count: int) -> list[Point]:
     return [(k + 1, 0) for k in range(count)]
 
 
+def _over(
+    path: Path, name: str, cards: Cards, rows: Sequence[Point], columns: Sequence[Point], what: str
+) -> sp.csr_array:
+    """The entries in these rows and columns. Raises InputError for one that is elsewhere, or twice."""
+
+    def place(k: int) -> str:
+        (a, b), (c, d), _, line = cards.entries[k]
+        return f"{name}, point {a}, component {b}, column point {c}, component {d} (line {line})"
+
+    of_row, of_column = ({point: k for k, point in enumerate(points)} for points in (rows, columns))
+    for k, (row, column, value, _) in enumerate(cards.entries):
+        if row not in of_row or column not in of_column:
+            raise InputError.one(path, place(k), value, f"not among the {what}")
+    i = np.array([of_row[row] for row, *_ in cards.entries], dtype=np.intp)
+    j = np.array([of_column[column] for _, column, *_ in cards.entries], dtype=np.intp)
+    values = np.array([value for *_, value, _ in cards.entries])
+    sign = 1 if cards.form == SYMMETRIC else None
+    return from_entries(path, (values, i, j), (len(rows), len(columns)), place, sign)
+
+
 def _cards(path: Path) -> dict[str, Cards]:
     """The matrices of a file by their names, in capitals. Raises InputError."""
-    cards: list[list[tuple[int, str]]] = []
-    for line, begins, words in _lines(read_text(path, "file", MIB)):
-        if begins:
-            cards.append([])
-        cards[-1] += [(line, word) for word in words]
     matrices: dict[str, Cards] = {}
-    for (line, name), at, second, third, *rest in cards:
+    for (line, name), *fields in _fields(read_text(path, "file", MIB)):
         name = name.upper()
-        if at[1] == "0":
+        point, component, third, *rest = fields
+        if point[1] == "0":
             if name in matrices:
                 twice = f"also in line {matrices[name].line}: each matrix needs a name to itself"
                 raise InputError.one(path, f"line {line}, a header of", name, twice)
-            if rest and third[1] not in REAL:
-                raise InputError.one(path, f"line {line}, type of {name}", third[1], "1 or 2, real numbers")
-            matrices[name] = Cards(path, name, int(_match(path, second, WHOLE)[0]), line)
+            form, kind = _whole(path, component), _whole(path, third)
+            if form not in (SQUARE, RECTANGULAR, SYMMETRIC, COLUMNS) or kind not in REAL:
+                allowed = "a form of 1, 2, 6 or 9, and a type of 1 or 2: real numbers"
+                raise InputError.one(path, f"line {line}, form and type of {name}", (form, kind), allowed)
+            matrices[name] = Cards(form, line)
             continue
         if name not in matrices:
             raise InputError.one(path, f"line {line}, a column of", name, "comes before its header")
-        column, matrix = (_whole(path, at), _whole(path, second)), matrices[name]
+        column = _whole(path, point), _whole(path, component, blank="0")
         for k in range(0, len(rest) - 3, 4):
             row, component, value, imaginary = rest[k : k + 4]
             if imaginary[1]:
                 raise InputError.one(path, f"line {line}", imaginary[1], "no fourth number of a real entry")
             if row[1] or value[1]:
-                matrix.rows.append((_whole(path, row), _whole(path, component)))
-                matrix.columns.append(column)
-                matrix.values.append(_number(path, value))
-                matrix.lines.append(row[0])
-    return {name: matrix for name, matrix in matrices.items() if matrix.rows}
+                at = _whole(path, row), _whole(path, component, blank="0")
+                digits, signed, exponent = _match(path, value, NUMBER)
+                number = float(f"{digits}e{signed or exponent or 0}")
+                matrices[name].entries.append((at, column, number, row[0]))
+    return {name: matrix for name, matrix in matrices.items() if matrix.entries}
 
 
-def _lines(text: str) -> Iterator[tuple[int, bool, list[str]]]:
-    """Of each line of the cards its number, whether it begins one, and its fields, 8, or 4 large ones."""
+def _fields(text: str) -> list[list[tuple[int, str]]]:
+    """The fields of each card after its own name, with the numbers of their lines."""
+    cards: list[list[tuple[int, str]]] = []
     inside = False
     for number, line in enumerate(text.split("\n"), start=1):
         line = line.partition("$")[0].expandtabs().rstrip()
-        if not line:
-            continue
         words = line.split(",") if "," in line else [line[:8]]
         begins = words[0].strip().upper() in ("DMIG", "DMIG*")
-        inside = begins or (inside and line[0] in " +*,")
-        if inside:
-            count = 4 if "*" in words[0] else 8
-            if len(words) == 1:
-                words += [line[k : k + 64 // count] for k in range(8, 72, 64 // count)]
-            words = [word.strip() for word in words[1 : 1 + count]]
-            yield number, begins, words + [""] * (count - len(words))
+        inside = begins or not line or (inside and line[0] in " +*,")
+        if not inside or not line:
+            continue
+        count = 4 if "*" in words[0] else 8
+        if len(words) == 1:
+            words += [line[k : k + 64 // count] for k in range(8, 72, 64 // count)]
+        words = [word.strip() for word in words[1 : 1 + count]]
+        if begins:
+            cards.append([])
+        cards[-1] += [(number, word) for word in words + [""] * (count - len(words))]
+    return cards
 
 
-def _whole(path: Path, at: tuple[int, str]) -> int:
-    return int(_match(path, at, WHOLE)[0]) if at[1] else 0
+def _whole(path: Path, at: tuple[int, str], blank: str = "") -> int:
+    line, word = at
+    return int(_match(path, (line, word or blank), WHOLE)[0] or 0)
 
 
-def _number(path: Path, at: tuple[int, str]) -> float:
-    digits, signed, exponent = _match(path, at, NUMBER).groups()
-    return float(f"{digits}e{signed or exponent or 0}")
-
-
-def _match(path: Path, at: tuple[int, str], pattern: re.Pattern[str]) -> re.Match[str]:
+def _match(path: Path, at: tuple[int, str], pattern: re.Pattern[str]) -> Sequence[str | None]:
     line, word = at
     if match := pattern.fullmatch(word):
-        return match
+        return match.groups()
     raise InputError.one(path, f"line {line}", word, "a number in each field of the card")

@@ -66,8 +66,6 @@ def one_sided(K: sp.csr_array) -> bool:
 
 def mirrored(M: sp.csr_array, sign: int = 1) -> sp.csr_array:
     """M with each entry that is listed on one side of the diagonal alone on the other, too."""
-    if M.shape[0] != M.shape[1]:
-        return M
     alone = _pattern(M) - _pattern(M).multiply(_pattern(M).T)
     return sp.csr_array(M + sign * M.multiply(alone).T)
 
@@ -90,7 +88,10 @@ def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequenc
         return f"{name}, {rows[i]}, column {rows[j]}" if rows else f"{name}[{i}, {j}]"
 
     pairs, held = contradictions(K), np.flatnonzero(np.isclose(K.diagonal(), HELD, rtol=1e-6, atol=0))
-    faults = []
+    faults = [
+        Fault(str(where), entry(k, k), 0.0, "K needs an entry on the diagonal: is the file cut off?")
+        for k in np.flatnonzero(K.diagonal() == 0).tolist()[:1]
+    ]
     for i, j in pairs[:1]:
         more = f"; {len(pairs) - 1} more pairs are not" if len(pairs) > 1 else ""
         if one_sided(K):
@@ -103,7 +104,7 @@ def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequenc
     if 0 < len(held) < K.shape[0]:
         more = f"; {len(held)} have it" if len(held) > 1 else ""
         allowed = f"Abaqus' mark of a degree of freedom that is held: leave its row and column out{more}"
-        faults.append(Fault(str(where), entry(held[0], held[0]), HELD, allowed))
+        faults.append(Fault(str(where), entry(int(held[0]), int(held[0])), HELD, allowed))
     if faults:
         raise InputError(faults)
 

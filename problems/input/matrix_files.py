@@ -8,6 +8,8 @@ files of one sparse matrix are read too.
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -16,7 +18,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.forms.assembly import Indices, Vector
+from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 
 from .entries import from_entries, refuse_twice
@@ -39,7 +41,7 @@ Choose = Callable[[Sequence[str]], Sequence[str]]
 def damage(error: Exception) -> str:
     """What is wrong with a file, in words: without Python's, which a library raises for whatever it meets."""
     plain = isinstance(error, ValueError | OSError | Warning) and not isinstance(error, UnicodeError)
-    if not plain or "invalid literal" in str(error):
+    if not plain or any(words in str(error) for words in ("invalid literal", "pickled")):
         return "damaged, or of another format"
     return getattr(error, "strerror", None) or str(error)
 
@@ -151,7 +153,7 @@ def read_mtx(path: Path) -> Any:
     elif sign:  # its lower triangle, column by column
         sizes = [rows * (rows + sign) // 2, 1]
     count = sizes[-1] if layout == "coordinate" else sizes[0] * sizes[1]
-    filled = _entry_lines(path, body, number, count, rb"[ \t]++".join(words))
+    _refuse_wrong_lines(path, body, number, count, rb"[ \t]++".join(words))
     if not rows * columns:
         return np.zeros((rows, columns))
     banner = f"%%MatrixMarket matrix {layout} {field} general\n"
@@ -161,7 +163,7 @@ def read_mtx(path: Path) -> Any:
     except OverflowError as error:
         raise ValueError(str(error)) from error
     if layout == "coordinate":
-        return from_entries(path, (M.data, *M.coords), M.shape, lambda k: f"line {filled[k]}", sign)
+        return from_entries(path, (M.data, *M.coords), M.shape, partial(_line_of, body, number), sign)
     if sign:
         j, i = np.triu_indices(rows, k=int(sign < 0))
         listed, M = M.ravel(), np.zeros((rows, rows), dtype=M.dtype)
@@ -169,23 +171,29 @@ def read_mtx(path: Path) -> Any:
     return M
 
 
-def _entry_lines(path: Path, body: bytes, before: int, entries: int, entry: bytes) -> Indices:
-    """The numbers of the lines of entries. Raises InputError for other lines, ValueError for too few."""
+def _line_of(body: bytes, before: int, k: int) -> str:
+    """The line of entry k, in words."""
+    filled = (number for number, line in enumerate(io.BytesIO(body), start=before + 1) if line.strip())
+    return f"line {next(islice(filled, k, None))}"
+
+
+def _refuse_wrong_lines(path: Path, body: bytes, before: int, entries: int, entry: bytes) -> None:
+    """Raise InputError for a line that holds anything but an entry, or ValueError if there are too few."""
     line = rb"[ \t]*+(?:%b)?+[ \t]*+\n" % entry
     one, many = re.compile(line), re.compile(rb"(?:%b)*+" % line)
-    file, filled = io.BytesIO(body), np.zeros(0, dtype=np.intp)
+    file, found, number = io.BytesIO(body), 0, before
     while lines := file.readlines(CHUNK):
         lines[-1] = lines[-1].removesuffix(b"\n") + b"\n"
         if not many.fullmatch(b"".join(lines)):
             at, wrong = next((k, text) for k, text in enumerate(lines) if not one.fullmatch(text))
-            _refuse_line(path, before + at + 1, wrong, "each line must hold one entry")
-        filled = np.append(filled, before + 1 + np.flatnonzero([*map(bytes.strip, lines)]))
-        before += len(lines)
-    if len(filled) < entries:
-        raise ValueError(f"truncated: {len(filled)} of {entries} entries")
-    if len(filled) > entries:
-        _refuse_line(path, filled[entries], b"an entry", f"the line of sizes says that there are {entries}")
-    return filled
+            _refuse_line(path, number + at + 1, wrong, "each line must hold one entry")
+        found += sum(map(bool, map(bytes.strip, lines)))
+        number += len(lines)
+    if found < entries:
+        raise ValueError(f"truncated: {found} of {entries} entries")
+    if found > entries:
+        key, allowed = _line_of(body, before, entries), f"at most {entries}, as the line of sizes says"
+        raise InputError.one(path, key, f"entry {entries + 1}", allowed)
 
 
 def _refuse_line(path: Path, number: int, line: bytes, allowed: str) -> NoReturn:

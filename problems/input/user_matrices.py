@@ -187,7 +187,7 @@ def _wrong_strays(data: Mapping[str, Any], shape: tuple[int, int]) -> Faults:
     allowed = "is no part of a problem: a bound is a column of A with its g; take out what is not meant"
     for key, M in data.items():
         if key not in ("x", "lam") and (M.ndim == 2 or M.dtype.kind in "fc") and {*M.shape} & {*shape}:
-            yield key, key, f"array of shape {M.shape}", allowed
+            yield "K", key, f"array of shape {M.shape}", allowed
 
 
 def _fits(given: Any) -> bool:

@@ -1,0 +1,185 @@
+"""Files of other codes, in all spellings of one K: the same K, or one sentence that names the place."""
+
+import gzip
+from io import BytesIO, StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from rich.console import Console
+
+from harness.scene.export import export, import_
+from problems import formats
+from problems.errors import InputError
+from problems.formats.nastran import pyyeti
+from problems.input.user_matrices import checked, holds_sparse, read_matrices
+
+K = np.array([[4.0, -1.0], [-1.0, 3.0]])
+LOWER, UPPER = [(1, 1, 4.0), (2, 1, -1.0), (2, 2, 3.0)], [(1, 1, 4.0), (1, 2, -1.0), (2, 2, 3.0)]
+QUIET = Console(file=StringIO())
+BOTH = [*LOWER, (1, 2, -1.0)]
+NAMES = {"mtx": "K.mtx", "dmig": "KAA.pch", "abaqus": "K.mtx", "npz": "K.npz", "op4": "KAA.op4"}
+
+
+def text(form: str, entries: list[tuple[int, int, float]], symmetric: bool = True) -> bytes:
+    """The entries of a 2 × 2 matrix as a file; an .npz is always general, and Abaqus' text says nothing."""
+    if form == "npz":
+        i, j, values = zip(*entries, strict=True)
+        sp.save_npz(file := BytesIO(), sp.coo_matrix((values, (np.array(i) - 1, np.array(j) - 1))))
+        return file.getvalue()
+    if form == "op4":
+        M, forms = np.zeros((2, 2)), [6 if symmetric else 1]
+        for i, j, value in entries:
+            M[i - 1, j - 1] = value
+        pyyeti(Path()).op4.OP4().write("made.op4", ["kaa"], [M], binary=False, forms=forms)
+        return Path("made.op4").read_bytes()
+    header, entry = {
+        "mtx": ("%%MatrixMarket matrix coordinate real {}\n% made\n2 2 {}\n", "{} {} {}\n"),
+        "dmig": ("$ made\nDMIG,KAA,0,{},2,0\n", "DMIG,KAA,{1},0,,{0},,{2}\n"),
+        "abaqus": ("** made\n", "{},3,{},3,{}\n"),
+    }[form]
+    said = {"mtx": ("general", "symmetric"), "dmig": (1, 6)}.get(form, ("", ""))[symmetric]
+    return (header.format(said, len(entries)) + "".join(entry.format(*each) for each in entries)).encode()
+
+
+def read(content: bytes, name: str, matrix: str | None = None) -> Any:
+    Path(name).write_bytes(content)
+    M, _ = formats.read_stiffness(Path(name), matrix)
+    data = {"K": M, "A": sp.csc_array((2, 0)), "f": np.zeros(2), "g": np.zeros(0)}
+    return checked(data, {"K": name}, sparse=True)[0].K.matrix.toarray()
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+@pytest.mark.parametrize("form", NAMES)
+def test_both_triangles_one_or_contradictory_ones(form: str, symmetric: bool) -> None:
+    np.testing.assert_array_equal(read(text(form, BOTH, symmetric), NAMES[form]), K)
+    for entries in (LOWER, UPPER):
+        if form == "abaqus" or (symmetric and form != "npz"):
+            np.testing.assert_array_equal(read(text(form, entries), NAMES[form]), K)
+        else:
+            with pytest.raises(InputError, match=r"\[-?[01].0, -?[01].0\]: K must be symm.* only a triangle"):
+                read(text(form, entries, symmetric), NAMES[form])
+    stiff = [(i, j, 1e12 if i == j == 1 else value) for i, j, value in LOWER]
+    with pytest.raises(InputError, match=r"and .* = \[-.*\]: (K )?must be (equal|symmetric)"):
+        read(text(form, [*stiff, (1, 2, -2.0)], symmetric), NAMES[form])
+
+
+@pytest.mark.parametrize("form", ["mtx", "dmig", "abaqus", "npz"])
+def test_an_entry_that_is_listed_twice_is_refused_with_its_place(form: str) -> None:
+    for again in (3.0, 1.0):
+        with pytest.raises(InputError, match=r"(line [456].* and .*line [678]|\[1, 1\] and).*listed once"):
+            read(text(form, [*BOTH, (2, 2, again)], symmetric=False), NAMES[form])
+
+
+@pytest.mark.parametrize("form", ["mtx", "dmig", "abaqus", "op4"])
+def test_text_of_any_program(form: str) -> None:
+    plain, name = text(form, LOWER), NAMES[form]
+    comment = plain.replace(b"made", b"pr\xfcft, von Hand")
+    ways = [b"\xef\xbb\xbf" + plain, plain.replace(b"\n", b"\r\n"), plain.replace(b"\n", b"\r"), comment]
+    ways.append(plain.replace(b"MatrixMarket matrix", b"MATRIXMARKET Matrix").replace(b"KAA,", b"K-A,"))
+    for content in ways:
+        np.testing.assert_array_equal(read(content, name), K)
+    np.testing.assert_array_equal(read(gzip.compress(plain), f"{name}.gz"), K)
+    with pytest.raises(InputError, match="UTF-16"):
+        read(plain.decode().encode("utf-16"), name)
+    if form in ("dmig", "op4"):
+        tiny = plain.replace(b"-1.0000000000000000E+00", b"-1.0000000000000000-101")
+        assert read(tiny.replace(b",-1.0", b",-1.0-101"), name)[0, 1] == -1e-101
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "said"),
+    [
+        (b"*USER ELEMENT, NODES=2\n1,2\n*MATRIX, TYPE=STIFFNESS\n4,1\n", "K.mtx", "line 1 .*MATRIX OUTPUT"),
+        (b"1,3,1,3,4.0\n2,3,2,3,1.e36\n", "K.mtx", "node 2, dof 3.*a degree of freedom that is held"),
+        (b"-1,3,-1,3,4.0\n1,3,1,3,3.0\n", "K.mtx", "= -1: 1 or more"),
+        (b"1,1,4.0\n4,4,3.0\n", "K.mtx", "row 2"),
+        (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,\n,2,,-1\n", "K.pch", "point 2, component 0.*cut off"),
+        (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,0\n", "K.pch", "line 2 = '0'"),
+        (text("dmig", LOWER) * 2, "K.pch", "line 7, a header of = 'KAA': also in line 2"),
+        (b"%%MatrixMarket matrix array real skew-symmetric\n2 2\n1.0\n", "K.mtx", r"= \[-1.0, 1.0\]: K must"),
+        (b"%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "K.mtx", "pattern entries"),
+        (b"hello", "K.op4", "= 'damaged, or of another format'"),
+    ],
+)
+def test_what_is_no_stiffness_is_refused_in_one_sentence(content: bytes, name: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read(content, name)
+
+
+@pytest.mark.parametrize("form", ["dmig", "npz", "op4", "op4 text"])
+def test_one_matrix_of_several_is_chosen_by_name(form: str) -> None:
+    """KAA, and MAA = 2 KAA."""
+    made = Path("made")
+    if form == "dmig":
+        twice = [(i, j, 2 * value) for i, j, value in LOWER]
+        made.write_bytes(text(form, LOWER) + text(form, twice).replace(b"KAA", b"MAA"))
+    elif form == "npz":
+        with made.open("wb") as file:
+            np.savez(file, KAA=K, MAA=2 * K, title="job")
+    else:
+        pyyeti(made).op4.OP4().write(str(made), ["KAA", "MAA"], [K, 2 * K], binary=form == "op4")
+    content, name = made.read_bytes(), NAMES[form.split()[0]]
+    np.testing.assert_array_equal(read(content, name, "KAA"), K)
+    np.testing.assert_array_equal(read(content, name, "maa"), 2 * K)
+    formats.FORMATS["mtx"].write(Path("."), {"A": np.eye(2, 1), "f": np.ones(2), "g": np.ones(1)})
+    import_([f"K={name}:MAA", "A.mtx", "f.mtx", "g.mtx"], Path("out.npz"), QUIET)
+    np.testing.assert_array_equal(np.load("out.npz")["K"], 2 * K)
+    with pytest.raises(InputError, match=r"\['KAA', 'MAA'\].*matrix = \"NAME\" in a part, K=FILE:NAME"):
+        read(content, name)
+    if form.startswith("op4"):
+        with pytest.raises(InputError, match="matrix 2 of 2 = 'KAA'"):
+            read(content.replace(b"MAA", b"kaa"), name)
+
+
+def test_signs_in_paths_are_no_names() -> None:
+    Path("run=3").mkdir()
+    data = {"K": sp.csr_array(K), "A": np.eye(2, 1), "f": np.ones(2), "g": np.ones(1)}
+    formats.FORMATS["mtx"].write(Path("run=3"), data)
+    others = [f"run=3/{name}.mtx" for name in "Afg"]
+    for stiffness in ("K=run=3/K.mtx", "run=3/K.mtx", "K=run=3/K.mtx:K"):
+        import_([stiffness, *others], Path("out.npz"), QUIET)
+    for drive in ("C:\\job.op4", "C:job.op4", "C:\\job.op4:KAA"):
+        with pytest.raises(InputError, match="no such file") as error:
+            import_([f"K={drive}", *others], Path("out.npz"), QUIET)
+        assert error.value.faults[0].where == drive.removesuffix(":KAA")
+
+
+def test_labelled_rows_are_said_and_digits_of_dmig_kept() -> None:
+    data = {"A": sp.csc_array(np.eye(2, 1)), "f": np.array([1.0, -1.23456789e-101]), "g": np.ones(1)}
+    formats.FORMATS["dmig"].write(Path("rest.pch"), data | {"K": sp.csr_array(K)})
+    np.testing.assert_array_equal(formats.read(Path("rest.pch"))["f"], data["f"])
+    formats.FORMATS["mtx"].write(Path("."), data)
+    Path("K.mtx").write_text("9,1,9,1,4.0\n4,2,4,2,3.0\n")
+    shown = StringIO()
+    import_([f"{name}.mtx" for name in "KAfg"], Path("out.npz"), Console(file=shown, width=200))
+    assert "from node 4, dof 2 to node 9, dof 1: those of A and f must, too" in shown.getvalue()
+
+
+def test_files_of_a_folder_and_of_other_formats_are_not_named_alike() -> None:
+    for form, out in (("mtx", "q.mps"), ("op4", "q.npz"), ("npz", "q")):
+        with pytest.raises(InputError, match="no suffix" if form == "mtx" else "must end in"):
+            export("gallery/installed-fasteners", form, Path(out), QUIET)
+
+
+def test_arrays_beside_a_problem_are_refused_or_said() -> None:
+    problem = {"K": K, "A": np.eye(2, 1), "f": np.ones(2), "g": np.ones(1)}
+    np.savez("mine.npz", **problem, x=np.ones(2), title="mine")
+    assert "x was not read" in read_matrices({"problem": Path("mine.npz")})[0].notes[0]
+    np.savez("mine.npz", **problem, lb=np.zeros(2), ub=np.ones(2))
+    with pytest.raises(InputError, match=r"lb = .* a bound is a column of A") as error:
+        read_matrices({"problem": Path("mine.npz")})
+    assert len(error.value.faults) == 2
+
+
+def test_a_large_sparse_K_is_one_in_any_spelling() -> None:
+    content = b"\xef\xbb\xbf%%matrixmarket matrix coordinate real symmetric\n3000 3000 1\n"
+    Path("K.mtx.gz").write_bytes(gzip.compress(content))
+    assert holds_sparse({"K": Path("K.mtx.gz")})
