@@ -43,9 +43,10 @@ def place(
     """Find the fewest fasteners that keep a gap in most load cases, or the best N, and their order.
 
     Fasteners of the scene's preload are chosen from candidate holes. The load cases are random or measured
-    gaps, as of `series`; a scene without random gaps is one case. Every plan in the report is proven in all
-    of them. DIR has the plan as a scene (plan.toml) and a table (plan.csv), and a report with the gap against
-    the number of fasteners. Stop with Ctrl-C, run the same command again, and it continues.
+    gaps, as of `series`; a scene without random gaps is one case. In what share of the cases a plan keeps the
+    gap is said of fresh ones, which did not choose it; every gap is proven. DIR has the plan as a scene
+    (plan.toml) and a table (plan.csv), and a report with the gap against the number of fasteners. Stop with
+    Ctrl-C, run the same command again, and it continues.
 
     \b
     Examples:
@@ -54,14 +55,15 @@ def place(
       python -m harness place joint.toml --candidates holes.csv --count 12 --scheduler local:2 --out results/b
 
     \b
-    Exit codes: 0 found, 2 wrong usage or bad input, 4 no plan keeps --allow-gap, 130 interrupted.
+    Exit codes: 0 found, 2 wrong usage or bad input, 4 no plan is shown to keep --allow-gap, 130 interrupted.
     """
     with error_reporting(
         interrupted="Interrupted. What was tried is kept: run the same command again."
     ) as console:
         from harness.measurement.describe import described
         from harness.placement.candidates import Movable
-        from harness.placement.run import OUTPUTS, Goal, run
+        from harness.placement.fresh import Goal
+        from harness.placement.run import OUTPUTS, run
         from harness.placement.session import Study
         from harness.planning.form_choice import chosen_form
         from harness.results.atomic_output import refuse_inputs

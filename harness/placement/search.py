@@ -1,7 +1,7 @@
 """The fewest fasteners that keep a gap, or the best of a number: removal one by one, then exchange.
 
-The gap G(S) of a plan S is the least that all load cases but the ⌊(1 − share) K⌋ worst of K keep. It is not
-monotone: a fastener may open a gap elsewhere. Plans are compared by
+The gap G(S) of a plan S is the least that all load cases but the worst keep, as many as may fail of K (see
+fresh.py). It is not monotone: a fastener may open a gap elsewhere. Plans are compared by
 
     φ(S) = (max(G, limit), mean over the cases of (Σ y⁸ / m)^⅛),
 
@@ -23,7 +23,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import dist
 from typing import TypeAlias
 
@@ -67,7 +67,7 @@ class Step:
 @dataclass
 class Search:
     """ask : answers questions. bare : the scene without fasteners. contacts : (m, 2) their places, mm.
-    cases : K. allowed : ⌊(1 − share) K⌋. said : told of each plan that is kept.
+    cases : K. allowed : how many may fail. said : told of each plan that is kept.
     """
 
     ask: Ask
@@ -82,6 +82,14 @@ class Search:
     def gap(self, outcome: Outcome) -> float:
         """G, mm, of all cases, or of those in the outcome."""
         return sorted(outcome.largest, reverse=True)[self.allowed]
+
+    def among(self, numbers: Sequence[int], allowed: int) -> Search:
+        """The search among the load cases of these numbers, which are its cases 0, 1, …"""
+
+        def ask(questions: Sequence[Question]) -> list[list[Outcome]]:
+            return self.ask([replace(q, cases=tuple(numbers[k] for k in q.cases)) for q in questions])
+
+        return replace(self, ask=ask, cases=len(numbers), allowed=allowed)
 
     def whole(self, plan: Plan, moved: str = "") -> Step:
         """A plan in all cases, proven."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,19 +45,21 @@ def write(directory: Path) -> Path:
 
 
 def _summary(record: dict[str, Any]) -> Table:
-    best, share = record["best"], f"{100 * record['share']:.4g} % of {counted(record['cases'], 'case')}"
-    limit = record["limit_mm"]
+    best, limit = record["best"], record["limit_mm"]
+    share = f"{100 * record['share']:.4g} % of the cases"
     asked = f"the best {record['count']}" if record["count"] else f"the fewest that leave {limit:g} mm"
     known = {
         "asked for": f"{asked} in {share}",
         "candidates": f"{len(record['candidates'])} holes, {significant(record['preload'])} N each",
         "found": record["said"],
     }
+    for n, sample in enumerate(record["samples"], start=1):
+        failing, (low, high) = sample["failing"], (f"{100 * value:.4g}" for value in sample["interval"])
+        said = f"{counted(sample['fasteners'], 'fastener')}: kept by {sample['kept']}, with "
+        said += f"{100 * record['confidence']:g} % confidence {low} to {high} % of all"
+        which = f"; beyond the limit in cases {', '.join(map(str, failing))}" if failing else ""
+        known[f"{sample['cases']} fresh cases, round {n}"] = said + which
     if best is not None:
-        if limit is not None:
-            failing = best["failing"]
-            which = f"{len(failing)} of {record['cases']}: {', '.join(map(str, failing))}"
-            known["cases beyond the limit"] = which if failing else f"none of {record['cases']}"
         known["files"] = "`plan.toml`, a scene; `plan.csv`; `plan/`, its series of load cases"
         known["lower bound"] = "none is known: this is the best plan found"
     lines = pd.DataFrame(known.items(), columns=["what", "value"])
@@ -78,7 +81,10 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
     columns = [word("plan", "family"), number("fasteners", "fasteners", whole), number("gap, mm", "gap_mm")]
     if record["limit_mm"] is not None:
         columns.append(Column("within the limit", lambda line: "yes" if line["kept"] else "no", "left"))
-    caption = "*Beside plans that cost no search.* Of each kind the smallest within the limit, or its last."
+    caption = (
+        "*Beside plans that cost no search*, in the cases that chose. Of each kind the smallest within the "
+    )
+    caption += "limit, or its last."
     return Table("families", caption, pd.DataFrame(lines), columns)
 
 
@@ -97,19 +103,22 @@ def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     style.plain_log(axes.yaxis)
     drawing.legend(loc="outside right upper")
-    share = f"{100 * record['share']:.4g} %"
-    caption = f"*The gap against the number of fasteners*: the largest in {share} of the cases, proven."
+    share = f"{100 * record['chosen_by_share']:.4g} % of the {counted(record['cases'], 'case')}"
+    caption = f"*The gap against the number of fasteners*: the largest in {share} that chose, proven."
     return Figure("gap-against-fasteners", caption, drawing, steps.drop(columns=["plan", "failing"]))
 
 
 def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
-    """The gap that the share of the cases keeps at each contact, before and after."""
+    """The gap that the share of the fresh cases keeps at each contact, before and after."""
     shown, share = [], record["share"]
     names = {"own": f"the scene's own {len(record['own'])}"}
     if record["best"]:
         names["plan"] = f"the plan of {record['best']['fasteners']}"
     for name, text in names.items():
         series = read_series(directory / name)
+        if record["samples"]:
+            fresh = series.cases["case"].isin(record["samples"][-1]["numbers"])
+            series = replace(series, cases=series.cases[fresh])
         if series.nodes is None or not len(series.cases):
             return [Text("No picture: some cases have no answer.")]
         pieces = [np.quantile(some, share, axis=0) for some in series.of_contacts()]
@@ -119,7 +128,7 @@ def _maps(record: dict[str, Any], directory: Path) -> list[Block]:
         Map(text, nodes, gap, scale, (), {"fasteners": marks} if marks else {})
         for text, nodes, gap, marks in shown
     ]
-    caption = f"*The gap at each contact that {100 * share:.4g} % of the cases keep*, before and after."
+    caption = f"*The gap at each contact that {100 * share:.4g} % of the fresh cases keep*, before and after."
     table = pd.DataFrame({"x_mm": shown[0][1][:, 0], "y_mm": shown[0][1][:, 1]})
     table = table.assign(**{f"{name}_mm": gap for name, (_, _, gap, _) in zip(names, shown, strict=True)})
     return [Figure("before-and-after", caption, drawn(maps, 1)[0], table)]

@@ -1,6 +1,7 @@
 """Where fasteners go: plans against other answers and full enumeration; refused, resumed, on workers."""
 
 import json
+import re
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -11,12 +12,13 @@ import pandas as pd
 import pytest
 from commands import harness
 from joints import two_parts
+from scipy.stats import binom, binomtest
 
 from harness import solve
 from harness.placement import search as search_module
 from harness.placement.asked import PLANS, Asked
 from harness.placement.candidates import Movable, Plan, grid, plan_of, uniform_plans
-from harness.placement.run import Goal
+from harness.placement.fresh import Cases, Goal, decided
 from harness.placement.search import Search
 from harness.placement.session import Outcome, PlanSession, Question, Study
 from problems.build import load_case
@@ -228,6 +230,71 @@ def test_no_two_fasteners_next_to_each_other_go_at_once(strip: Path) -> None:
     assert search._without_least(start, {}, 3).plan == (line[0], line[1], line[3])
 
 
+def test_a_plan_that_fresh_cases_refute_is_searched_again(strip: Path) -> None:
+    """None of the 60 cases that choose needs more than a fastener, and all after them two."""
+    candidates, lines = plans_of(strip, 1, 4), list[int]()
+    search = replace(told(strip, candidates, lambda plan, case: 2.0 - min(len(plan), 2)), limit_mm=0.5)
+    needs_two = search.ask
+    easy = told(strip, candidates, lambda plan, case: float(case >= 60 and len(plan) < 2)).ask
+    goal = Goal(0.5, 0.95, None)
+    found = decided(
+        replace(search, ask=easy), (), goal, Cases.of(60, False, goal), lambda s, n: lines.append(n)
+    )
+    first, second = found.samples
+    assert (len(first.step.plan), first.kept, lines) == (0, 0, [120])
+    assert (len(second.step.plan), second.kept) == (2, len(second.numbers))
+    assert found.best is not None
+    assert found.best.plan == second.step.plan
+    chosen, *samples = (set(some) for some in (found.numbers, first.numbers, second.numbers))
+    assert not set(range(60)) & samples[0]
+    assert not (chosen | samples[0]) & samples[1]
+    # Of a table there are no more; where all candidates fail, no more cases help.
+    table = Cases([*range(0, 240, 2), *range(60, 240)], 60, True)
+    assert len(decided(replace(search, ask=easy), (), goal, table, pytest.fail).samples) == 1
+    none = decided(
+        replace(search, ask=needs_two, candidates=candidates[:1]),
+        (),
+        goal,
+        Cases.of(60, False, goal),
+        pytest.fail,
+    )
+    assert (none.best, len(none.samples)) == (None, 1)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])
+def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> None:
+    """By binomial sums: more failures show the share no longer, and half as many pass four times in five."""
+    goal = Goal(0.1, share, None)
+    for alpha in (0.05, 0.025, 0.0125):
+        n = goal.fresh(alpha)
+        c = goal.failing(n, alpha)
+        low = binomtest(n - c, n).proportion_ci(1 - alpha, "exact").low
+        lower = binomtest(n - c - 1, n).proportion_ci(1 - alpha, "exact").low
+        assert lower < share <= low
+        assert binom.cdf(c, n, (1 - share) / 2) >= 0.8
+    assert goal.failing(goal.least(0.025), 0.05) == 0
+    assert goal.failing(goal.least(0.025) - 1, 0.05) == -1
+
+
+@pytest.mark.slow
+def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
+    gaps = random_gaps(Movable.of(read_scene(str(strip))).bare, 40, 7)
+    for rows in (40, 1):
+        np.savetxt(tmp_path / f"{rows}.csv", [gaps.load(k).g for k in range(rows)], delimiter=",")
+    asked = ("--candidates", "2x6", "--allow-gap", 0.08, "--out")
+    many = harness("place", strip, "--gaps", tmp_path / "40.csv", "--share", 0.8, *asked, tmp_path / "many")
+    assert "Every second row is held back" in many.output
+    assert re.search(r"keeps? 0\.08 mm in (all|[\d.]+ % of) 20 held-back rows \(95 % interval", many.output)
+    record = records_of(tmp_path / "many")
+    assert record["samples"][0]["numbers"] == [*range(1, 40, 2)]
+    assert all(step["worst_case"] % 2 == 0 for step in record["steps"])
+    one = harness("place", strip, "--gaps", tmp_path / "1.csv", *asked, tmp_path / "one")
+    assert "in the one load case, proven" in one.output
+    few = harness("place", strip, "--gaps", tmp_path / "40.csv", *asked, tmp_path / "few")
+    assert few.exit_code == 2
+    assert "half of 40 rows are held back: take 144 rows, or a share of 1" in few.output
+
+
 def test_exchange_starts_from_uniform_plans_too(strip: Path) -> None:
     """Where only the uniform one of three is good, which no exchange would reach one by one."""
     candidates = plans_of(strip, 1, 9)
@@ -276,6 +343,10 @@ def test_the_command_finds_a_plan_that_solve_confirms(strip: Path, tmp_path: Pat
     best, plan = record["best"], tmp_path / "out" / "plan.toml"
     assert best["fasteners"] < len(record["candidates"])
     assert best["gap_mm"] <= 0.05
+    assert f"PASS: {best['fasteners']} fasteners keep 0.05 mm in all 6 fresh cases (95 % " in done.output
+    (sample,) = record["samples"][-1:]
+    assert (sample["plan"], sample["kept"], sample["failing"]) == (best["plan"], 6, [])
+    assert min(sample["numbers"]) >= record["cases"]
     assert "# Where they are now." in plan.read_text()
     assert pd.read_csv(tmp_path / "out" / "plan.csv").to_numpy().tolist() == best["plan"]
     assert [list(p) for p in Movable.of(read_scene(str(plan))).own] == best["plan"]
@@ -381,10 +452,11 @@ def test_a_limit_that_no_plan_keeps_says_where_and_by_how_much(strip: Path, tmp_
 
 
 def test_a_share_needs_cases_to_show_it() -> None:
-    assert Goal(0.1, 0.95, None).allowed(200) == 10
+    """Of those that choose half as many may fail as in all."""
+    assert Goal(0.1, 0.95, None).allowed(200) == 5
     assert Goal(0.1, 1.0, None).allowed(1) == 0
-    assert Goal(0.1, 0.95, None).allowed(59) == 2
-    assert Goal(0.1, 0.01, None).allowed(10) == 9  # at least one case must keep it
+    assert Goal(0.1, 0.95, None).allowed(59) == 1
+    assert Goal(0.1, 0.01, None).allowed(10) == 4
     with pytest.raises(InputError, match="take 59, or a share of 1"):
         Goal(0.1, 0.95, None).allowed(58)
 
