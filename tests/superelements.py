@@ -55,8 +55,10 @@ def write_part(
     format: str = "npz",
     **more: Any,
 ) -> Tables:
-    """The table of a part whose files are in the folder. more : columns of its nodes; dofs."""
-    dofs = {"dofs": more.pop("dofs")} if "dofs" in more else {}
+    """The table of a part whose files are in the folder. more : columns of its nodes; dofs, rows, matrix."""
+    keys = {key: more.pop(key) for key in ("dofs", "rows", "matrix") if key in more}
+    if len(keys.get("dofs", "z")) > 1:
+        keys.setdefault("rows", "table")
     path = folder / f"{name}{formats.FORMATS[format].suffixes[0]}"
     if format == "npz":
         np.savez(path, K=K) if not sp.issparse(K) else formats.matrix_files.write(path, {"K": K})
@@ -67,7 +69,7 @@ def write_part(
         formats.FORMATS[format].write(written, data)
         path = written / "K.mtx" if written.is_dir() else written
     write_nodes(folder / f"{name}.csv", xyz, normals, **more)
-    return {"name": name, "superelement": str(path), "nodes": str(folder / f"{name}.csv")} | dofs
+    return {"name": name, "superelement": str(path), "nodes": str(folder / f"{name}.csv")} | keys
 
 
 def scene_from(parts: list[Tables], *effects: Tables, **joint: Any) -> JointScene:

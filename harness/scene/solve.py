@@ -67,6 +67,9 @@ def solve(
     allowed_gap.refuse_unusable(allow_gap_mm)
     refuse_unwritable(out, [Path(source)])
     scene = read_scene(source)
+    if refine and not _is_of_plates(scene):
+        allowed = "left out: the grid of superelements and of given matrices is not known here"
+        raise InputError.one("--refine", "scene", scene.name, allowed)
     print_unusual(scene, console)
     built: dict[str, float] = {}  # what the cache did not hold, and how far it is
     found = solution.solve(

@@ -73,6 +73,7 @@ def _matrices(scene: Scene, console: Console) -> None:
 def _superelements(scene: JointScene, console: Console) -> None:
     """Print parts and contacts, sizes and digits. Raises InputError if K is not positive definite."""
     from problems.model.superelement_joint import SuperelementJoint  # of such scenes only
+    from problems.model.superelement_rows import first_rows
 
     joint = scene.joint
     assert isinstance(joint, SuperelementJoint)
@@ -85,6 +86,9 @@ def _superelements(scene: JointScene, console: Console) -> None:
         table.add_row(f"contact {a} – {b}", f"{len(found.nodes)} nodes of {a}{beyond}")
     print_unusual(scene, console)
     console.print(_with_effects(table, scene))
+    for part in joint.parts:
+        rows = first_rows(part.nodes, (part.node, part.dof))
+        console.print(Text(f"Rows of K of {part.name}: {rows}."))
     x, y, normal = (", ".join(f"{each:.4g}" for each in axis) for axis in joint.axes)
     console.print(f"Points are given along x = ({x}) and y = ({y}); the normal of their plane is ({normal}).")
     _matrices(scene, console)

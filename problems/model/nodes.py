@@ -22,12 +22,17 @@ SHOWN = 10  # nodes of a message
 
 @dataclass(frozen=True)
 class Nodes:
-    """ids (N,); xyz (N, 3) mm; normal (N, 3), of length 1; contact (N,) which are of the contact surface."""
+    """By ascending ids, so that nothing depends on the order of the table.
+
+    ids (N,); xyz (N, 3) mm; normal (N, 3), of length 1; contact (N,) which are of the contact surface.
+    table (N,) : the nodes in the order of the table.
+    """
 
     ids: Indices
     xyz: Matrix
     normal: Matrix
     contact: Mask
+    table: Indices
 
 
 def read_nodes(path: Path) -> Nodes:
@@ -48,7 +53,9 @@ def read_nodes(path: Path) -> Nodes:
     found = list(_wrong_nodes(ids, rows[:, 1:4], length, rows[:, -1] if of_surface else contact, contact))
     if found:
         raise InputError([Fault(str(path), *fault) for fault in found])
-    return Nodes(ids.astype(np.intp), rows[:, 1:4], normal / length[:, None], contact)
+    own = np.argsort(ids)
+    unit = normal[own] / length[own, None]
+    return Nodes(ids[own].astype(np.intp), rows[own, 1:4], unit, contact[own], np.argsort(own))
 
 
 def _wrong_nodes(

@@ -2,7 +2,7 @@
 
 K u = f with u the kept displacements and rotations, N and mm. A row of K is a degree of freedom of a node: 1,
 2, 3 displacements along x, y, z; 4, 5, 6 rotations about them. A file with labels (DMIG, Abaqus' text) says
-which; in others the rows go through the nodes as their table does, and at each through `dofs`.
+which; in others their order does (`superelement_rows`).
 
 A rigid motion r = t + ω × (p − p₀) of the nodes that K gives no force for, Kr = 0, is free: nothing holds the
 part against it but springs to other parts.
@@ -10,8 +10,9 @@ part against it but springs to other parts.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,6 +32,7 @@ from problems.storage import fingerprint
 
 from .joint import Table
 from .nodes import Nodes, listed, read_nodes
+from .superelement_rows import Order, rows_of
 
 MIB = 16_384
 LOST = 0.05  # of a normal: what may be along degrees of freedom that are not kept
@@ -41,11 +43,16 @@ Dof = Annotated[int, Field(ge=1, le=6)]
 
 
 class SuperelementTable(Table):
-    """[[joint.part]]: the files of K and of its nodes; dofs, where the file of K does not say them."""
+    """[[joint.part]]: the files of K and of its nodes; dofs and rows, where the file of K does not say them.
+
+    matrix : the name of K in a file with several.
+    """
 
     name: Name
     superelement: str
     nodes: str
+    matrix: Annotated[str, Field(min_length=1)] | None = None
+    rows: Order | None = None
     dofs: Annotated[tuple[Dof, ...], Field(min_length=1, max_length=6)] = (3,)
 
     @field_validator("dofs")
@@ -60,12 +67,15 @@ class SuperelementTable(Table):
 class Superelement:
     """node, dof (n,) : the node, by its place in the table, and the degree of freedom of each unknown.
 
-    content : a hash of what its files hold.
+    content : a hash of what its files hold. source : of K's file alone, and the name of its matrix.
+    dofs : of each node, if the file does not say them.
     """
 
     name: str
     file: Path
     content: str
+    source: tuple[str, str | None]
+    dofs: tuple[int, ...]
     nodes: Nodes
     node: Indices
     dof: Indices
@@ -79,14 +89,15 @@ class Superelement:
         except InputError as error:
             faults += error.faults
         try:
-            entry = stored(path)
+            source = _hash(path), table.matrix
+            entry = stored(path, *source)
         except InputError as error:
             faults += error.faults
         if nodes is None or entry is None:
             raise InputError(faults)
-        node, dof = _unknowns(path, folder / table.nodes, nodes, entry[0], table.dofs)
+        node, dof = rows_of(path, folder / table.nodes, nodes, entry[0], table.dofs, table.rows)
         given = [array.tolist() for array in (nodes.xyz, nodes.normal, nodes.contact, node, dof)]
-        found = cls(table.name, path, storage.digest(_content(path), given), nodes, node, dof)
+        found = cls(table.name, path, storage.digest(source, given), source, table.dofs, nodes, node, dof)
         if (lost := found._lost).size:
             where = f"{len(lost)} nodes of the contact surface, ids {listed(map(str, nodes.ids[lost]))}"
             kept = (
@@ -98,7 +109,7 @@ class Superelement:
     @property
     def key(self) -> str:
         """Of what it adds to a model: what its files hold, and the code that reads them."""
-        return storage.digest(stored_key(self.file), self.content)
+        return storage.digest(stored_key(*self.source), self.content)
 
     @property
     def size(self) -> int:
@@ -107,16 +118,16 @@ class Superelement:
     @property
     def stiffness(self) -> Any:
         """K (n, n): dense by columns and memory-mapped, or a csc_array."""
-        arrays, facts = stored(self.file)
+        arrays, facts = stored(self.file, *self.source)
         return matrix_files.unpacked(arrays, "K") if facts["sparse"] else arrays["K"]
 
     @property
     def notes(self) -> list[str]:
-        return [f"{self.name}: {note}" for note in stored(self.file)[1]["notes"]]
+        return [f"{self.name}: {note}" for note in stored(self.file, *self.source)[1]["notes"]]
 
     @property
     def sparse(self) -> bool:
-        return bool(stored(self.file)[1]["sparse"])
+        return bool(stored(self.file, *self.source)[1]["sparse"])
 
     @cached_property
     def contacts(self) -> Indices:
@@ -179,59 +190,38 @@ class Superelement:
         return ", ".join(word for word, one in zip(words, chosen, strict=True) if one)
 
 
-def stored_key(path: Path) -> str:
-    """Of K in the cache: its file's bytes, and the code that reads and checks it."""
+def stored_key(content: str, matrix: str | None) -> str:
+    """Of K in the cache: its file's bytes, which of its matrices, and the code that reads and checks it."""
     code = fingerprint([Path(__file__)], within=("problems/formats", "problems/input"))
-    return storage.digest("superelement", _content(path), code)
+    return storage.digest("superelement", content, matrix, code)
 
 
-def _content(path: Path) -> str:
-    found = path.stat()
-    return _hash(path, found.st_mtime_ns, found.st_size)
+def _hash(path: Path) -> str:
+    """Of what the file holds now: two files of one size and time may differ. Raises InputError."""
+    try:
+        with regular_file(path, "superelement", MIB).open("rb") as file:
+            return storage.digest(path.suffixes[-2:], hashlib.file_digest(file, "sha256").hexdigest())
+    except OSError as error:
+        raise InputError.one(path, "superelement", error.strerror, "a readable file") from error
 
 
-@lru_cache(maxsize=100)
-def _hash(path: Path, changed: int, size: int) -> str:
-    return storage.digest(path.suffix, path.read_bytes())
-
-
-def stored(path: Path) -> storage.Entry:
+def stored(path: Path, content: str, matrix: str | None) -> storage.Entry:
     """K, checked, and the labels of its rows if the file has any, from the cache. Raises InputError."""
-    regular_file(path, "superelement", MIB)
 
     def made() -> storage.Entry:
-        given, labels = read_stiffness(path)
+        given, labels = read_stiffness(path, matrix)
         n = given.shape[0]
         nothing = {"A": sp.csc_array((n, 0)), "f": np.zeros(n), "g": np.zeros(0)}
         sparse = sp.issparse(given) and n > SMALL and given.nnz <= DENSEST * n**2
         assembly, _ = checked({"K": given} | nothing, dict.fromkeys("KAfg", str(path)), sparse=True)
+        if _hash(path) != content:
+            raise InputError.one(
+                path, "superelement", "changed", "the file that it was when the scene was read"
+            )
         K = assembly.K.matrix
         arrays = matrix_files.packed({"K": K if sparse else K.toarray(order="F")})
         if labels is not None:
             arrays["labels"] = labels
         return arrays, {"notes": assembly.notes, "sparse": bool(sparse)}
 
-    return storage.load_or_make(stored_key(path), made)
-
-
-def _unknowns(
-    path: Path, table: Path, nodes: Nodes, arrays: Any, dofs: tuple[int, ...]
-) -> tuple[Indices, Indices]:
-    """The node and the degree of freedom of each row of K. Raises InputError."""
-    count = int(arrays["K_shape"][0]) if "K_shape" in arrays else len(arrays["K"])
-    if "labels" not in arrays:
-        if count != len(nodes.ids) * len(dofs):
-            rows = f"{len(nodes.ids)} nodes of {table} with the dofs {list(dofs)} are"
-            allowed = f"{rows} {len(nodes.ids) * len(dofs)} rows"
-            raise InputError.one(path, "rows of K", count, allowed)
-        return np.repeat(np.arange(len(nodes.ids)), len(dofs)), np.tile(dofs, len(nodes.ids))
-    ids, dof = np.array(arrays["labels"]).T
-    place = {int(each): k for k, each in enumerate(nodes.ids)}
-    if missing := [str(each) for each in dict.fromkeys(ids.tolist()) if each not in place]:
-        raise InputError.one(path, "nodes of K", listed(missing), f"ids of {table}")
-    if len(dofs) == 1:
-        dof = np.where(dof == 0, dofs[0], dof)  # scalar points
-    if not ((dof >= 1) & (dof <= 6)).all():
-        wrong = sorted(set(dof.tolist()) - set(range(1, 7)))
-        raise InputError.one(path, "degrees of freedom of K", wrong, "1 … 6; scalar points need one dof")
-    return np.array([place[each] for each in ids.tolist()], dtype=np.intp), dof.astype(np.intp)
+    return storage.load_or_make(stored_key(content, matrix), made)

@@ -33,6 +33,7 @@ from .nodes import listed
 from .pairing import Face, Pairing, paired, with_tool
 from .plate import Plate
 from .superelement import Superelement, SuperelementTable
+from .superelement_rows import misfit
 from .surface import surface_of
 
 LEVEL = np.cos(np.radians(10.0))
@@ -141,7 +142,7 @@ class SuperelementJoint:
 
     def faults(self) -> Faults:
         """Of the contacts; of files they are raised when these are read."""
-        wrong = list(wrong_contacts(self.names, self.contacts, self.pairs))
+        wrong = list(wrong_contacts(self.names, self.contacts, self.pairs, at_one_place=False))
         for part in self.parts:
             steep = part.nodes.normal[part.contacts] @ self.axes[2] < STEEP
             if steep.any():
@@ -183,6 +184,18 @@ class SuperelementJoint:
         return listed(f"{a.nodes.ids[a.contacts[k]]} ({t:.3g} mm)" for k, t in far.items())
 
     def unusual(self) -> Faults:
+        for part in self.parts:
+            rank = misfit(part.stiffness, part.nodes, (part.node, part.dof), part.dofs)
+            if rank:
+                yield (
+                    f"part.{part.name}, median rank by distance of the nodes that a row of K ties most",
+                    *rank,
+                )
+            alone = np.setdiff1d(np.arange(len(part.contacts)), self.faces[part.name].surface.triangles)
+            if len(alone):
+                ids = listed(map(str, part.nodes.ids[part.contacts[alone]]))
+                usual = f"none: contact nodes far from all others, ids {ids}"
+                yield f"part.{part.name}, nodes of no surface", len(alone), usual
         for pair, found in self.pairings.items():
             name = " – ".join(pair)
             if found.far:
@@ -224,6 +237,13 @@ class SuperelementJoint:
         index = self.pairs.index(pair)
         start = sum(len(self.places(each)) for each in self.pairs[:index])
         return slice(start, start + len(self.places(pair)))
+
+    def contact_name(self, index: int) -> str:
+        """The pair and the node of a contact, by its place in λ."""
+        pair = next(pair for pair in self.pairs if index < self.span(pair).stop)
+        node = self.pairings[pair].nodes[index - self.span(pair).start]
+        first = self._of[pair[0]]
+        return f"{' – '.join(pair)} at node {first.nodes.ids[first.contacts[node]]}"
 
     def places(self, pair: Pair) -> Matrix:
         return self.faces[pair[0]].xyz[self.pairings[pair].nodes, :2]

@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "init", "--superelements", folder / "wing.npz", folder / "frame.npz", folder / "scene.toml"
     )
     assert done.exit_code == 0, done.output
-    text = (folder / "scene.toml").read_text().replace("dofs = [3]", "dofs = [1, 2, 3]", 1)
+    text = (folder / "scene.toml").read_text().replace("dofs = [3]", 'dofs = [1, 2, 3]\nrows = "table"', 1)
     (folder / "edited.toml").write_text(
         text.replace("points = [[0.0, 0.0]]", "points = [[100.0, 60.0], [290.0, 33.0]]")
     )
@@ -71,6 +71,7 @@ def test_validate_says_what_there_is(folder: Path) -> None:
         "45 nodes of wing",
         "n = 201, m = 45",
         "Points are given along",
+        "Rows of K of wing: node 1 x, node 1 y, node 1 z, node 2 x",
     ):
         assert said in done.output
 

@@ -1,5 +1,6 @@
 """Joints of superelements against the built-in joint, closed forms, and themselves elsewhere."""
 
+import os
 import pickle
 from itertools import pairwise
 from pathlib import Path
@@ -93,6 +94,72 @@ def test_labels_of_abaqus_say_which_row_is_which(tmp_path: Path) -> None:
     np.testing.assert_array_equal(own.nodes.xyz[own.node, :2], JOINT.nodes)
     np.testing.assert_array_equal(own.stiffness, K[0])
     assert abs(np.sort(solved(scene).gap) - np.sort(solved(built_in(*EFFECTS)).gap)).max() < 1e-9
+
+
+ROWS = {"table": (0, [3]), "ids": (1, [3]), "directions": (2, [1, 2, 3])}
+
+
+@pytest.mark.parametrize("order", ROWS)
+def test_rows_without_labels_are_as_the_scene_says(order: str, tmp_path: Path) -> None:
+    """Ids and places in another order than the rows of K: asked; the same gaps as in the order of the ids;
+    and an order that does not fit K is told."""
+    others, dofs = np.random.default_rng(4).permutation(45), ROWS[order][1]
+    K = [np.kron(np.diag([0.0] * (len(dofs) - 1) + [1.0]), one) for one in stiffnesses(JOINT)]
+    parts, plain = [], scene_from(plates(tmp_path), *EFFECTS)
+    for name, one in zip("ab", K, strict=True):
+        one[range(len(one) - 45), range(len(one) - 45)] = 1e3  # in the plane, on springs
+        rows = others if order == "table" else np.arange(45)
+        rows = np.concatenate([rows + 45 * k for k in range(len(dofs))])
+        table = others if order != "directions" else np.arange(45)
+        xyz = flat(JOINT.nodes)[table]
+        part = write_part(tmp_path, name, one[np.ix_(rows, rows)], xyz, dofs=dofs, id=table + 1)
+        parts.append({key: value for key, value in part.items() if key != "rows"})
+    with pytest.raises(InputError, match='"table", "ids" or "directions"'):
+        scene_from(parts)
+    right = scene_from([part | {"rows": order} for part in parts], *EFFECTS)
+    wrong = scene_from([part | {"rows": "ids" if order == "table" else "table"} for part in parts], *EFFECTS)
+    np.testing.assert_allclose(solved(right).gap, solved(plain).gap, rtol=0, atol=1e-12)
+    assert [f'the order "{order}"' in said for said in wrong.unusual] == [True, True]
+    assert not right.unusual
+
+
+def test_a_file_replaced_with_its_size_and_time_is_read_anew(tmp_path: Path) -> None:
+    (part, other), path = plates(tmp_path), tmp_path / "a.npz"
+    assert scene_from([part, other]).joint.parts[0].stiffness[0, 0] == stiffnesses(JOINT)[0][0, 0]
+    before = path.stat()
+    np.savez(path, K=2 * stiffnesses(JOINT)[0])
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert path.stat().st_size == before.st_size
+    assert scene_from([part, other]).joint.parts[0].stiffness[0, 0] == 2 * stiffnesses(JOINT)[0][0, 0]
+
+
+def test_one_matrix_of_several(tmp_path: Path) -> None:
+    part, K = plates(tmp_path)[0], stiffnesses(JOINT)[0]
+    np.savez(tmp_path / "a.npz", KAA=K, MAA=np.eye(45))
+    with pytest.raises(InputError, match=r"KAA.*MAA.*matrix"):
+        scene_from([part])
+    for name, wanted in (("KAA", K), ("MAA", np.eye(45))):
+        np.testing.assert_array_equal(scene_from([part | {"matrix": name}]).joint.parts[0].stiffness, wanted)
+
+
+@pytest.mark.parametrize("bare", [False, True])
+def test_three_parts_that_meet_at_other_places_may_form_a_ring(bare: bool, tmp_path: Path) -> None:
+    """A strap on both ends of two parts that overlap in the middle. Where all three meet, it is refused."""
+    column, parts = np.unique(JOINT.nodes[:, 0], return_inverse=True)[1], []
+    own = {"strap": (column < 3) | (column > 5) | bare, "left": column < 6, "right": column > 2}
+    for k, (name, inside) in enumerate(own.items()):
+        rows = np.flatnonzero(inside)
+        nodes = np.column_stack([JOINT.nodes[rows], np.full(len(rows), k)])
+        parts.append(write_part(tmp_path, name, 40 * np.eye(len(rows)), nodes))
+    ring = [["strap", "left"], ["strap", "right"], ["left", "right"]]
+    scene = scene_from(parts, {"kind": "initial_gap", "mean": 0.1}, contacts=ring)
+    if bare:
+        with pytest.raises(InputError, match=r"left – right at node .*dependent on strap – left at node"):
+            prepared(scene)
+    else:
+        assert len(solved(scene).gap) == 45
+    with pytest.raises(InputError, match="no pair twice"):
+        scene_from(parts, contacts=[["strap", "left"], ["left", "strap"]])
 
 
 def error_of_other_meshes(folder: Path, elements: int) -> float:
