@@ -11,8 +11,8 @@ import numpy as np
 from problems.effects.fasteners import Fasteners
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix
+from problems.input.tables import read_columns
 from problems.model.effect import SpringEffect
-from problems.model.effect_tables import read_columns
 from problems.model.positions import MOST
 from problems.model.scene import JointScene, Scene
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
@@ -20,6 +19,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Vector
 from problems.input.bounded import regular_file
+from problems.input.tables import Cells, doubt, number
 
 MIB = 1024
 #: The names of displacements and of contact forces.
@@ -114,10 +114,10 @@ def read_answer(path: Path) -> dict[str, Vector]:
                 names = archive.files
                 found = _named(names, archive.__getitem__)
         else:
-            with path.open(encoding="utf-8-sig", newline="") as file:
-                reader = csv.DictReader(file)
-                rows, names = list(reader), list(reader.fieldnames or [])
-            found = _named(names, lambda name: [float(row[name]) for row in rows])
+            columns = _columns(path)
+            found = _named(names := list(columns), columns.__getitem__)
+    except InputError:
+        raise
     except Exception as error:  # numpy, zipfile and csv raise kinds of their own
         raise InputError.one(path, "file", f"{type(error).__name__}: {error}", ALLOWED) from error
     if not found:
@@ -129,6 +129,27 @@ def read_answer(path: Path) -> dict[str, Vector]:
             allowed = f"must be a finite number; {len(wrong)} of {len(vector)} are not"
             raise InputError.one(path, f"{name}[{wrong[0]}]", float(vector[wrong[0]]), allowed)
     return found
+
+
+def _columns(path: Path) -> dict[str, Vector]:
+    """The columns of HEADINGS in a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
+    table = Cells.of(path, MIB, ())
+    rows = table.rows()
+    header = next(rows, (0, []))[1]
+    names = [name for known in HEADINGS.values() for name in known if name in header]
+    if twice := [name for name in names if header.count(name) > 1]:
+        raise InputError.one(path, "names", twice, "each heading once")
+    at = [header.index(name) for name in names]
+    mark, read = table.decimal_mark(at), []
+    for line, cells in rows:
+        texts = [cells[k] if k < len(cells) else "" for k in at]
+        read.append([number(text, mark)[0] for text in texts])
+        if any(cells[len(header) :]) or not np.isfinite(read[-1]).all():
+            allowed = (
+                doubt(texts, mark) or f"every cell must be a finite number, one for each heading; {ALLOWED}"
+            )
+            raise InputError.one(path, f"line {line}", table.delimiter.join(cells), allowed)
+    return {name: np.array([row[k] for row in read]) for k, name in enumerate(names)}
 
 
 def _named(names: list[str], read: Callable[[str], object]) -> dict[str, Vector]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import codecs
 import gzip
 import zlib
+from itertools import islice
 from pathlib import Path
 
 from problems.errors import InputError
@@ -35,7 +36,7 @@ def read_bytes(path: Path, key: str, mib: float) -> bytes:
         content = regular_file(path, key, mib).read_bytes()
         if content.startswith(b"\x1f\x8b"):
             with gzip.open(path) as file:
-                content = file.read(int(mib * MIB) + 1)
+                content = b"".join(islice(iter(lambda: file.read(MIB), b""), int(mib) + 1))
     except (OSError, EOFError, zlib.error) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise InputError.one(path, key, why, "a readable file") from error

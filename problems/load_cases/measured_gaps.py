@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from problems.build import load_case
 from problems.errors import Fault, InputError
@@ -19,6 +18,7 @@ from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
 from . import LoadCases
+from .gap_tables import read_gaps
 
 ALLOWED = "every gap must be a finite number, in mm"
 MAX_FAULTS = 10  # reported one by one; the rest are counted
@@ -62,12 +62,13 @@ def measured_gaps(scene: Scene, path: Path, count: int | None = None, form: Form
     """The first `count` rows, or all, of a .csv (numbers; # begins a comment), .npz or .npy.
 
     An .npz must hold an array `gaps`, or a single array; an .npy is memory-mapped, the others are read into
-    memory. Raises InputError naming the cases with faults.
+    memory. A .csv (or .csv.gz) may have a header and a column that counts its rows: see gap_tables.py. Raises
+    InputError naming the cases with faults.
     """
-    gaps = _read(regular_file(path, "file", TABLE_MIB))
     effects = scene.effects if isinstance(scene, JointScene) else ()
     forces = load_case(scene, form, [each for each in effects if not isinstance(each, GapEffect)])
     m = len(forces.g)
+    gaps = _read(regular_file(path, "file", TABLE_MIB), m)
     if gaps.ndim != 2 or gaps.shape[1] != m or not len(gaps):
         raise InputError.one(
             path, "shape", gaps.shape, f"one row per case, one column for each of {m} contacts"
@@ -92,23 +93,24 @@ def _faults(path: Path, gaps: Matrix) -> Iterator[Fault]:
             yield Fault(str(path), f"case {start + row}, contact {contacts[0]}{others}", value, ALLOWED)
 
 
-def _read(path: Path) -> Matrix:
+def _read(path: Path, m: int) -> Matrix:
+    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
     try:
-        match path.suffix:
+        match suffix:
             case ".csv":
-                # Invalid and missing entries become NaN, which is reported with its case.
-                table = pd.read_csv(path, header=None, comment="#", low_memory=False)
-                return table.apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+                return read_gaps(path, m, TABLE_MIB)
             case ".npy":
                 return _real(np.load(path, mmap_mode="r"))
             case ".npz":
                 with np.load(path) as archive:
                     (name,) = ["gaps"] if "gaps" in archive.files else archive.files
                     return _real(archive[name])
-    except Exception as error:  # pandas, numpy and zipfile raise their own kinds
+    except InputError:
+        raise
+    except Exception as error:  # and zipfile raise their own kinds
         said = f"{type(error).__name__}: {error}"
         raise InputError.one(path, "file", said, "a readable table of numbers") from error
-    raise InputError.one(path, "file", path.suffix, "a .csv, .npz or .npy")
+    raise InputError.one(path, "file", suffix, "a .csv, .npz or .npy")
 
 
 def _real(array: Matrix) -> Matrix:

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from problems.effects.initial_gap import square_root
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
-from problems.model.effect_tables import read_columns
+from problems.input.tables import read_columns
 from problems.model.interface import AnyJoint
 
 NOISE = 1e-3  # ν

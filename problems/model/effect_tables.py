@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-import csv
-import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from problems.errors import Fault, InputError
-from problems.input.bounded import regular_file, unknown, validation_faults
+from problems.errors import Fault
+from problems.input.bounded import unknown, validation_faults
+from problems.input.tables import Rows, read_columns
 
 from .effect import EXCLUDED, Effect, effect_class, effect_kinds, unknown_part
 from .interface import AnyJoint
 from .joint import Faults
 
-CSV_MIB = 100
-UNIT = re.compile(r"[\s_]*(?:mm|\[\s*mm\s*\]|\(\s*mm\s*\))$", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class Rows:
-    """The good rows of a file, their line numbers, and the faults."""
-
-    path: Path
-    rows: list[tuple[float, ...]] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
-    faults: list[Fault] = field(default_factory=list)
+FILE_KEYS = ("file", "columns", "skip_lines", "missing")
 
 
 @dataclass
@@ -71,9 +59,18 @@ class EffectTable:
                 allowed += ", ".join(effect.columns)
                 yield Fault(str(self.where), f"{self._name}.columns", headings, allowed)
                 return
+            skip, missing = content.get("skip_lines", 0), content.get("missing", [])
+            if type(skip) is not int or skip < 0:
+                yield Fault(str(self.where), f"{self._name}.skip_lines", skip, "a number of lines, 0 or more")
+                return
+            if not isinstance(missing, list) or (missing and "gap" not in effect.columns):
+                allowed = "of a measured_gap, a list of what marks a point without a gap, as [9999, 'NaN']"
+                yield Fault(str(self.where), f"{self._name}.missing", missing, allowed)
+                return
             path = self.where.parent / str(content["file"])
-            self.rows = read_columns(path, {name: headings.get(name, name) for name in effect.columns})
-            content = {key: value for key, value in content.items() if key not in ("file", "columns")}
+            columns = {name: headings.get(name, name) for name in effect.columns}
+            self.rows = read_columns(path, columns, skip_lines=skip, missing=missing)
+            content = {key: value for key, value in content.items() if key not in FILE_KEYS}
             content["points"] = self.rows.rows
         try:
             self.effect = effect.model_validate(content)
@@ -110,74 +107,3 @@ class EffectTable:
     def _is_consequence(self, key: str) -> bool:
         """Whether a fault of all points, or of the whole table, may result from bad rows of a file."""
         return bool(self.rows and self.rows.faults and key in ("", "points"))
-
-
-def headings(path: Path) -> list[str]:
-    """The columns of a file, in small letters and without units; none if it cannot be read."""
-    try:
-        with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
-            first = file.readline()
-    except (InputError, OSError, UnicodeDecodeError):
-        return []
-    header: list[str] = next(csv.reader([first], delimiter=_delimiter(first)), [])
-    return [_heading(cell) for cell in header]
-
-
-def read_columns(path: Path, headings: Mapping[str, str]) -> Rows:
-    """The columns of a file, row by row, by name and heading; others are ignored. Bad rows are faults.
-
-    Cells are separated by what the header has of ; tab and comma, in this order; a comma that separates
-    nothing is a decimal one. A heading may be written large and end in its unit, mm; a row of units may
-    follow.
-    """
-    read = Rows(path)
-    try:
-        with regular_file(path, "file", CSV_MIB).open(encoding="utf-8-sig", newline="") as file:
-            first = file.readline()
-            delimiter = _delimiter(first)
-            file.seek(0)
-            _read(csv.reader(file, delimiter=delimiter), delimiter, headings, read)
-    except InputError as error:
-        read.faults.extend(error.faults)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = getattr(error, "strerror", None) or str(error)
-        read.faults.append(Fault(str(path), "file", why, "a readable comma-separated file"))
-    return read
-
-
-def _read(reader: Any, delimiter: str, headings: Mapping[str, str], read: Rows) -> None:
-    header: list[str] = next(reader, [])
-    found = [_heading(cell) for cell in header]
-    wanted = [_heading(heading) for heading in headings.values()]
-    if any(found.count(heading) != 1 for heading in wanted):
-        allowed = f"a header line with the columns {', '.join(headings.values())}, once each"
-        read.faults.append(Fault(str(read.path), "line 1", delimiter.join(header), allowed))
-        return
-    columns = [found.index(heading) for heading in wanted]
-    for cells in reader:
-        own = [cells[column].strip() if column < len(cells) else "" for column in columns]
-        units = reader.line_num == 2 and any(own) and {_heading(cell) for cell in own} == {""}
-        if units or not any(cell.strip() for cell in cells):
-            continue
-        try:
-            row = tuple(float(cell if delimiter == "," else cell.replace(",", ".")) for cell in own)
-        except ValueError:
-            row = (math.nan,)
-        if all(map(math.isfinite, row)) and not any(cells[len(header) :]):  # 0,5 would be two cells
-            read.rows.append(row)
-            read.lines.append(reader.line_num)
-        else:
-            allowed = f"a finite number in each of the columns {', '.join(headings.values())}"
-            line = delimiter.join(cells)
-            read.faults.append(Fault(str(read.path), f"line {reader.line_num}", line, allowed))
-    if not read.rows and not read.faults:
-        read.faults.append(Fault(str(read.path), "rows", 0, "at least one row below the header"))
-
-
-def _delimiter(header: str) -> str:
-    return next((mark for mark in ";\t" if mark in header), ",")
-
-
-def _heading(cell: str) -> str:
-    """Without its unit, if that is mm, in small letters."""
-    return UNIT.sub("", cell.strip()).lower()

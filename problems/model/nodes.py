@@ -10,8 +10,8 @@ import numpy as np
 
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Indices, Mask, Matrix, Vector
+from problems.input.tables import headings, read_columns
 
-from .effect_tables import headings, read_columns
 from .surface import SAME
 
 NORMAL = ("nx", "ny", "nz")

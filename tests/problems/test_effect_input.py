@@ -207,13 +207,13 @@ def test_an_effect_without_a_kind_may_name_an_unknown_part(tmp_path: Path) -> No
     [
         (b"x;y;gaps\n0;0;1\n", "line 1"),
         (b"x,X [mm],y,gap\n0,0,0,1\n", "line 1"),
-        (b"x;y;gap\n0;0;1.000,5\n", "line 2"),
+        (b"x;y;gap\n0;0;1.00,5\n", "line 2"),
         (b"x,y,gap\n0,0,0,5\n", "line 2"),
-        (b"x,y,gap\nin,in,in\n0,0,1\n", "line 2"),
+        (b"x,y,gap\npx,px,px\n0,0,1\n", "line 2"),
         (b"0,0,1\n9,9,1\n", "line 1"),
         (b"", "line 1"),
         (b"x,y,gap\n", "rows"),
-        (b"x,y,gap\n\xff\xfe,1,1\n", "file"),
+        (b"x,y,gap\n\xff\xfe,1,1\n", "line 2"),
         (None, "file"),
     ],
 )
@@ -227,7 +227,7 @@ def test_a_file_that_is_no_table(tmp_path: Path, content: bytes | None, key: str
 TABLES = {
     "comma": "x,y,gap\n0,0,0.5\n100,0,1.25\n0,50,2e-1\n",
     "semicolon": "x;y;gap\n0;0;0,5\n100,0;0;1,25\n0;50;2e-1\n",
-    "tab": "X\tY\tGap\n0\t0\t0,5\n100\t0\t1.25\n0\t50\t0,2\n",
+    "tab": "X\tY\tGap\n0\t0\t0,5\n100\t0\t1,25\n0\t50\t0,2\n",
     "headings with units": "gap (mm), X [mm] ,y_mm\n0.5,0,0\n1.25,100,0\n0.2,0,50\n",
     "a row of units": "x;y;point;gap\nmm;[mm];;mm\n0;0;a;0,5\n100;0;b;1,25\n0;50;c;0,2\n",
 }

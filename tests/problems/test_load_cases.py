@@ -159,8 +159,9 @@ def test_a_bad_table_is_named_case_by_case(scene: Scene, data: Prepared, tmp_pat
     [
         ("1,2,3\n4,5,6\n", r"shape = \(2, 3\).*45 contacts"),
         ("1,2\n1,2,3\n", "line 2"),
-        ("", "EmptyDataError"),
-        (",".join(["x"] * 45) + "\n", "case 0, contact 0 and 44 more = nan"),
+        ("", "shape = \\(0, 0\\)"),
+        (",".join(["x"] * 45) + "\n", r"shape = \(0, 0\)"),  # a header without a case
+        (",".join(["1.5"] + ["x"] * 44) + "\n", "case 0, contact 1 and 43 more = nan"),
     ],
 )
 def test_a_csv_that_is_no_table(text: str, words: str, scene: Scene, data: Prepared, tmp_path: Path) -> None:
