@@ -7,6 +7,7 @@ for A, f, g, which stay Matrix Market files; its stiffness are lines of numbers,
     row, column, value                                     FORMAT=COORDINATE
 """
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,14 @@ import scipy.io
 import scipy.sparse as sp
 
 from problems.errors import InputError
-from problems.input.entries import from_entries, mirrored, one_sided
+from problems.input.entries import from_entries, mirrored, one_sided, read_entries
 from problems.input.matrix_files import BANNER, MIB, Choose, read_mtx
-from problems.input.text_files import read_bytes, read_text
+from problems.input.text_files import read_bytes
 
 NORMAL = 3  # the degree of freedom under which displacements are written to Abaqus
-LINES = "node, dof, node, dof, value; or row, column, value; the same on every line"
-ELEMENT = ("*USERELEMENT", "*MATRIX,TYPE=")
+ELEMENT = re.compile(rb"(?mi)^\*[ \t]*(?:USER[ \t]*ELEMENT|MATRIX[ \t]*,[ \t]*TYPE).*$")
+COMMENT = re.compile(rb"(?m)^\*.*$")  # and keywords, such as *MATRIX ASSEMBLE
+BY_ROWS, BY_NODES = ("row", "column", "value"), ("node", "dof", "node", "dof", "value")
 ASK = "*MATRIX OUTPUT, STIFFNESS, FORMAT=MATRIX INPUT or COORDINATE: ask Abaqus for that"
 
 
@@ -70,41 +72,24 @@ def read_abaqus(path: Path, choose: Choose) -> dict[str, tuple[sp.csr_array, np.
 
 
 def _read(path: Path) -> tuple[sp.csr_array, np.ndarray | None]:
-    values, places, lines = _entries(path)
+    content = read_bytes(path, "file", MIB)
+    if element := ELEMENT.search(content):
+        number, line = content.count(b"\n", 0, element.start()) + 1, element[0].decode("latin-1")
+        allowed = f"is of a user element; what is read is {ASK}"
+        raise InputError.one(path, f"line {number}", line, allowed)
+    body = COMMENT.sub(b"", content).replace(b",", b" ")
+    by_rows = len(body.strip().partition(b"\n")[0].split()) == len(BY_ROWS)
+    places, values, line_of = read_entries(path, body, 0, BY_ROWS if by_rows else BY_NODES)
+    if not len(values):
+        raise InputError.one(path, "lines", 0, "at least one")
     unknowns, place = np.unique(np.vstack(np.hsplit(places, 2)), axis=0, return_inverse=True)
     i, j = place.reshape(2, -1)
-    n = len(unknowns)
-    if (unknowns[:, 0] < 1).any():
+    n, last = len(unknowns), unknowns[-1, 0]
+    if unknowns[0, 0] < 1:
         allowed = "1 or more: what is below is made by Abaqus, such as a multiplier, and no unknown of a part"
         raise InputError.one(path, "nodes or rows", int(unknowns[0, 0]), allowed)
-    labelled = unknowns.shape[1] == 2
-    if not labelled and n < unknowns[-1, 0]:
-        missing = int(np.setdiff1d(np.arange(1, unknowns[-1, 0]), unknowns)[0])
-        raise InputError.one(path, f"row {missing}", None, f"rows are 1 … {unknowns[-1, 0]}, none left out")
-    K = from_entries(path, (values, i, j), (n, n), lambda k: f"line {lines[k]}")
-    return (mirrored(K) if one_sided(K) else K), unknowns if labelled else None
-
-
-def _entries(path: Path) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Values, (k, 4) or (k, 2) whole numbers, and the line of each. Raises InputError."""
-    rows: list[list[float]] = []
-    lines: list[int] = []
-    for number, line in enumerate(read_text(path, "file", MIB).split("\n"), start=1):
-        if "".join(line.upper().split()).startswith(ELEMENT):
-            raise InputError.one(path, f"line {number}", line.strip(), f"is of a user element; read is {ASK}")
-        if not line.strip() or line.startswith("*"):  # ** comments, *MATRIX ASSEMBLE, …
-            continue
-        try:
-            row = [float(word) for word in line.replace(",", " ").split()]
-        except ValueError:
-            row = []
-        if len(row) not in (3, 5) or (rows and len(row) != len(rows[0])):
-            raise InputError.one(path, f"line {number}", line.strip(), LINES)
-        if not all(map(float.is_integer, row[:-1])):
-            raise InputError.one(path, f"line {number}", line.strip(), "whole numbers but the last")
-        rows.append(row)
-        lines.append(number)
-    if not rows:
-        raise InputError.one(path, "lines", 0, "at least one")
-    table = np.array(rows)
-    return table[:, -1], table[:, :-1].astype(np.intp), lines
+    if by_rows and n < last:
+        missing = int(np.setdiff1d(np.arange(1, last), unknowns)[0])
+        raise InputError.one(path, f"row {missing}", None, f"rows are 1 … {last}, none left out")
+    K = from_entries(path, (values, i, j), (n, n), line_of)
+    return (mirrored(K) if one_sided(K) else K), None if by_rows else unknowns

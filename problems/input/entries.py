@@ -6,7 +6,11 @@ listed if they agree; where it does not, a triangle alone is refused. |K_ij − 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
+from io import BytesIO
+from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,6 +52,33 @@ def from_entries(
             allowed = allowed if sign == 1 else "must be opposite, and zero on the diagonal: skew-symmetric"
             raise InputError.one(where, " and ".join(map(place, at.tolist())), values[at].tolist(), allowed)
     return M
+
+
+def read_entries(
+    path: Path, body: bytes, before: int, fields: Sequence[str], kind: type = float
+) -> tuple[Any, Any, Place]:
+    """The places (k, …) and values (k,) of lines of whole numbers and a last number, and the lines' names.
+
+    body : the file after so many lines. Raises InputError naming the first line that is neither so nor empty.
+    """
+    count = len(fields) - 1
+
+    def line_of(k: int) -> tuple[str, str]:
+        lines = ((number, line) for number, line in enumerate(body.split(b"\n"), before + 1) if line.strip())
+        number, line = next(islice(lines, k, None))
+        return f"line {number}", line.decode("latin-1").strip()
+
+    if not body.strip():
+        return np.zeros((0, count), dtype=np.int64), np.zeros(0), str
+    dtype = np.dtype([*[("places", np.int64, (count,))][:count], ("values", kind)])
+    try:
+        rows = np.loadtxt(BytesIO(body), dtype, comments=None, ndmin=1)
+    except ValueError as error:  # it says "row 0, column 3", but "row 1;" of the first row if it has too few
+        k, sign = re.findall(r" row (\d+)([,;])", str(error))[0]
+        key, line = line_of(int(k) - (sign == ";"))
+        allowed = f"each line must hold {', '.join(fields)}: whole numbers but the last, none out of range"
+        raise InputError.one(path, key, line, allowed) from error
+    return rows["places"] if count else None, rows["values"], lambda k: line_of(k)[0]
 
 
 def refuse_twice(where: object, name: str, M: Any) -> None:
@@ -102,8 +133,7 @@ def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequenc
         values = [float(K[i, j]), float(K[j, i])]
         faults.append(Fault(str(where), f"{entry(i, j)} and {entry(j, i)}", values, allowed))
     if 0 < len(held) < K.shape[0]:
-        more = f"; {len(held)} have it" if len(held) > 1 else ""
-        allowed = f"Abaqus' mark of a degree of freedom that is held: leave its row and column out{more}"
+        allowed = "Abaqus' mark of a degree of freedom that is held: leave its row and column out"
         faults.append(Fault(str(where), entry(int(held[0]), int(held[0])), HELD, allowed))
     if faults:
         raise InputError(faults)

@@ -8,33 +8,29 @@ files of one sparse matrix are read too.
 import io
 import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from itertools import islice
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
-import scipy.io
 import scipy.sparse as sp
 
 from problems.errors import InputError
 from problems.forms.assembly import Vector
 from problems.forms.prepared import Prepared
 
-from .entries import from_entries, refuse_twice
+from .entries import from_entries, read_entries, refuse_twice
 from .text_files import read_bytes
 
 PARTS = ("data", "indices", "indptr", "shape")
 MIB = 16_384  # of a text file of one matrix
-CHUNK = 2**20  # bytes of lines that are checked at once
-INTEGER = rb"[-+]?+\d++"
-REAL = rb"(?:[-+]?+(?:\d++\.?+\d*+|\.\d++)(?:[eE][-+]?+\d++)?+|[-+]?+(?i:nan|inf(?:inity)?+))"
-#: The number of an entry, by the field in the header.
-NUMBER = {"real": REAL, "double": REAL, "integer": INTEGER, "unsigned-integer": INTEGER}
+LARGEST_SIZE = 10**8  # rows or columns
+KINDS = {"real": float, "double": float, "integer": np.int64, "unsigned-integer": np.uint64}
 #: By the symmetry in the header, the sign with which (i, j) stands for (j, i), too.
 SIGNS = {"general": None, "symmetric": 1, "hermitian": 1, "skew-symmetric": -1}
 BANNER = "%%matrixmarket"
-LAYOUTS = {"coordinate": 2, "array": 1}  # spaces in the line of sizes
+HEADER = re.compile(rf"{BANNER}\s+matrix\s+(coordinate|array)\s+(\S+)\s+({'|'.join(SIGNS)})")
+#: What a line holds.
+LAYOUTS = {"coordinate": ("row", "column", "entry"), "array": ("entry",)}
 Choose = Callable[[Sequence[str]], Sequence[str]]
 
 
@@ -120,84 +116,54 @@ def mtx_header(path: Path) -> tuple[list[str], list[int], int, bytes]:
 
     Raises InputError.
     """
-    content = read_bytes(path, "file", MIB)
-    lines, number = io.BytesIO(content), 1
-    banner = lines.readline()
-    words = banner.decode("latin-1").lower().split()
-    if words[:2] != [BANNER, "matrix"] or len(words) != 5 or words[4] not in SIGNS or words[2] not in LAYOUTS:
-        _refuse_line(path, 1, banner, "the header is %%MatrixMarket matrix LAYOUT FIELD SYMMETRY")
-    for number, line in enumerate(lines, start=2):
-        if line.strip() and not line.startswith(b"%"):
-            if not re.fullmatch(rb"\s*+\d++(?:[ \t]++\d++){%d}\s*+" % LAYOUTS[words[2]], line):
-                _refuse_line(path, number, line, "the sizes are ROWS COLUMNS, and ENTRIES if coordinate")
-            return words[2:], [*map(int, line.split())], number, content[lines.tell() :]
-    raise InputError.one(path, "lines", number, "truncated: the line of sizes is missing")
+    lines, number, text, words = io.BytesIO(read_bytes(path, "file", MIB)), 1, "", None
+    allowed = "the header is %%MatrixMarket matrix LAYOUT FIELD SYMMETRY"
+    for number, line in enumerate(lines, start=1):
+        text = line.decode("latin-1").strip()
+        if number == 1:
+            if not (words := HEADER.fullmatch(text.lower())):
+                break
+            allowed = "the sizes are ROWS COLUMNS, and ENTRIES of a coordinate layout"
+        elif words and text and not text.startswith("%"):
+            sizes = [int(word) for word in text.split() if word.isdecimal()]
+            if len(sizes) != len(text.split()) or len(sizes) != (3 if words[1] == "coordinate" else 2):
+                break
+            return [*words.groups()], sizes, number, lines.read()
+    raise InputError.one(path, f"line {number}", text, allowed)
 
 
 def read_mtx(path: Path) -> Any:
     """A Matrix Market file, array or sparse.
 
-    Raises InputError if an entry is listed twice or a line holds anything else than one entry, or ValueError
-    if entries are missing, a number is out of range, or a symmetric matrix is not square. mmread would take
-    missing entries for zeros, read 3,5 and 3D5 as 3, add up what is listed twice, and crash on a NUL.
+    Raises InputError for a line that does not hold one entry, or one of an entry that is listed twice, and
+    ValueError if entries are missing or of another kind. SciPy's reader takes missing entries for zeros,
+    reads 3,5 and 3D5 as 3, adds up what is listed twice, and crashes on a NUL.
     """
     (layout, field, symmetry), sizes, number, body = mtx_header(path)
     (rows, columns), sign = sizes[:2], SIGNS[symmetry]
     if sign and rows != columns:
         raise ValueError(f"{symmetry}, and not square: {rows} × {columns}")
-    if field not in NUMBER:
+    if field not in KINDS:
         raise ValueError(f"{field} entries, where real numbers are needed")
-    words = [NUMBER[field]]
+    if max(sizes[:2]) > LARGEST_SIZE:
+        raise ValueError(f"{rows} × {columns} is out of range: at most {LARGEST_SIZE:g} rows and columns")
+    triangle = rows * (rows + sign) // 2 if sign else rows * columns
+    count = sizes[2] if layout == "coordinate" else triangle
+    places, values, line = read_entries(path, body, number, LAYOUTS[layout], KINDS[field])
+    if len(values) < count:
+        raise ValueError(f"truncated: {len(values)} of {count} entries")
+    if len(values) > count:
+        raise InputError.one(path, line(count), "an entry", f"at most {count}, as the line of sizes says")
     if layout == "coordinate":
-        words = [INTEGER, INTEGER, *words]
-    elif sign:  # its lower triangle, column by column
-        sizes = [rows * (rows + sign) // 2, 1]
-    count = sizes[-1] if layout == "coordinate" else sizes[0] * sizes[1]
-    _refuse_wrong_lines(path, body, number, count, rb"[ \t]++".join(words))
-    if not rows * columns:
-        return np.zeros((rows, columns))
-    banner = f"%%MatrixMarket matrix {layout} {field} general\n"
-    header = banner + "%\n" * (number - 2) + " ".join(map(str, sizes)) + "\n"
-    try:
-        M = scipy.io.mmread(io.BytesIO(header.encode() + body))
-    except OverflowError as error:
-        raise ValueError(str(error)) from error
-    if layout == "coordinate":
-        return from_entries(path, (M.data, *M.coords), M.shape, partial(_line_of, body, number), sign)
-    if sign:
-        j, i = np.triu_indices(rows, k=int(sign < 0))
-        listed, M = M.ravel(), np.zeros((rows, rows), dtype=M.dtype)
-        M[i, j], M[j, i] = listed, sign * listed
+        for k in np.flatnonzero(((places < 1) | (places > sizes[:2])).any(axis=1))[:1]:
+            raise InputError.one(path, line(k), places[k].tolist(), f"rows 1 … {rows}, columns 1 … {columns}")
+        return from_entries(path, (values, *(places.T - 1)), (rows, columns), line, sign)
+    if not sign:
+        return values.reshape(columns, rows).T
+    j, i = np.triu_indices(rows, k=int(sign < 0))  # the lower triangle, column by column
+    M = np.zeros((rows, rows), dtype=values.dtype)
+    M[i, j], M[j, i] = values, sign * values
     return M
-
-
-def _line_of(body: bytes, before: int, k: int) -> str:
-    """The line of entry k, in words."""
-    filled = (number for number, line in enumerate(io.BytesIO(body), start=before + 1) if line.strip())
-    return f"line {next(islice(filled, k, None))}"
-
-
-def _refuse_wrong_lines(path: Path, body: bytes, before: int, entries: int, entry: bytes) -> None:
-    """Raise InputError for a line that holds anything but an entry, or ValueError if there are too few."""
-    line = rb"[ \t]*+(?:%b)?+[ \t]*+\n" % entry
-    one, many = re.compile(line), re.compile(rb"(?:%b)*+" % line)
-    file, found, number = io.BytesIO(body), 0, before
-    while lines := file.readlines(CHUNK):
-        lines[-1] = lines[-1].removesuffix(b"\n") + b"\n"
-        if not many.fullmatch(b"".join(lines)):
-            at, wrong = next((k, text) for k, text in enumerate(lines) if not one.fullmatch(text))
-            _refuse_line(path, number + at + 1, wrong, "each line must hold one entry")
-        found += sum(map(bool, map(bytes.strip, lines)))
-        number += len(lines)
-    if found < entries:
-        raise ValueError(f"truncated: {found} of {entries} entries")
-    if found > entries:
-        key, allowed = _line_of(body, before, entries), f"at most {entries}, as the line of sizes says"
-        raise InputError.one(path, key, f"entry {entries + 1}", allowed)
-
-
-def _refuse_line(path: Path, number: int, line: bytes, allowed: str) -> NoReturn:
-    raise InputError.one(path, f"line {number}", line.decode(errors="replace").rstrip(), allowed)
 
 
 SAMPLE_SIZE = 20_000
