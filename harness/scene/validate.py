@@ -88,7 +88,7 @@ def _superelements(scene: JointScene, console: Console) -> None:
     console.print(_with_effects(table, scene))
     for part in joint.parts:
         rows = first_rows(part.nodes, (part.node, part.dof))
-        console.print(Text(f"Rows of K of {part.name}: {rows}."))
+        console.print(Text(f"First rows of K of {part.name}: {rows}."))
     x, y, normal = (", ".join(f"{each:.4g}" for each in axis) for axis in joint.axes)
     console.print(f"Points are given along x = ({x}) and y = ({y}); the normal of their plane is ({normal}).")
     _matrices(scene, console)

@@ -17,6 +17,7 @@ from .surface import SAME
 NORMAL = ("nx", "ny", "nz")
 UNIT = 1e-3  # by which the length of a normal may miss 1
 FARTHEST = 1e9  # mm from the origin: beyond, doubles hardly tell places apart by SAME
+FAR = 10.0  # times the distances beside it
 SHOWN = 10  # nodes of a message
 
 
@@ -84,6 +85,14 @@ def _wrong_nodes(
     if len(pairs):
         twice = listed(f"{ids[own[i]]:.0f} and {ids[own[j]]:.0f}" for i, j in pairs)
         yield "x, y, z", f"ids {twice}", "one node at each place of the contact surface"
+
+
+def outliers(xyz: Matrix) -> Indices:
+    """The nodes whose nearest one is far away beside the distance that it has to its own nearest one."""
+    from scipy.spatial import cKDTree
+
+    away, nearest = (each[:, 1] for each in cKDTree(xyz).query(xyz, k=2))
+    return np.flatnonzero(away > FAR * away[nearest])
 
 
 def _ids(ids: Vector) -> str:

@@ -29,7 +29,7 @@ from problems.input.bounded import Positive
 
 from .interface import across
 from .joint import TOOL, Faults, Pair, Table, wrong_contacts
-from .nodes import listed
+from .nodes import listed, outliers
 from .pairing import Face, Pairing, paired, with_tool
 from .plate import Plate
 from .superelement import Superelement, SuperelementTable
@@ -191,11 +191,11 @@ class SuperelementJoint:
                     f"part.{part.name}, median rank by distance of the nodes that a row of K ties most",
                     *rank,
                 )
-            alone = np.setdiff1d(np.arange(len(part.contacts)), self.faces[part.name].surface.triangles)
-            if len(alone):
-                ids = listed(map(str, part.nodes.ids[part.contacts[alone]]))
-                usual = f"none: contact nodes far from all others, ids {ids}"
-                yield f"part.{part.name}, nodes of no surface", len(alone), usual
+            if len(far := outliers(part.nodes.xyz[part.contacts])):
+                usual = (
+                    f"none: is this their place? Ids {listed(map(str, part.nodes.ids[part.contacts[far]]))}"
+                )
+                yield f"part.{part.name}, nodes far from all others", len(far), usual
         for pair, found in self.pairings.items():
             name = " – ".join(pair)
             if found.far:

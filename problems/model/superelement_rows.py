@@ -15,10 +15,11 @@ import scipy.sparse as sp
 from problems.errors import InputError
 from problems.forms.assembly import Indices
 
-from .nodes import SHOWN, Nodes, listed
+from .nodes import Nodes, listed
 
 Order = Literal["table", "ids", "directions"]
 Rows = tuple[Indices, Indices]
+FIRST = 7  # rows that are printed
 SAMPLE, STRONGEST = 64, 4  # rows that are looked at; nodes that each is coupled to most
 BETTER, FAR = 3.0, 10  # times the rank of another order; the rank of nodes at random is half their number
 NAMES = ("x", "y", "z", "about x", "about y", "about z")
@@ -78,8 +79,8 @@ def _labelled(path: Path, table: Path, nodes: Nodes, labels: Any, dofs: tuple[in
 
 def first_rows(nodes: Nodes, rows: Rows) -> str:
     """The node and the degree of freedom of the first rows, in words."""
-    named = zip(nodes.ids[rows[0][: SHOWN + 1]].tolist(), rows[1].tolist(), strict=False)
-    return listed(f"node {at} {NAMES[dof - 1]}" for at, dof in named).replace(" and 1 more", ", …")
+    named = zip(nodes.ids[rows[0][:FIRST]].tolist(), rows[1].tolist(), strict=False)
+    return ", ".join(f"node {at} {NAMES[dof - 1]}" for at, dof in named)
 
 
 def misfit(K: Any, nodes: Nodes, rows: Rows, dofs: tuple[int, ...]) -> tuple[float, str] | None:

@@ -71,7 +71,7 @@ def test_validate_says_what_there_is(folder: Path) -> None:
         "45 nodes of wing",
         "n = 201, m = 45",
         "Points are given along",
-        "Rows of K of wing: node 1 x, node 1 y, node 1 z, node 2 x",
+        "First rows of K of wing: node 1 x, node 1 y, node 1 z, node 2 x",
     ):
         assert said in done.output
 
