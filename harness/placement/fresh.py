@@ -20,10 +20,10 @@ from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count, islice
-from math import ceil, floor, log
+from math import ceil, comb, floor, log
 
 from harness.placement.candidates import Plan
-from harness.placement.search import Search, Step, Values
+from harness.placement.search import PLANS, Search, Step, Values
 from problems.errors import InputError
 
 ALPHA = 0.05
@@ -176,10 +176,11 @@ def searched(search: Search, own: Plan, goal: Goal) -> tuple[list[Step], Step]:
             return steps, steps[0]
         best, way = search.fewest(steps[0])
         return [*steps, *way, *search.uniform()], best
-    before: Values = {}
     more = len(search.candidates) - goal.count
-    steps += (way := list(islice(search.removal(steps[0], before), max(more - 1, 0))))
-    best = [steps[0], *way][-1]
-    if more:
-        steps.append(best := search.fewer(best, before)[0])
-    return [*steps, *search.wholes(search.even(goal.count), "uniform")], best
+    if comb(len(search.candidates), more) <= PLANS:
+        best = search.best_of_all(steps[0], goal.count)
+    else:
+        before: Values = {}
+        steps += list(islice(search.removal(steps[0], before), more - 1))
+        best, _ = search.fewer(steps[-1], before, every=True)
+    return [*steps, best, *search.wholes(search.even(goal.count), "uniform")], best

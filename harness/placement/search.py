@@ -15,7 +15,9 @@ be less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 197
 
 Exchange moves a fastener to one of the free holes next to where the gap is too large: one of the nearest, or
 of those that are needed least. The best move is made as long as it makes φ less. Of the plan without the
-fastener that is needed least and uniform ones of as many, it starts from the one of least G.
+fastener that is needed least and uniform ones of as many, it starts from the one of least G. Where there are
+few plans of a number of fasteners, all of them are compared instead. Where the number is given, it starts
+from each.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from math import dist
+from itertools import combinations
+from math import comb, dist
 from typing import TypeAlias
 
 import numpy as np
@@ -45,6 +48,7 @@ NONE = (0.0, 0.0)  # less than any φ
 HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners needed least
 SHARE_AT_ONCE = 8  # a plan's share that is taken out at once, as long as that keeps the limit
 NEXT = 3  # a fastener and those next to it
+PLANS = 300  # that are all compared; after a removal half as many
 FURTHER = 1.25  # times what is enough: how far removal goes on
 DIGITS = 6  # of mm: values closer than a nanometre are equal, whatever the rounding
 
@@ -57,6 +61,10 @@ class Step:
     gap_mm: float
     outcome: Outcome
     moved: str = ""
+
+    def order(self) -> tuple[float, Plan]:
+        """The least gap first."""
+        return round(self.gap_mm, DIGITS), self.plan
 
     @property
     def worst(self) -> int:
@@ -158,13 +166,34 @@ class Search:
             steps.append(best := fewer)
         return best, steps
 
-    def fewer(self, step: Step, before: Values) -> tuple[Step, Values]:
-        """The best that exchange makes of plans with one fastener less, and the values on its way."""
+    def fewer(self, step: Step, before: Values, every: bool = False) -> tuple[Step, Values]:
+        """The best that exchange makes of plans with one fastener less, or of all of them, if they are few;
+        and the values on its way. every : whether it starts from all these plans, not from the best alone.
+        """
+        if comb(len(self.candidates), len(step.plan) - 1) <= PLANS // 2:
+            return self.best_of_all(step, len(step.plan) - 1), {}
         starts: dict[Plan, Values] = {plan: {} for plan in self.even(len(step.plan) - 1)}
         starts[without(step.plan, self._least(step, before, 1)[0])] = before
-        found = self.wholes(list(starts), "exchange")
-        start = min(found, key=lambda each: (round(each.gap_mm, DIGITS), each.plan))
-        return self.exchanged(start, starts[start.plan]), starts[start.plan]
+        found = sorted(self.wholes(list(starts), "exchange"), key=Step.order)
+        tried = [self.exchanged(start, starts[start.plan]) for start in (found if every else found[:1])]
+        return min(tried, key=Step.order), starts[found[0].plan]
+
+    def best_of_all(self, step: Step, count: int) -> Step:
+        """The plan of least G of all with so many fasteners. step : the base of the first estimates.
+
+        Estimates are never above G: plans are solved in the order of theirs, until no other can have less.
+        """
+        plans = list(combinations(self.candidates, count))
+        left = dict(zip(plans, self._values(step, plans), strict=True))
+        solved: list[Step] = []
+        while left:
+            del left[plan := min(left, key=lambda each: (left[each], each))]
+            solved.append(self.whole(plan, "exchange"))
+            least = min(step.gap_mm for step in solved)
+            left = {plan: value for plan, value in left.items() if value[0] < max(least, self.limit_mm)}
+            renewed = self._values(solved[-1], list(left))
+            left = {plan: max(pair) for plan, *pair in zip(left, left.values(), renewed, strict=True)}
+        return min(solved, key=Step.order)
 
     def removal(self, step: Step, before: Values) -> Iterator[Step]:
         """The plans with one fastener less each. before : values of earlier steps."""

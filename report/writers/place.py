@@ -23,7 +23,7 @@ from report.writers.pages import emptied, written
 FAMILIES = {
     "all candidates": ("all candidates", style.BLACK, "o", ""),
     "removal": ("after removal", style.BLUE, ".", "-"),
-    "exchange": ("after exchanges", style.BLACK, "*", ""),
+    "exchange": ("after exchanges, or of all", style.BLACK, "*", ""),
     "own": ("the scene's own", style.GREEN, "D", ""),
     "uniform": ("in the holes nearest to uniform patterns", style.VERMILLION, "s", ""),
 }

@@ -19,6 +19,7 @@ from harness.placement import search as search_module
 from harness.placement.asked import PLANS, Asked
 from harness.placement.candidates import Movable, Plan, grid, plan_of, uniform_plans
 from harness.placement.fresh import Cases, Goal, decided
+from harness.placement.fresh import searched as searched_by
 from harness.placement.search import Search
 from harness.placement.session import Outcome, PlanSession, Question, Study
 from problems.build import load_case
@@ -117,6 +118,13 @@ def searched(session: PlanSession, limit: float, candidates: Plan, allowed: int 
     return Search(lambda asked: [session.answer(q) for q in asked], *given)
 
 
+@pytest.fixture
+def no_plan_by_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with so many candidates that plans cannot all be compared."""
+    monkeypatch.setattr(search_module, "PLANS", 0)
+
+
+@pytest.mark.usefixtures("no_plan_by_plan")
 @pytest.mark.parametrize("allowed", [0, 2])
 @pytest.mark.parametrize("limit", [0.03, 0.05])
 def test_the_fewest_are_the_optimum_or_one_more(
@@ -295,6 +303,17 @@ def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     assert "half of 40 rows are held back: take 144 rows, or a share of 1" in few.output
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 8])
+def test_few_plans_are_all_compared(strip: Path, count: int) -> None:
+    """Whose gaps follow no rule, in 20 cases of which one may fail: against the least of all."""
+    candidates, gaps = plans_of(strip, 2, 4), np.random.default_rng(count)
+    plans = {plan: gaps.uniform(size=20) for k in range(9) for plan in combinations(candidates, k)}
+    search = told(strip, candidates, lambda plan, case: float(plans[plan][case]), cases=20)
+    _, best = searched_by(replace(search, allowed=1), candidates, Goal(None, 0.95, count))
+    assert best.gap_mm == min(sorted(gap)[-2] for plan, gap in plans.items() if len(plan) == count)
+
+
+@pytest.mark.usefixtures("no_plan_by_plan")
 def test_exchange_starts_from_uniform_plans_too(strip: Path) -> None:
     """Where only the uniform one of three is good, which no exchange would reach one by one."""
     candidates = plans_of(strip, 1, 9)
@@ -316,6 +335,7 @@ def test_exchange_goes_on_after_a_move_that_opens_another_case(strip: Path) -> N
     assert (found.plan, found.gap_mm) == ((third,), 0.6)
 
 
+@pytest.mark.usefixtures("no_plan_by_plan")
 def test_exchange_starts_from_what_is_least_in_all_cases(strip: Path) -> None:
     """Not from a uniform plan that is good only in those that decide about another one."""
     candidates = plans_of(strip, 1, 9)
