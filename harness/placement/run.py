@@ -6,6 +6,7 @@ DIRECTORY/own, on the scenes as a user would read them.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, replace
@@ -25,19 +26,21 @@ from harness.placement.search import Search, Step
 from harness.placement.session import THREADS, Study
 from harness.results import records
 from harness.results.provenance import installed_version, provenance
-from harness.scene.edited import MOVED, edited, with_fasteners
+from harness.scene.edited import MOVED, edited, with_fasteners, with_gaps
 from harness.series.run import run as run_series
 from harness.series.session import Job
 from harness.terminal import DONE, GAP_EXCEEDED
 from harness.verification.judge import LIMIT_MM
 from problems.build import prepared
+from problems.effects.fasteners import Fasteners
+from problems.effects.initial_gap import InitialGap
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
 from problems.load_cases import LoadCases
 from problems.load_cases.measured_gaps import MeasuredGaps
 from problems.load_cases.random_gaps import RandomGaps
-from problems.model.scene import Scene
-from problems.scene import read_scene
+from problems.model.scene import JointScene, Scene
+from problems.scene import read_scene, scene_of
 from problems.storage import digest
 
 RECORD = "place.json"
@@ -68,8 +71,16 @@ def run(
     nodes = prepared(study.bare, form=study.form).assembly.contact_nodes
     assert nodes is not None  # of a joint
 
+    law = _other_gaps(study.bare, study.cases)
+    kinds = MOVED if law is None else (*MOVED, "initial_gap")
+
     def text_of(plan: Plan) -> str:
-        return edited(source, directory, with_fasteners(plan), MOVED)
+        def change(document: Any) -> None:
+            with_fasteners(plan)(document)
+            if law is not None:
+                with_gaps(law)(document)
+
+        return edited(source, directory, change, kinds)
 
     text_of(movable.own)  # refused now rather than after the search
     identity = _identity(study, movable.own, candidates, goal) | facts
@@ -80,6 +91,7 @@ def run(
     if cases.table:
         console.print("Every second row is held back: it does not choose the plan, but says what it keeps.")
     with records.locked(directory, (), other=records.MEASUREMENTS):
+        scene_of(tomllib.loads(text_of(movable.own)), str(directory / "own.toml"))  # as is refused at the end
         pool = workers(scheduler, console) if scheduler else nullcontext()
         with pool as where, _showing(console) as said:
             ask = Asked(study, directory / PLANS, identity, where)
@@ -95,6 +107,9 @@ def run(
             path = directory / f"{name}.toml"
             records.replace_text(path, text_of(plan))
             scene = read_scene(str(path))
+            if law is not None and law.points is not None:  # a scene has a scan, or random gaps around it
+                assert isinstance(scene, JointScene)
+                scene = replace(scene, effects=(*study.bare.effects, *scene.effects_of(Fasteners)))
             made = cases_of(scene)
             if found.samples and isinstance(made, RandomGaps):  # those that decided, too
                 made = replace(made, count=found.samples[-1].numbers[-1] + 1)
@@ -109,6 +124,16 @@ def run(
         console.print(f"Report: {write(directory)}")
         console.print(words, style="green" if code == DONE else "red", soft_wrap=True)
         return code
+
+
+def _other_gaps(bare: JointScene, cases: LoadCases) -> RandomGaps | None:
+    """The random gaps, if the scene's file says something else of them than these cases."""
+    if not isinstance(cases, RandomGaps):
+        return None
+    but = {"random": {"seed"}}
+    there = [each.model_dump(exclude=but) for each in bare.effects_of(InitialGap)]
+    same = there == [cases.field.model_dump(exclude=but)]
+    return None if same and cases.points is None else cases
 
 
 def _identity(study: Study, own: Plan, candidates: Plan, goal: Goal) -> dict[str, Any]:

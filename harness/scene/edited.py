@@ -11,7 +11,9 @@ import tomlkit
 
 from problems.drawn import drawn_table
 from problems.errors import InputError
-from problems.scene import SCENES, assembly_path, read_toml
+from problems.input.text_files import read_text
+from problems.load_cases.random_gaps import RandomGaps
+from problems.scene import SCENES, TOML_MIB, assembly_path, read_toml
 
 MOVED = ("fasteners",)  # what `with_fasteners` changes
 FILES = ("assembly", "file", "superelement", "nodes")  # keys whose values may be paths, as seen from the file
@@ -29,7 +31,7 @@ def edited(source: str, folder: Path, change: Callable[[Any], None], kinds: Sequ
         path = Path(source) if source.endswith(".toml") else SCENES / f"{source}.toml"
         if not path.is_file():
             raise InputError.one("scene", "name", source, "a scene in a file, so that its values can change")
-        document, home = tomlkit.parse(path.read_text("utf-8")), path.parent
+        document, home = tomlkit.parse(read_text(path, "file", TOML_MIB, strict=True)), path.parent
     if "assembly" in document:
         there = read_toml(assembly := assembly_path(home / "scene", document["assembly"])).get("effect", [])
         if wrong := [table["kind"] for table in there if table.get("kind") in kinds]:
@@ -57,6 +59,24 @@ def with_fasteners(points: Sequence[tuple[float, float]]) -> Callable[[Any], Non
             found[0]["points"] = tomlkit.item([list(place) for place in points]).multiline(True)
         for other in found[1 if points else 0 :]:
             document["effect"].remove(other)
+
+    return change
+
+
+def with_gaps(cases: RandomGaps) -> Callable[[Any], None]:
+    """The change that gives a scene the law of random gaps, or instead the scan that they pass through."""
+    table: dict[str, Any] = cases.field.model_dump(mode="json", exclude={"kind"}, exclude_none=True)
+    kind = "initial_gap"
+    if cases.points is not None:
+        kind, table = "measured_gap", {key: table[key] for key in ("between",) if key in table}
+        table["points"] = tomlkit.item(cases.points.tolist()).multiline(True)
+
+    def change(document: Any) -> None:
+        for old in of_kind(document, "initial_gap"):
+            document["effect"].remove(old)
+        new = tomlkit.table()
+        new.update({"kind": kind} | table)
+        document["effect"].append(new)
 
     return change
 

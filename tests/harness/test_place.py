@@ -285,6 +285,26 @@ def test_how_many_fresh_cases_and_how_many_of_them_may_fail(share: float) -> Non
 
 
 @pytest.mark.slow
+def test_the_scene_of_a_plan_has_the_gaps_that_chose_it(strip: Path, tmp_path: Path) -> None:
+    """The scan in place of the scene's gap, or the law that options gave; `solve` takes them from there."""
+    (tmp_path / "scan.csv").write_text("x,y,gap\n0,0,0.03\n200,0,0.05\n0,50,0.06\n200,50,0.04\n")
+    assert place(strip, tmp_path / "a", "--count", 2, "--around", tmp_path / "scan.csv").exit_code == 0
+    scene = read_scene(str(tmp_path / "a" / "plan.toml"))
+    assert [effect.kind for effect in scene.effects] == ["fasteners", "measured_gap"]
+    assert load_case(scene, effects=scene.effects).g[0] == pytest.approx(0.03)
+    assert place(strip, tmp_path / "b", "--count", 2, "--mean", 0.2).exit_code == 0
+    scene = read_scene(str(tmp_path / "b" / "own.toml"))
+    (gap,) = (effect for effect in scene.effects if effect.kind == "initial_gap")
+    assert (gap.mean, gap.random.sd, gap.random.correlation_length) == (0.2, 0.02, 60.0)
+    # A scan that no scene can have is refused before the search.
+    (tmp_path / "line.csv").write_text("x,y,gap\n0,0,0.03\n200,0,0.05\n")
+    refused = place(strip, tmp_path / "c", "--count", 2, "--around", tmp_path / "line.csv")
+    assert refused.exit_code == 2
+    assert "measured_gap" in refused.output
+    assert not (tmp_path / "c" / PLANS).exists()
+
+
+@pytest.mark.slow
 def test_rows_of_a_table_are_held_back(strip: Path, tmp_path: Path) -> None:
     gaps = random_gaps(Movable.of(read_scene(str(strip))).bare, 40, 7)
     for rows in (40, 1):
