@@ -22,6 +22,7 @@ from problems.forms.assembly import Indices
 SYMMETRY = 1e-10  # largest |K_ij − K_ji| / √(K_ii K_jj) attributed to rounding
 HELD = 1e36  # N/mm, what Abaqus writes on the diagonal for a degree of freedom that is held
 Place = Callable[[int], str]
+BLANK = b" \t\n\r\v\f\x1c\x1d\x1e\x1f\x85\xa0"  # what NumPy takes for a blank, too
 ONCE = "each entry must be listed once"
 
 
@@ -64,11 +65,12 @@ def read_entries(
     count = len(fields) - 1
 
     def line_of(k: int) -> tuple[str, str]:
-        lines = ((number, line) for number, line in enumerate(body.split(b"\n"), before + 1) if line.strip())
+        numbered = enumerate(body.split(b"\n"), start=before + 1)
+        lines = ((number, line) for number, line in numbered if line.strip(BLANK))
         number, line = next(islice(lines, k, None))
         return f"line {number}", line.decode("latin-1").strip()
 
-    if not body.strip():
+    if not body.strip(BLANK):
         return np.zeros((0, count), dtype=np.int64), np.zeros(0), str
     dtype = np.dtype([*[("places", np.int64, (count,))][:count], ("values", kind)])
     try:
@@ -124,12 +126,9 @@ def refuse_no_stiffness(where: object, K: sp.csr_array, name: str, rows: Sequenc
         for k in np.flatnonzero(K.diagonal() == 0).tolist()[:1]
     ]
     for i, j in pairs[:1]:
-        more = f"; {len(pairs) - 1} more pairs are not" if len(pairs) > 1 else ""
+        allowed = f"K must be symmetric, both within {SYMMETRY:g} √(K_ii K_jj)"
         if one_sided(K):
-            more = (
-                ": only a triangle is there. Write both, or in a format that says that one is meant for both"
-            )
-        allowed = f"K must be symmetric, both within {SYMMETRY:g} √(K_ii K_jj){more}"
+            allowed += ": only a triangle is there; write both, or in a format that says that K is symmetric"
         values = [float(K[i, j]), float(K[j, i])]
         faults.append(Fault(str(where), f"{entry(i, j)} and {entry(j, i)}", values, allowed))
     if 0 < len(held) < K.shape[0]:

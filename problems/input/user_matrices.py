@@ -115,7 +115,7 @@ def checked(
 
     refuse((key, key, None, "is missing") for key in "KAfg" if key not in data)
     refuse(_wrong_kinds(data))
-    K, A = (sp.csr_array(data[key], dtype=float) for key in "KA")
+    K, A = (sp.csr_array(data[key], dtype=float, copy=True) for key in "KA")
     f, g = (np.asarray(data[key], dtype=float).ravel() for key in "fg")
     nodes = np.asarray(data["nodes"], dtype=float) if "nodes" in data else None
     refuse([("K", "K.shape", K.shape, "at least one unknown")] if K.shape[0] == 0 else [])
@@ -129,7 +129,7 @@ def checked(
     skew = abs(K - K.T).max()
     notes = []
     if strays:
-        notes.append(f"Of the file, {', '.join(strays)} was not read: a problem is K, A, f, g and nodes")
+        notes.append(f"Not read: {', '.join(strays)}; a problem is K, A, f, g and nodes")
     if rounded := [key for key in "KAfg" if not _fits(data[key])]:
         notes.append(f"Numbers of {', '.join(rounded)} that float64 cannot hold were rounded to the nearest")
     if skew:

@@ -172,7 +172,7 @@ def test_files_of_a_folder_and_of_other_formats_are_not_named_alike() -> None:
 def test_arrays_beside_a_problem_are_refused_or_said() -> None:
     problem = {"K": K, "A": np.eye(2, 1), "f": np.ones(2), "g": np.ones(1)}
     np.savez("mine.npz", **problem, x=np.ones(2), title="mine")
-    assert "x was not read" in read_matrices({"problem": Path("mine.npz")})[0].notes[0]
+    assert "Not read: x;" in read_matrices({"problem": Path("mine.npz")})[0].notes[0]
     np.savez("mine.npz", **problem, lb=np.zeros(2), ub=np.ones(2))
     with pytest.raises(InputError, match=r"lb = .* a bound is a column of A") as error:
         read_matrices({"problem": Path("mine.npz")})
