@@ -208,7 +208,7 @@ def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[st
     faults += [Fault(files, name, None, "is in none of the files") for name in "KAfg" if name not in data]
     if faults:
         raise InputError(faults)
-    return data, origin, rows
+    return data, origin, "" if origin["A"] == origin["f"] == origin["K"] else rows
 
 
 def _of_problem(faults: list[Fault], path: Path, names: Sequence[str]) -> list[str]:

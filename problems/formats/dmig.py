@@ -161,10 +161,12 @@ def _fields(text: str) -> list[list[tuple[int, str]]]:
     inside = False
     for number, line in enumerate(text.split("\n"), start=1):
         line = line.partition("$")[0].expandtabs().rstrip()
+        if not line:
+            continue
         words = line.split(",") if "," in line else [line[:8]]
         begins = words[0].strip().upper() in ("DMIG", "DMIG*")
-        inside = begins or not line or (inside and line[0] in " +*,")
-        if not inside or not line:
+        inside = begins or (inside and line[0] in " +*,")
+        if not inside:
             continue
         count = 4 if "*" in words[0] else 8
         if len(words) == 1:
