@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.placement.candidates import Movable, Place, Plan, grid, plan_of
-from harness.placement.search import Search, Step
+from harness.placement.candidates import ROWS, Movable, Place, Plan, grid, plan_of
+from harness.placement.search import Search, Step, onto
 from harness.placement.session import Outcome, PlanSession, Question, Study
 from problems.forms.assembly import Matrix
 from problems.load_cases.random_gaps import random_gaps
@@ -130,6 +130,17 @@ def bisected(plans: Sequence[Plan], search: Search) -> list[Step]:
     return tried
 
 
+def uniform(search: Search) -> list[Step]:
+    """The holes nearest to uniform patterns: of each number of rows by bisection."""
+    holes = search.candidates
+    return [
+        step
+        for rows in ROWS
+        for sizes in [range(1, len(holes) // rows + 1)]
+        for step in bisected([onto(plan_of(grid(search.bare, rows, k)), holes) for k in sizes], search)
+    ]
+
+
 def at_random(search: Search, ask: Counted, candidates: Plan, limit: float, budget: int) -> Step:
     """Random plans, each of one fastener less than the smallest so far that keeps the limit."""
     random, best = np.random.default_rng(0), search.whole(candidates)
@@ -166,7 +177,7 @@ def compared(name: str, scatter: str) -> tuple[list[dict[str, Any]], list[dict[s
 
     (best,) = timed("removal and exchange", lambda: [searched(search)])
     budget = ask.count
-    timed("uniform patterns", search.uniform)
+    timed("uniform patterns", lambda: uniform(search))
     far = farthest_plans(candidates, distances(session, candidates))
     timed("farthest points", lambda: bisected(far, search))
     timed("greedy adding", lambda: [added(search, candidates, limit)])

@@ -67,10 +67,8 @@ class Goal:
         """c, of so many fresh cases; -1 if they cannot show the share."""
         from scipy.stats import binom
 
-        q = 1 - self.share
-        return (
-            bisect_left(range(cases), True, key=lambda c: binom.cdf(c, cases, q) > alpha / 2) - 1 if q else 0
-        )
+        shown = binom.cdf(range(cases), cases, 1 - self.share) <= alpha / 2
+        return int(shown.sum()) - 1 if self.share < 1 else 0
 
 
 @dataclass(frozen=True)
@@ -167,20 +165,17 @@ def decided(
 
 
 def searched(search: Search, own: Plan, goal: Goal) -> tuple[list[Step], Step]:
-    """All candidates, the scene's own plan, uniform patterns, removal and exchange; and the best."""
+    """All candidates, the scene's own plan, removal and exchange, uniform plans of as many; and the best."""
     steps = [search.whole(search.candidates, "all candidates")]
     if own != search.candidates:
         steps.append(search.whole(own, "own"))
-    if goal.count is None:
-        if steps[0].gap_mm > search.limit_mm:
-            return steps, steps[0]
-        best, way = search.fewest(steps[0])
-        return [*steps, *way, *search.uniform()], best
-    more = len(search.candidates) - goal.count
-    if comb(len(search.candidates), more) <= PLANS:
-        best = search.best_of_all(steps[0], goal.count)
-    else:
-        before: Values = {}
-        steps += list(islice(search.removal(steps[0], before), more - 1))
-        best, _ = search.fewer(steps[-1], before, every=True)
-    return [*steps, best, *search.wholes(search.even(goal.count), "uniform")], best
+    best, before = steps[0], Values()
+    if goal.count is None and best.gap_mm <= search.limit_mm:
+        best, way = search.fewest(best)
+        steps += way
+    elif goal.count is not None and comb(len(search.candidates), goal.count) <= PLANS:
+        steps.append(best := search.best_of_all(best, goal.count))
+    elif goal.count is not None:
+        steps += islice(search.removal(best, before), len(best.plan) - goal.count - 1)
+        steps.append(best := search.fewer(steps[-1], before, every=True)[0])
+    return [*steps, *search.wholes(search.even(len(best.plan)), "uniform")], best

@@ -22,7 +22,6 @@ from each.
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -32,7 +31,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from harness.placement.candidates import ROWS, Place, Plan, grid, plan_of, uniform_plans
+from harness.placement.candidates import Place, Plan, uniform_plans
 from harness.placement.session import Outcome, Question
 from problems.forms.assembly import Matrix
 from problems.model.scene import JointScene
@@ -122,27 +121,9 @@ class Search:
             for each in zip(*found, strict=True)
         ]
 
-    def uniform(self) -> list[Step]:
-        """Plans in the holes nearest to uniform patterns, tried to find the fewest fasteners: of each number
-        of rows the most columns, then by bisection, as if gaps shrank with more of them.
-        """
-        tried: list[Step] = []
-
-        def enough(columns: int) -> bool:
-            pattern = plan_of(grid(self.bare, rows, columns))
-            tried.append(self.whole(onto(pattern, self.candidates), "uniform"))
-            return tried[-1].gap_mm <= self.limit_mm
-
-        fewest = len(self.candidates) + 1
-        for rows in ROWS:
-            most = (fewest - 1) // rows
-            if most and enough(most):
-                fewest = rows * (1 + bisect_left(range(1, most), True, key=enough))
-        return tried
-
     def even(self, count: int) -> list[Plan]:
         """The holes nearest to uniform patterns of so many fasteners."""
-        return [onto(plan, self.candidates) for plan in uniform_plans(self.bare, count)]
+        return list(dict.fromkeys(onto(plan, self.candidates) for plan in uniform_plans(self.bare, count)))
 
     def fewest(self, start: Step) -> tuple[Step, list[Step]]:
         """The smallest plan found that keeps the limit, as `start`, all candidates, does; all on the way."""

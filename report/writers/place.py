@@ -76,7 +76,8 @@ def _families(record: dict[str, Any], steps: pd.DataFrame) -> Table:
             own = own[(own["fasteners"] == record["count"]) | (name in ("own", "all candidates"))]
         kept = own if record["count"] else own[own["gap_mm"] <= limit]
         if len(own):
-            line = (kept if len(kept) else own.tail(1)).iloc[0]
+            most = own[own["fasteners"] == own["fasteners"].max()]
+            line = (kept if len(kept) else most).iloc[0]
             lines.append({"family": text, **line[["fasteners", "gap_mm"]], "kept": line["gap_mm"] <= limit})
     columns = [word("plan", "family"), number("fasteners", "fasteners", whole), number("gap, mm", "gap_mm")]
     if record["limit_mm"] is not None:
