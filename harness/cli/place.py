@@ -68,6 +68,7 @@ def place(
         from harness.planning.form_choice import chosen_form
         from harness.results.atomic_output import refuse_inputs
         from harness.scene.allowed_gap import refuse_unusable
+        from harness.scene.validate import print_unusual
         from harness.series.given import RANDOM, GivenCases
         from harness.terminal.console import waiting
         from problems.build import load_case
@@ -103,6 +104,7 @@ def place(
             return Listed((load_case(of, choice.form),)) if one else given.of(of, choice.form)
 
         bare = cases_of(movable.bare)
+        print_unusual(movable.bare, console, bare.notes)
         share = share if share is not None else (1.0 if bare.count == 1 else 0.95)
         study = Study(movable.bare, movable.fastener, bare, choice.form)
         facts = {"solver_version": made.version, "solver_code": made.code}

@@ -99,6 +99,7 @@ def series(
         from harness.planning.form_choice import chosen_form
         from harness.results.series_file import read_facts
         from harness.scene.allowed_gap import refuse_unusable, show_series
+        from harness.scene.validate import print_unusual
         from harness.series.given import RANDOM, GivenCases
         from harness.series.run import run
         from harness.series.session import Job
@@ -132,6 +133,7 @@ def series(
             console.print(f"In the sparse form, without condensation: {choice.why}.", style="dim")
         taken: Any = choice.form
         chosen: LoadCases = swept(read, sweep, taken) if sweep else given.of(read, taken)
+        print_unusual(read, console, chosen.notes)
         limits = time_limit, memory_limit
         threads = threads or threads_per_worker(scheduler) or (1 if taken == "sparse" else 2)
         job = Job(read, chosen, solver, taken, tolerance, limit, check, threads, {}, plugin, *limits)

@@ -11,6 +11,7 @@ import numpy as np
 from problems.effects.fasteners import Fasteners
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix
+from problems.input.scan_points import crowded
 from problems.input.tables import read_columns
 from problems.model.effect import SpringEffect
 from problems.model.positions import MOST
@@ -93,8 +94,7 @@ def movable_fasteners(scene: Scene) -> list[Fasteners]:
 
 
 def _twice(points: Matrix, source: str) -> list[Fault]:
-    places, counts = np.unique(points.round(DIGITS), axis=0, return_counts=True)
-    return [Fault(source, "x, y", place.tolist(), "is there twice") for place in places[counts > 1]]
+    return [Fault(source, "x, y", points[k].tolist(), "is there twice") for _, k in crowded(points)]
 
 
 def plan_of(points: Matrix) -> Plan:

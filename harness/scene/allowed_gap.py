@@ -64,6 +64,8 @@ def show(check: dict[str, Any], gap: Vector, nodes: Vector | None, console: Cons
     near = ""
     if (grid := check.get("closer_than_grid_mm")) is not None:
         near = f". This is closer to the limit than the grid can tell, about {grid:.1g} mm"
+    if "beyond_scan" in check:
+        near += f". {check['beyond_scan']}"
     if not contacts:
         said = f"no gap is larger than {allowed:g} mm; the largest is {largest:.3g} mm{near}"
         return _passed(said, console)

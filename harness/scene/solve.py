@@ -30,6 +30,7 @@ from harness.terminal import DONE, FAILED
 from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
+from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Vector
@@ -96,7 +97,8 @@ def solve(
         check = allowed_gap.checked(allow_gap_mm, found.gap, uncertainty, record["pairs"])
         if grid is not None and abs(check["largest_mm"] - allow_gap_mm) <= grid.error_mm:
             check["closer_than_grid_mm"] = grid.error_mm
-        record["allowed_gap"] = check
+        beyond = _beyond_scan(scene, check["contacts"])
+        record["allowed_gap"] = check | ({"beyond_scan": beyond} if beyond else {})
     code = DONE if record["verdict"] == "within" else FAILED
     if allow_gap_mm is not None:
         code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
@@ -110,6 +112,18 @@ def solve(
         write_record(new, record)  # with the files that were added
     console.print(f"{time.perf_counter() - started:.1f} s in all. Answer: {written}")
     return code
+
+
+def _beyond_scan(scene: Scene, contacts: list[int]) -> str:
+    """How many of these contacts, and of all, are beyond the points of a measured gap; empty if none is."""
+    if not isinstance(scene, JointScene):
+        return ""
+    beyond = [effect.beyond(scene.joint) > 0 for effect in scene.effects_of(MeasuredGap)]
+    if not (some := np.any(beyond, axis=0)).any():
+        return ""
+    return f"{some.sum()} of {some.size} contacts are beyond the measured points" + (
+        f", {some[contacts].sum()} of those that exceed" if contacts else ""
+    )
 
 
 def _arrays(found: Solution) -> dict[str, Any]:

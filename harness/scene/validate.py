@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Sequence
 
 import scipy.sparse as sp
 from rich.console import Console
@@ -94,9 +95,9 @@ def _superelements(scene: JointScene, console: Console) -> None:
     _matrices(scene, console)
 
 
-def print_unusual(scene: Scene, console: Console) -> None:
-    """Print what may be, but is rarely meant."""
-    for sentence in scene.unusual if isinstance(scene, JointScene) else ():
+def print_unusual(scene: Scene, console: Console, notes: Sequence[str] = ()) -> None:
+    """Print what may be, but is rarely meant. notes : on load cases."""
+    for sentence in (*(scene.unusual if isinstance(scene, JointScene) else ()), *notes):
         console.print(Text(f"{sentence}.", style="yellow"))
 
 

@@ -1,13 +1,13 @@
 """Holding clamps: each presses the parts together over a round pad."""
 
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Positive
-from problems.model.effect import ContactEffect, Pair, pressing_forces, sides
+from problems.model.effect import Pair, pressing_forces, sides
 from problems.model.interface import AnyJoint
 from problems.model.positions import Positions
 
@@ -17,13 +17,14 @@ _INSIDE = np.array([(x, y) for x in _AXIS for y in _AXIS if np.hypot(x, y) <= 1]
 DISC = _INSIDE / (2 * _INSIDE.std())
 
 
-class Clamps(Positions, ContactEffect):
+class Clamps(Positions):
     """f += force on the first part of every contact, −= on the second, spread evenly under the pad.
 
     clamping_force in N per clamp, on what both parts have of a disc of `radius` mm around its place:
     on points that share it evenly, each by the weights of the nodes around it.
     """
 
+    in_holes: ClassVar[bool] = False
     clamping_force: Annotated[Positive, "N"]
     radius: Annotated[Positive, "mm"] = 20.0
 

@@ -4,16 +4,16 @@ from typing import Annotated
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Positive
-from problems.model.effect import ContactEffect, pressing_forces
+from problems.model.effect import pressing_forces
 from problems.model.interface import AnyJoint
 from problems.model.positions import Positions
 
 
-class Fasteners(Positions, ContactEffect):
+class Fasteners(Positions):
     """f += preload on the first part of every contact, f −= preload on the second, in N.
 
     A temporary fastener, or a rivet while it is being set: a force, no stiffness. It acts where it is: on the
-    nodes around it, by the weights of its place. Two fasteners at one place add up.
+    nodes around it, by the weights of its place.
     """
 
     preload: Annotated[Positive, "N"]

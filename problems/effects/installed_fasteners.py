@@ -8,13 +8,13 @@ import scipy.sparse as sp
 
 from problems.forms.assembly import Vector
 from problems.input.bounded import Finite, Positive
-from problems.model.effect import ContactEffect, Effect, Pair, SpringEffect, sides
+from problems.model.effect import Effect, Pair, SpringEffect, sides
 from problems.model.interface import AnyJoint, across
 from problems.model.joint import TOOL, Faults
 from problems.model.positions import Positions
 
 
-class InstalledFasteners(Positions, ContactEffect, SpringEffect):
+class InstalledFasteners(Positions, SpringEffect):
     """½ k (x_a − x_b − approach)² for each fastener: K += k t tᵀ, f += k · approach · t, t = w_a − w_b.
 
     stiffness k in N/mm along the fastener's axis; the default is an estimate, EA/L of a 6 mm aluminium
@@ -30,15 +30,6 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
         yield from super().faults(joint, others)
         if joint.pairs and not self.tied(joint):
             yield "between", self.between, "a contact of two parts; a fastener cannot tie a part to the tool"
-        # A hole holds one element: no two ties, nor a tie and a preload, at one place of one contact.
-        mine = _places(self, joint)
-        for other in others:
-            if isinstance(other, Positions):
-                shared = mine & _places(other, joint)
-                crossed = other.pairs(joint) if isinstance(other, ContactEffect) else joint.pairs
-                if shared and set(self.tied(joint)) & set(crossed):
-                    allowed = f"separate places: {other.kind} acts at the same ones"
-                    yield "points", [list(place) for place in sorted(shared)], allowed
 
     def tied(self, joint: AnyJoint) -> list[Pair]:
         return [pair for pair in self.pairs(joint) if pair[1] != TOOL]
@@ -55,8 +46,3 @@ class InstalledFasteners(Positions, ContactEffect, SpringEffect):
     def force(self, joint: AnyJoint) -> Vector:
         T, k = self.springs(joint)
         return T @ (k * self.approach)
-
-
-def _places(given: Positions, joint: AnyJoint) -> set[tuple[float, float]]:
-    """To the nanometre."""
-    return {(x, y) for x, y in given.marks(joint).round(6).tolist()}

@@ -1,24 +1,27 @@
 """Measured gap: values measured at points, interpolated to the contacts."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-from problems.forms.assembly import Vector
+from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite
-from problems.model.effect import ContactEffect, Effect, GapEffect, Pair, at_contacts
+from problems.input.scan_points import crowded, too_small, unlike
+from problems.model.effect import ContactEffect, Effect, GapEffect, at_contacts
 from problems.model.interface import AnyJoint
 from problems.model.joint import Faults
+from problems.model.surface import Triangles
 
 
 class MeasuredGap(ContactEffect, GapEffect):
-    """g += linear interpolation of the points (x, y, gap) in mm, from `file`, a CSV with these columns.
+    """g += interpolation of the points (x, y, gap) in mm, from `file`, a CSV with these columns.
 
-    Linear on the Delaunay triangles of the points; outside their convex hull, the gap of the nearest point.
-    Points may lie outside the junction.
+    Linear on Delaunay's triangles of the points, bilinear on rectangles, the same whatever the order of the
+    points; outside their convex hull, the gap of the nearest point. Points may lie outside the junction.
     """
 
     columns: ClassVar[tuple[str, ...]] = ("x", "y", "gap")
@@ -29,27 +32,38 @@ class MeasuredGap(ContactEffect, GapEffect):
         places = np.array(self.points)[:, :2]
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=1e-9 * np.ptp(places)) < 2:
             yield "points", "all on one line", "at least three points off a line"
-        _, first, count = np.unique(places, axis=0, return_index=True, return_counts=True)
-        for k in first[count > 1]:
-            yield f"points[{k}]", list(self.points[k]), "one gap per point; this point appears twice"
+        for first, k in crowded(places):
+            allowed = f"one gap per point; this point appears twice, see {self.point_name(k)}"
+            yield f"points[{first}]", list(self.points[first]), allowed
         for other in others:
             if isinstance(other, MeasuredGap) and set(self.pairs(joint)) & set(other.pairs(joint)):
                 yield "between", self.between, "one measured_gap per contact: another one covers this contact"
 
     def unusual(self, joint: AnyJoint) -> Faults:
-        if (mean := float(np.mean(self.points, axis=0)[2])) < 0:
+        points = np.array(self.points)
+        if (mean := float(points[:, 2].mean())) < 0:
             yield "points, their mean gap", mean, "0 mm or more: the parts would overlap"
+        for k, usual in unlike(points):
+            yield f"gap, {self.point_name(k)}", self.points[k][2], usual
+        beyond = self.beyond(joint)
+        if count := int((beyond > 0).sum()):
+            value = f"{count} of {len(beyond)}, up to {beyond.max():.4g} mm away"
+            metres = too_small(points[:, :2], joint.bounds)
+            yield "contacts beyond the points", value, f"none: they take the gap of the nearest point{metres}"
+
+    def beyond(self, joint: AnyJoint) -> Vector:
+        """(m,) how far each contact is from the nearest point if it is beyond the points, mm; else 0."""
+        return at_contacts(lambda pair: self._at(joint.places(pair))[1], self.pairs(joint), joint)
 
     def gap(self, joint: AnyJoint) -> Vector:
+        return at_contacts(lambda pair: self._at(joint.places(pair))[0], self.pairs(joint), joint)
+
+    def _at(self, nodes: Matrix) -> tuple[Vector, Vector]:
+        """Gaps, and the distances of `beyond`."""
         points = np.array(self.points)
-        places, values = points[:, :2], points[:, 2]
-        inside, nearest = LinearNDInterpolator(places, values), NearestNDInterpolator(places, values)
-
-        def at(pair: Pair) -> Vector:
-            nodes = joint.places(pair)
-            found = inside(nodes)
-            beyond = np.isnan(found)
-            found[beyond] = nearest(nodes[beyond])
-            return np.asarray(found)
-
-        return at_contacts(at, self.pairs(joint), joint)
+        points = points[np.lexsort(points.T[::-1])]
+        surface = Triangles.of(points[:, :2], holes=False)
+        distance, nearest = surface.tree.query(nodes - surface.middle)
+        W = surface.weights(nodes)
+        outside = W.sum(axis=1) == 0
+        return np.where(outside, points[nearest, 2], W @ points[:, 2]), np.where(outside, distance, 0.0)

@@ -14,6 +14,8 @@ class LoadCases(ABC):
     """Cases 0 … count − 1. Case k depends on k alone: not on `count`, nor on the cases made before it."""
 
     count: int
+    #: Sentences on the input that its user reads before a verdict.
+    notes: tuple[str, ...] = ()
 
     @property
     @abstractmethod

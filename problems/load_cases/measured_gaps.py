@@ -13,6 +13,7 @@ from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded import regular_file
+from problems.input.scan_points import neighbours, outliers
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
 from problems.storage import digest
@@ -37,6 +38,7 @@ class MeasuredGaps(LoadCases):
     gaps: Matrix
     count: int
     numbers: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -80,7 +82,25 @@ def measured_gaps(scene: Scene, path: Path, count: int | None = None, form: Form
         more = len(faults) - MAX_FAULTS
         rest = [Fault(str(path), "cases", f"{more} more", ALLOWED)] if more > 0 else []
         raise InputError(faults[:MAX_FAULTS] + rest)
-    return MeasuredGaps(forces, gaps, len(gaps) if count is None else count)
+    notes = tuple(_unusual(scene, path, gaps[:count]))
+    return MeasuredGaps(forces, gaps, len(gaps) if count is None else count, notes=notes)
+
+
+def _unusual(scene: Scene, path: Path, gaps: Matrix) -> Iterator[str]:
+    """Sentences on gaps that are outliers among those of their case."""
+    joint, near = scene.joint if isinstance(scene, JointScene) else None, None
+    if joint:
+        beside = [joint.span(pair).start + neighbours(joint.places(pair)) for pair in joint.pairs]
+        near = np.concatenate(beside) if len({each.shape[1] for each in beside}) == 1 else None
+    count = 0
+    for k, case in enumerate(gaps):
+        for contact in np.flatnonzero(outliers(np.asarray(case), near)):
+            count += 1
+            if count <= MAX_FAULTS:
+                usual = f"{np.median(case):.3g} mm, the median of the case"
+                yield f"{path}: case {k}, contact {contact} = {case[contact]:g} is unusual; usual is {usual}"
+    if count > MAX_FAULTS:
+        yield f"{path}: {count - MAX_FAULTS} more gaps are unusual"
 
 
 def _faults(path: Path, gaps: Matrix) -> Iterator[Fault]:

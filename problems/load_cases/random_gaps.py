@@ -1,6 +1,6 @@
 """Load cases that differ in a random initial gap."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from problems.model.scene import JointScene, Scene
 from problems.storage import digest
 
 from . import LoadCases
-from .scan import Scan, read_scan
+from .scan import NOISE, Scan, read_scan
 
 #: The bits of a case's seed: integers of this size are exact in every JSON reader.
 SEED_BITS = 53
@@ -40,6 +40,7 @@ class RandomGaps(LoadCases):
     seed: int
     count: int
     points: Matrix | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -55,15 +56,15 @@ class RandomGaps(LoadCases):
         assert self.field.random is not None
         seed, sd = self.parameters(k)["gap_seed"], self.field.random.sd
         field = self.field.model_copy(update={"random": self.field.random.model_copy(update={"seed": seed})})
-        if self._scan is None:
+        if self.scan is None:
             return LoadCase(self.rest.f, self.rest.g + field.gap(self.joint))
-        scan, random = self._scan, np.random.default_rng((seed, 1))
+        scan, random = self.scan, np.random.default_rng((seed, 1))
         through = {pair: scan.through(z, sd, random) for pair, z in field.on_grid(self.joint).items()}
         gap = at_contacts(lambda pair: self.joint.from_grid(pair, through[pair]), list(through), self.joint)
         return LoadCase(self.rest.f, self.rest.g + gap)
 
     @cached_property
-    def _scan(self) -> Scan | None:
+    def scan(self) -> Scan | None:
         if self.points is None:
             return None
         assert self.field.random is not None
@@ -78,7 +79,7 @@ def random_gaps(
     sd: float | None = None,
     correlation_length: float | None = None,
     form: Form = "dual",
-    around: Path | None = None,
+    around: Path | str | None = None,
 ) -> RandomGaps:
     """Cases around the scene's `initial_gap`; mean, sd and correlation_length (mm) override its values.
     Around a measured gap the mean is 0 by default.
@@ -98,11 +99,12 @@ def random_gaps(
         raise InputError.one(where, "initial_gap", f"{len(found)} effects", "at most one can be random")
     table: dict[str, Any] = found[0].model_dump() if found else {"kind": "initial_gap"}
     options = {"mean": mean, "sd": sd, "correlation_length": correlation_length}
-    points = None if around is None else read_scan(around, scene.joint)
+    points, notes = (None, []) if around is None else read_scan(Path(around), scene.joint)
     usual = None if points is None else float(points[:, 2].mean())
     if any(effect.kind == "measured_gap" for effect in scene.effects):
         if around is not None:
-            raise InputError.one(where, "measured_gap", "an effect", f"{around} would be added: give one")
+            allowed = f"remove it: the gaps pass through {around}"
+            raise InputError.one(where, "measured_gap", "an effect of the scene", allowed)
         usual = 0.0
     own = {"mean": table.get("mean", usual)} | (table.get("random") or {})
     given = own | {key: value for key, value in options.items() if value is not None}
@@ -115,4 +117,10 @@ def random_gaps(
     except ValidationError as error:
         raise InputError(list(validation_faults("series", InitialGap, error, "initial_gap"))) from error
     others = [effect for effect in scene.effects if effect not in found]
-    return RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)
+    made = RandomGaps(scene.joint, load_case(scene, form, others), field, seed, cases, points)
+    if made.scan is None:
+        return made
+    missed, about = made.scan.missed(given["mean"]), NOISE * given["sd"]
+    misses = f"their mean misses its points by at most {missed:.1g} mm, a case by about {about:.1g} mm"
+    notes.append(f"The cases pass through {around}: {misses}")
+    return replace(made, notes=tuple(notes))

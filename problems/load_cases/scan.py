@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from problems.effects.initial_gap import square_root
 from problems.errors import Fault, InputError
 from problems.forms.assembly import Matrix, Vector
+from problems.input.scan_points import crowded, too_small, unlike
 from problems.input.tables import read_columns
 from problems.model.interface import AnyJoint
 
@@ -28,19 +29,32 @@ NOISE = 1e-3  # ν
 MOST = 5000  # points of a scan: WCWᵀ is dense
 
 
-def read_scan(path: Path, joint: AnyJoint) -> Matrix:
-    """(s, 3) x, y and gap in mm. Raises InputError with all faults, also of points off the junction."""
+def read_scan(path: Path, joint: AnyJoint) -> tuple[Matrix, list[str]]:
+    """(s, 3) x, y and gap in mm, by x and y; and sentences on what is unusual.
+
+    Raises InputError with all faults, also of points off the junction or at one place.
+    """
     read = read_columns(path, {name: name for name in ("x", "y", "gap")})
     if len(read.rows) > MOST:
         raise InputError.one(path, "points", len(read.rows), f"at most {MOST}: thin the scan out")
-    points = np.array(read.rows).reshape(-1, 3)
+    points, lines = np.array(read.rows).reshape(-1, 3), read.lines
     outside = [
-        Fault(str(path), f"line {read.lines[k]}", points[k, :2].tolist(), joint.region)
+        Fault(str(path), f"line {lines[k]}", points[k, :2].tolist(), joint.region)
         for k in np.flatnonzero(~joint.covers(joint.names, points[:, :2]))
     ]
-    if faults := [*read.faults, *outside]:
+    twice = [
+        Fault(str(path), f"line {lines[k]}", points[k].tolist(), f"one gap per point, see line {lines[i]}")
+        for i, k in crowded(points[:, :2])
+    ]
+    if faults := [*read.faults, *outside, *twice]:
         raise InputError(faults)
-    return points
+    notes = [
+        f"{path}: line {lines[k]}, gap = {points[k, 2]:g} is unusual; usual is {usual}"
+        for k, usual in unlike(points)
+    ]
+    if question := too_small(points[:, :2], joint.bounds):
+        notes.append(f"{path}: the points span {np.ptp(points[:, :2], axis=0).tolist()} mm{question}")
+    return points[np.lexsort(points.T[::-1])], notes
 
 
 @dataclass(frozen=True)
@@ -64,6 +78,10 @@ class Scan:
         spread = (W @ _times(Cx, Cy, W[[k]].toarray()) for k in range(len(points)))
         S = np.array(list(spread)) + NOISE**2 * np.eye(len(points))
         return cls(W, Cx, Cy, sla.cho_factor((S + S.T) / 2), points[:, 2])
+
+    def missed(self, mean: float) -> float:
+        """By how much the mean of the gaps misses the scan at most, mm: of ν²(WCWᵀ + ν²I)⁻¹(d − mean)."""
+        return float(abs(NOISE**2 * sla.cho_solve(self.factor, self.gaps - mean)).max())
 
     def through(self, gap: Matrix, sd: float, random: np.random.Generator) -> Matrix:
         """The random gap of a pair on the grid, mm, made to pass through the scan. sd : σ, mm."""

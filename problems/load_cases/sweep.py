@@ -1,5 +1,6 @@
 """Load cases that step through values of a scene's keys: initial_gap.mean=0.1:1.0:10."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
@@ -42,6 +43,7 @@ class Sweep(LoadCases):
     steps: tuple[Step, ...]
     count: int
     form: Form = "dual"
+    notes: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -81,7 +83,9 @@ def sweep(scene: Scene, texts: Sequence[str], form: Form = "dual") -> Sweep:
     count = prod(len(step.values) for step in steps)
     if count > MOST_CASES:
         raise InputError.one("--sweep", "cases", count, f"at most {MOST_CASES} combinations")
-    return Sweep(scene, steps, count, form)
+    whole = [text.partition("=") for text in texts if re.fullmatch(r"[^=]+=-?\d+,\d+", text)]
+    notes = tuple(f"--sweep {name} has two values, {two}: decimals have a point" for name, _, two in whole)
+    return Sweep(scene, steps, count, form, notes)
 
 
 def effect_name(scene: JointScene, index: int) -> str:

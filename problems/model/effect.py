@@ -23,7 +23,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import scipy.sparse as sp
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from problems.forms.assembly import Matrix, Vector
 
@@ -55,6 +55,11 @@ class Effect(Table):
     #: Of the CSV that a table may name as `file` in place of `points`; none if there is no such file.
     columns: ClassVar[tuple[str, ...]] = ()
     kind: str
+    #: Of each point, the line of its file; empty if they are from a list.
+    _lines: tuple[str, ...] = PrivateAttr(())
+
+    def point_name(self, k: int) -> str:
+        return self._lines[k] if self._lines else f"points[{k}]"
 
     @property
     def contacts(self) -> tuple[Pair, ...]:

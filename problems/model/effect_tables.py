@@ -74,9 +74,15 @@ class EffectTable:
             content["points"] = self.rows.rows
         try:
             self.effect = effect.model_validate(content)
+            if self.rows:
+                self.effect._lines = tuple(f"{self.rows.path.name}, line {line}" for line in self.rows.lines)
         except ValidationError as error:
             for fault in validation_faults(self.where, effect, error, self._name):
-                if not self._is_consequence(fault.key.removeprefix(self._name).lstrip(".")):
+                key = fault.key.removeprefix(self._name).lstrip(".")
+                if self.rows and (row := re.fullmatch(r"points\.(\d+)\.\d+", key)):
+                    line = f"line {self.rows.lines[int(row[1])]}"
+                    yield Fault(str(self.rows.path), line, fault.value, fault.allowed)
+                elif not self._is_consequence(key):
                     yield fault
         yield from self.rows.faults if self.rows else ()
 

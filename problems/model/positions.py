@@ -10,8 +10,9 @@ from pydantic import Field, model_validator
 
 from problems.forms.assembly import Matrix, Vector
 from problems.input.bounded import Finite, NotNegative
+from problems.input.scan_points import crowded
 
-from .effect import Effect, ForceEffect
+from .effect import ContactEffect, Effect, ForceEffect, SpringEffect
 from .interface import AnyJoint
 from .joint import Faults, Table
 
@@ -38,10 +39,11 @@ class Pattern(Table):
         return self
 
 
-class Positions(ForceEffect):
+class Positions(ContactEffect, ForceEffect):
     """Forces at `points`, a list of (x, y) in mm; or `file`, a CSV with columns x and y; or a `pattern`."""
 
     columns: ClassVar[tuple[str, ...]] = ("x", "y")
+    in_holes: ClassVar[bool] = True
     points: Annotated[tuple[tuple[Finite, Finite], ...], "mm"] = ()
     pattern: Pattern | None = None
 
@@ -84,6 +86,16 @@ class Positions(ForceEffect):
         marks = self.marks(joint)
         for k in np.flatnonzero(~joint.covers(self.parts(joint), marks)):
             yield f"points[{k}]" if self.points else "pattern", marks[k].tolist(), joint.region
+        for first, twin in crowded(marks) if self.in_holes and self.points else ():
+            allowed = f"separate places: {self.point_name(first)} is there, too"
+            yield f"points[{twin}]", marks[twin].tolist(), allowed
+        # A hole holds one element: no two fasteners, and nothing else where one is installed.
+        for other in others:
+            alone = isinstance(self, SpringEffect) or (self.in_holes and type(other) is type(self))
+            if alone and isinstance(other, Positions) and set(self.pairs(joint)) & set(other.pairs(joint)):
+                both = crowded(np.vstack([marks, other.marks(joint)]))
+                if shared := [marks[i].tolist() for i, k in both if i < len(marks) <= k]:
+                    yield "points", shared, f"separate places: {other.kind} acts at the same ones"
 
 
 def _spread(size: float, edge: float, count: int) -> Vector:

@@ -105,7 +105,7 @@ class JointScene(Scene):
             f"{where}.{key} = {shown} is unusual; usual is {usual}"
             for where, some in found
             for key, value, usual in some
-            for shown in [value if isinstance(value, list) else f"{value:g}"]
+            for shown in [value if isinstance(value, list | str) else f"{value:g}"]
         ]
 
     def marks(self) -> Matrix:

@@ -81,7 +81,7 @@ def test_a_scan_off_the_junction_or_beside_a_measured_gap(tmp_path: Path) -> Non
         cases(tmp_path, np.zeros((5001, 3)))
     cases(tmp_path)
     measured = MeasuredGap(kind="measured_gap", points=((0, 0, 1), (9, 0, 1), (0, 9, 1)))
-    with pytest.raises(InputError, match=r"scan\.csv would be added"):
+    with pytest.raises(InputError, match="remove it: the gaps pass through"):
         random_gaps(
             make_scene(JOINT, measured), 1, 0, sd=1, correlation_length=9, around=tmp_path / "scan.csv"
         )

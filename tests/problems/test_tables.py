@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 from joints import make_joint, make_scene
 
+from problems.effects.fasteners import Fasteners
+from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
+from problems.input.scan_points import unlike
 from problems.input.tables import read_columns
 from problems.load_cases.measured_gaps import measured_gaps
+from problems.load_cases.random_gaps import random_gaps
+from problems.model.effect_tables import EffectTable
 
 COLUMNS = {name: name for name in ("x", "y", "gap")}
 POINTS = [(0.0, 0.0, 0.1), (2000.0, 0.0, 0.9), (1250.0, 300.0, 0.5)]
@@ -114,3 +119,103 @@ def test_gaps_that_may_be_something_else(text: str, words: str, tmp_path: Path) 
     (tmp_path / "g.csv").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
         measured_gaps(make_scene(JOINT), tmp_path / "g.csv")
+
+
+SCENE = make_scene(JOINT)
+EDGES = [(50.0 * x, 30.0 * y) for y in range(5) for x in range(9)]
+
+
+def measured(*points: tuple[float, float, float]) -> MeasuredGap:
+    return MeasuredGap(kind="measured_gap", points=points)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_order_of_a_scan_changes_no_bit(seed: int) -> None:
+    """Of points on circles, on a grid and at random; the first are ones whose diagonal had been arbitrary."""
+    random = np.random.default_rng(seed)
+    places = [[(-100, -100), (200, -100), (200, 150), (-100, 150)], EDGES, random.uniform(-50, 420, (99, 2))]
+    for points in [np.column_stack([each, random.uniform(0.1, 0.9, len(each))]) for each in places]:
+        gaps = {
+            measured(*points[order].tolist()).gap(JOINT).tobytes()
+            for order in [np.arange(len(points)), *(random.permutation(len(points)) for _ in range(5))]
+        }
+        assert len(gaps) == 1
+
+
+def scan(values: dict[int, float]) -> list[tuple[float, float, float]]:
+    return [(x, y, values.get(k, 0.3 + 0.01 * (7 * k % 5 - 2))) for k, (x, y) in enumerate(EDGES)]
+
+
+@pytest.mark.parametrize("mark", [9999.0, -9999.0, 32767.0, 1e15, -1.0, -999.0, 9.99])
+@pytest.mark.parametrize("where", [(4,), (0, 44), (10, 11, 12, 15)])
+def test_marks_of_nothing_are_named_on_all_roads(mark: float, where: tuple[int, ...], tmp_path: Path) -> None:
+    points = scan(dict.fromkeys(where, mark))
+    text = "x,y,gap\n" + "".join(f"{x},{y},{gap!r}\n" for x, y, gap in points)
+    (tmp_path / "scan.csv").write_text(text)
+    table = EffectTable(tmp_path / "scene.toml", 0, {"kind": "measured_gap", "file": "scan.csv"})
+    assert list(table.read()) == []
+    around = random_gaps(
+        SCENE, 1, 0, sd=0.1, correlation_length=90.0, around=str(tmp_path / "scan.csv")
+    ).notes
+    joint = make_joint(PART, PART | {"name": "b"}, nodes=(9, 5))
+    np.savetxt(tmp_path / "gaps.csv", [[gap for *_, gap in points]], delimiter=",")
+    effect = make_scene(JOINT, table.effect).unusual
+    for k in where:
+        assert [f"line {k + 2}" in " ".join(said) for said in (effect, around)] == [True, True]
+    assert sum(", line " in said for said in effect) == len(where)
+    said = measured_gaps(make_scene(joint), tmp_path / "gaps.csv").notes
+    assert [f"contact {k} = {mark:g}" in line for k, line in zip(where, said, strict=True)] == [True] * len(
+        where
+    )
+
+
+@pytest.mark.parametrize("kind", ["rough", "step", "bump", "plane", "constant"])
+def test_a_measured_gap_is_named_as_nothing_rarely(kind: str) -> None:
+    random, alarms = np.random.default_rng(3), 0
+    for _ in range(3):
+        x, y = random.uniform([[0], [0]], [[2000], [600]], (2, 5000))
+        gap = {
+            "rough": random.normal(0.3, 0.2, 5000),
+            "step": np.where(x > 900, 0.9, 0.1) + random.normal(0, 0.01, 5000),
+            "bump": 0.1 + 2 * np.exp(-((x - 900) ** 2 + (y - 300) ** 2) / 2e4),
+            "plane": 0.001 * x + 0.002 * y,
+            "constant": np.full(5000, 0.3),
+        }[kind]
+        alarms += len(list(unlike(np.column_stack([x, y, gap]))))
+    assert alarms <= 2
+
+
+@pytest.mark.parametrize("near", [0.0, 1e-3])
+def test_two_gaps_or_fasteners_at_one_place_are_refused(near: float, tmp_path: Path) -> None:
+    points = ((0.0, 0.0, 0.1), (100.0, 50.0, 0.3), (near, 0.0, 0.7), (400.0, 0.0, 0.1))
+    (key, *_), *rest = measured(*points).faults(JOINT)
+    assert (key, rest) == ("points[0]", [])
+    (tmp_path / "scan.csv").write_text("x,y,gap\n" + "".join(f"{x},{y},{gap}\n" for x, y, gap in points))
+    with pytest.raises(InputError, match=r"line 4 .* one gap per point, see line 2"):
+        random_gaps(SCENE, 1, 0, sd=0.1, correlation_length=90.0, around=str(tmp_path / "scan.csv"))
+    holes = {"kind": "fasteners", "preload": 1.0, "points": ((9.0, 9.0), (9.0, 9.0 + near), (50.0, 50.0))}
+    assert [key for key, *_ in Fasteners(**holes).faults(JOINT)] == ["points[1]"]
+    one, other = (Fasteners(**holes | {"points": ((9.0, y),)}) for y in (9.0, 9.0 + near))
+    assert [key for key, *_ in one.faults(JOINT, [other])] == ["points"]
+
+
+def test_contacts_beyond_a_scan_are_counted() -> None:
+    """A scan of the western half; one in metres; one that is elsewhere."""
+    half = [(x / 2, y, gap) for x, y, gap in scan({})]
+    (said,) = make_scene(JOINT, measured(*half)).unusual
+    assert "3 of 9, up to 200 mm away" in said
+    (metres,) = make_scene(JOINT, measured(*((x / 1e3, y / 1e3, gap) for x, y, gap in half))).unusual
+    assert "8 of 9, " in metres
+    assert "in metres?" in metres
+    (away,) = make_scene(JOINT, measured(*((x + 12000, y, gap) for x, y, gap in half))).unusual
+    assert "9 of 9, up to 1.2e+04 mm away" in away
+
+
+def test_lines_above_a_table_are_skipped(tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text("x,y,gap\nnot these\nx,y,gap\n0,0,1\n9,0,1\n0,9,9999\n0,9,1\n")
+    table = {"kind": "measured_gap", "file": "scan.csv", "skip_lines": 2, "missing": [9999]}
+    read = EffectTable(tmp_path / "scene.toml", 0, table)
+    assert (list(read.read()), len(read.effect.points)) == ([], 3)
+    for key, wrong in (("skip_lines", -1), ("missing", 9999)):
+        (fault,) = EffectTable(tmp_path / "scene.toml", 0, table | {key: wrong}).read()
+        assert fault.key == f"effect[0] (measured_gap).{key}"

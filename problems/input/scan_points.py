@@ -1,0 +1,81 @@
+"""Points of a scan: two at one place, and gaps that are hardly measured ones.
+
+A gap is an outlier by one of these rules, in mm, with s = 1.4826 · median |gap − median|:
+
+    far      it is more than 20 s + 5 from the median
+    alone    of nine points or more: fewer than two of its eight nearest have a gap within max(20 d, 3 q, 0.3)
+             of its own: q is the distance of their quartiles, d the median over all points of the distance
+             from the gap to that of the eight which is second closest to it
+    below    it is negative, and it and its equals are more than 2 s + 0.1 below all others
+
+Marks of a scanner that saw nothing are of these kinds: 9999, 32767, 1e30, −1. Noise, steps, pockets and bumps
+that several points show are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from problems.forms.assembly import Indices, Mask, Matrix, Vector
+
+CLOSE = 0.01  # mm: points that are closer are at one place
+NEAR, ALIKE = 8, 2
+SPREADS, QUARTILES, ALONE, BELOW, FAR = 20.0, 3.0, 0.3, 0.1, 5.0
+MAD = 1.4826  # of a normal distribution: σ / median |z|
+SMALL = 0.02  # of the joint's size
+SHOWN = 10
+
+
+def crowded(points: Matrix) -> list[tuple[int, int]]:
+    """The pairs (i, k), i < k, of points (n, 2) that are at one place."""
+    from scipy.spatial import cKDTree
+
+    return sorted(cKDTree(points).query_pairs(CLOSE))
+
+
+def neighbours(points: Matrix) -> Indices:
+    """(n, 8 or fewer) the nearest other points of each of the points (n, 2)."""
+    from scipy.spatial import cKDTree
+
+    count = min(NEAR + 1, len(points))
+    return np.asarray(cKDTree(points).query(points, count)[1]).reshape(len(points), count)[:, 1:]
+
+
+def outliers(gaps: Vector, near: Indices | None = None) -> Mask:
+    """(n,) which gaps are. near : `neighbours` of their points; without them `alone` is not tested."""
+    middle = np.median(gaps)
+    s = MAD * np.median(abs(gaps - middle))
+    found = abs(gaps - middle) > SPREADS * s + FAR
+    least, others = gaps.min(), gaps[gaps > gaps.min()]
+    if least < 0 and len(others) and others.min() - least > 2 * s + BELOW:
+        found |= gaps == least
+    if near is not None and near.shape[1] == NEAR:
+        beside = gaps[near]
+        second = np.partition(abs(beside - gaps[:, None]), ALIKE - 1, axis=1)[:, ALIKE - 1]
+        low, high = np.quantile(beside, [0.25, 0.75], axis=1)
+        reach = np.maximum(QUARTILES * (high - low), max(SPREADS * np.median(second), ALONE))
+        found |= second > reach
+    return found
+
+
+def unlike(points: Matrix) -> Iterator[tuple[int, str]]:
+    """Of the points (n, 3), x, y and gap, those that are no measured ones, and what is usual."""
+    if len(points) < 3:
+        return
+    near = neighbours(points[:, :2])
+    found = outliers(points[:, 2], near)
+    apart = np.linalg.norm(points[near[:, 0], :2] - points[:, :2], axis=1)
+    found |= (points == 0).all(axis=1) & (apart > QUARTILES * np.median(apart))
+    where = np.flatnonzero(found)
+    for k in where[:SHOWN]:
+        last = len(where) > SHOWN and k == where[SHOWN - 1]
+        more = f"; {len(where) - SHOWN} more points are unusual" if last else ""
+        yield int(k), f"{np.median(points[near[k], 2]):.3g} mm as around it{more}"
+
+
+def too_small(points: Matrix, bounds: Matrix) -> str:
+    """A question, if the points (n, 2) span a small part of the joint within its bounds (2, 2)."""
+    small = (np.ptp(points, axis=0) < SMALL * np.ptp(bounds, axis=0)).all()
+    return ". Are x and y of the points in metres?" if small else ""
