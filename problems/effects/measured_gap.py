@@ -47,9 +47,9 @@ class MeasuredGap(ContactEffect, GapEffect):
             yield f"gap, {self.point_name(k)}", self.points[k][2], usual
         beyond = self.beyond(joint)
         if count := int((beyond > 0).sum()):
-            value = f"{count} of {len(beyond)}, up to {beyond.max():.4g} mm away"
             metres = too_small(points[:, :2], joint.bounds)
-            yield "contacts beyond the points", value, f"none: they take the gap of the nearest point{metres}"
+            value = f"{count} of {len(beyond)}, up to {beyond.max():.4g} mm away{metres}"
+            yield "contacts beyond the points", value, "none: they take the gap of the nearest point"
 
     def beyond(self, joint: AnyJoint) -> Vector:
         """(m,) how far each contact is from the nearest point if it is beyond the points, mm; else 0."""

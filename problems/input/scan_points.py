@@ -78,4 +78,4 @@ def unlike(points: Matrix) -> Iterator[tuple[int, str]]:
 def too_small(points: Matrix, bounds: Matrix) -> str:
     """A question, if the points (n, 2) span a small part of the joint within its bounds (2, 2)."""
     small = (np.ptp(points, axis=0) < SMALL * np.ptp(bounds, axis=0)).all()
-    return ". Are x and y of the points in metres?" if small else ""
+    return " (are x and y of the points in metres?)" if small else ""
