@@ -30,7 +30,6 @@ from .text_files import read_text
 CSV_MIB = 100
 MAX_FAULTS = 10  # reported one by one; the rest are counted
 NO_UNIT = {"": Fraction(1), "-": Fraction(1)}
-FORCES = NO_UNIT | {"n": Fraction(1), "kn": Fraction(1000)}
 LENGTHS = NO_UNIT | {
     unit: Fraction(mm)
     for names, mm in {
@@ -47,8 +46,8 @@ LENGTHS = NO_UNIT | {
     for unit in names.split()
 }
 #: Of columns that are no lengths, by name.
-UNITS = {"lam": FORCES} | dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT)
-BARE = "|".join(sorted({*LENGTHS, *FORCES} - {*NO_UNIT, '"'}, key=len, reverse=True))
+UNITS = dict.fromkeys(("id", "nx", "ny", "nz", "contact"), NO_UNIT)
+BARE = "|".join(sorted({*LENGTHS} - {*NO_UNIT, '"'}, key=len, reverse=True))
 HEADING = re.compile(rf"(.*?)(?:\s*[\[({{]\s*(.*?)\s*[\])}}]|[\s_/,:-]+(?:in\s+)?({BARE}))")
 PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 APART = ".,' \u2019\u00a0\u2009\u202f"  # what may part thousands
@@ -117,7 +116,6 @@ class Cells:
 def read_columns(
     path: Path,
     headings: Mapping[str, str],
-    mib: float = CSV_MIB,
     skip_lines: int = 0,
     missing: Iterable[float | str] = (),
 ) -> Rows:
@@ -127,7 +125,7 @@ def read_columns(
     """
     read = Rows(path)
     try:
-        table = Cells.of(path, mib, [heading(text)[0] for text in headings.values()], skip_lines)
+        table = Cells.of(path, CSV_MIB, [heading(text)[0] for text in headings.values()], skip_lines)
         _read(table, headings, [str(mark).strip().lower() for mark in missing], read)
     except InputError as error:
         read.faults.extend(error.faults)
@@ -153,7 +151,8 @@ def _read(table: Cells, headings: Mapping[str, str], missing: list[str], read: R
         texts = [cells[k] if k < len(cells) else "" for k in columns]
         row = [_plain(text).strip("[](){} ") for text in texts] if below else []
         if any(row) and all(unit in scale for unit, scale in zip(row, scales, strict=True)):
-            units = [new if old in ("", new) else old + new for old, new in zip(units, row, strict=True)]
+            both = zip(units, row, strict=True)
+            units = [new if old in ("", new) else f"{old}, {new}" for old, new in both]
             continue
         for unit, scale in zip(units, scales, strict=True):
             if unit not in scale:
@@ -223,7 +222,7 @@ def heading(cell: str) -> tuple[str, str]:
     if not (parts := HEADING.fullmatch(text)) or not parts[1]:
         return text, ""
     unit = parts[2] or parts[3] or ""
-    return (parts[1] if unit in LENGTHS | FORCES else text), unit
+    return (parts[1] if unit in LENGTHS else text), unit
 
 
 def _plain(cell: str) -> str:

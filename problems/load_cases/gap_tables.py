@@ -19,7 +19,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.input.tables import LENGTHS, Cells, doubt, heading, number
 
-COUNTS = {"", "case", "index", "row", "no", "no.", "nr", "nr.", "id"}
+COUNTS = {"", "case", "index", "row", "no", "no.", "nr", "nr.", "id", "unnamed: 0"}
 PLAUSIBLE = 5  # mm: gaps before riveting are smaller
 FIRST = 20  # rows that tell whether the first line is a header
 QUICK = re.compile(r"[-+.\deE]+", re.ASCII)
@@ -83,6 +83,7 @@ def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
 
 def _unit(path: Path, names: list[str]) -> str:
     """The unit of the headings. Raises InputError if they have several, or one that is no length."""
+    names = [f"gap [{name}]" if name.lower() in LENGTHS else name for name in names]
     units = sorted({heading(name)[1] for name in names} - {"", "-"})
     if len(units) > 1 or any(unit not in LENGTHS for unit in units):
         allowed = f"one unit of length: {', '.join(filter(None, LENGTHS))}"

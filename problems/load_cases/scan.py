@@ -52,8 +52,8 @@ def read_scan(path: Path, joint: AnyJoint) -> tuple[Matrix, list[str]]:
         f"{path}: line {lines[k]}, gap = {points[k, 2]:g} is unusual; usual is {usual}"
         for k, usual in unlike(points)
     ]
-    if question := too_small(points[:, :2], joint.bounds):
-        notes.append(f"{path}: the points span {np.ptp(points[:, :2], axis=0).tolist()} mm{question}")
+    if len(points) > 2 and (question := too_small(points[:, :2], joint.bounds)):
+        notes.append(f"{path}: the points span a small part of the junction{question}")
     return points[np.lexsort(points.T[::-1])], notes
 
 
@@ -79,9 +79,12 @@ class Scan:
         S = np.array(list(spread)) + NOISE**2 * np.eye(len(points))
         return cls(W, Cx, Cy, sla.cho_factor((S + S.T) / 2), points[:, 2])
 
-    def missed(self, mean: float) -> float:
-        """By how much the mean of the gaps misses the scan at most, mm: of ν²(WCWᵀ + ν²I)⁻¹(d − mean)."""
-        return float(abs(NOISE**2 * sla.cho_solve(self.factor, self.gaps - mean)).max())
+    def mean_says(self, mean: float) -> str:
+        """How the mean of all cases, m + CWᵀ(WCWᵀ + ν²I)⁻¹(d − m), misses the scan, and its range."""
+        y = sla.cho_solve(self.factor, self.gaps - mean)
+        between = mean + _times(self.Cx, self.Cy, self.W.T @ y)
+        low, high, missed = between.min(), between.max(), abs(NOISE**2 * y).max()
+        return f"misses its points by at most {missed:.1g} mm and is {low:.3g} to {high:.3g} mm"
 
     def through(self, gap: Matrix, sd: float, random: np.random.Generator) -> Matrix:
         """The random gap of a pair on the grid, mm, made to pass through the scan. sd : σ, mm."""
