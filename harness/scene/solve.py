@@ -30,11 +30,10 @@ from harness.terminal import DONE, FAILED
 from harness.verification.assess import GapError
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import UNPROVEN
-from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Assembly, Vector
-from problems.model.effect import Effect, ForceEffect, SpringEffect
+from problems.model.effect import Effect, ForceEffect, GapEffect, SpringEffect
 from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.positions import FORCES
@@ -118,7 +117,7 @@ def _beyond_scan(scene: Scene, contacts: list[int]) -> str:
     """How many of these contacts, and of all, are beyond the points of a measured gap; empty if none is."""
     if not isinstance(scene, JointScene):
         return ""
-    beyond = [effect.beyond(scene.joint) > 0 for effect in scene.effects_of(MeasuredGap)]
+    beyond = [effect.beyond(scene.joint) > 0 for effect in scene.effects_of(GapEffect)]
     if not (some := np.any(beyond, axis=0)).any():
         return ""
     return f"{some.sum()} of {some.size} contacts are beyond the measured points" + (
@@ -163,6 +162,7 @@ def _record(found: Solution, built: list[str], solver: str | None) -> dict[str, 
         "closest_mm": found.closest_mm,
         "error_bound_mm": known.bound_mm,
         "route": known.route,
+        "unusual": scene.unusual if isinstance(scene, JointScene) else [],
         **layout(scene, data.assembly),
         "fasteners": fastener_forces(scene, found.x),
         "digits": digits_sentence(problem)[0] if _is_given(scene) else None,

@@ -52,7 +52,6 @@ class MeasuredGap(ContactEffect, GapEffect):
             yield "contacts beyond the points", value, "none: they take the gap of the nearest point"
 
     def beyond(self, joint: AnyJoint) -> Vector:
-        """(m,) how far each contact is from the nearest point if it is beyond the points, mm; else 0."""
         return at_contacts(lambda pair: self._at(joint.places(pair))[1], self.pairs(joint), joint)
 
     def gap(self, joint: AnyJoint) -> Vector:

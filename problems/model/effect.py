@@ -161,6 +161,10 @@ class GapEffect(Effect):
     def gap(self, joint: AnyJoint) -> Vector:
         """(m,) gap in mm."""
 
+    def beyond(self, joint: AnyJoint) -> Vector:
+        """(m,) how far each contact is from the nearest measured point if it is beyond these, mm; else 0."""
+        return np.zeros(joint.size[1])
+
 
 class SpringEffect(ForceEffect):
     """Adds springs between parts at points of the junction: K += T diag(k) Tᵀ, after condensation."""

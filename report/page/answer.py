@@ -38,6 +38,7 @@ def facts(record: Data) -> list[list[str]]:
         "error bound, mm": record.get("error_bound_mm"),
         "gaps proven to, mm": (record.get("allowed_gap") or {}).get("uncertainty_mm"),
         "left out by the grid, mm (estimated)": (record.get("grid") or {}).get("error_mm"),
+        "unusual": "; ".join(record.get("unusual", ())) or None,
         "memory, MiB": record.get("peak_rss_mib"),
         **{f"{step}, s": seconds for step, seconds in record.get("steps", {}).items()},
     }
@@ -68,6 +69,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     kinds = {None: ("", "CANNOT BE TOLD"), True: ("fail", "FAIL"), False: ("pass", "PASS")}
     kind, word = kinds[check["exceeded"]]
     near = ", closer to the limit than the grid can tell" if check.get("closer_than_grid_mm") else ""
+    near += f"; {check['beyond_scan']}" if "beyond_scan" in check else ""
     return {"kind": kind, "text": f"{word} at {significant(check['allowed_mm'])} mm: {largest}{near}."}
 
 
