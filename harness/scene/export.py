@@ -149,13 +149,13 @@ def import_(files: list[str], out: Path, console: Console) -> None:
         raise InputError.one("--out", "path", str(out), "must end in .npz, which makes it a scene")
     given = [*map(_source, files)]
     with atomic_output(out, [path for _, path, _ in given]) as new:
-        data, origin, rows = _read_all(given)
+        data, origin, notes = _read_all(given)
         checked(data, {name: str(path) for name, path in origin.items()}, sparse=True)
         formats.FORMATS["npz"].write(new, data | {name: sp.csr_array(data[name]) for name in "KA"})
         problem = _opened(new, origin)
     print_facts(str(out), problem.prepared.assembly, console)
-    if rows:
-        console.print(rows, style="yellow")
+    for note in notes:
+        console.print(note, style="yellow")
     about = ("about ", " in balanced units") if problem.form == "sparse" else ("", "")
     condition = f"{problem.prepared.condition:.1e}".join(about)
     console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
@@ -174,14 +174,15 @@ def _source(text: str) -> tuple[str, Path, str]:
     return name, Path(file), matrix
 
 
-def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[str, Path], str]:
-    """K, A, f, g and perhaps nodes, their files, and a sentence on the rows of a K that has labels.
+def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[str, Path], list[str]]:
+    """K, A, f, g and perhaps nodes, their files, and sentences on what may be meant otherwise.
 
     What is named overrides the rest.
     """
     data: formats.Data = {}
     origin: dict[str, Path] = {}
     faults: list[Fault] = []
+    notes: list[str] = []
     rows = ""
     for named in (False, True):
         of_rank: dict[str, Path] = {}
@@ -204,11 +205,14 @@ def _read_all(given: list[tuple[str, Path, str]]) -> tuple[formats.Data, dict[st
     for name, matrix, axis in (("f", "K", 0), ("g", "A", 1)):
         if name not in data and matrix in data and formats.format_of(origin[matrix]).omits_zeros:
             data[name], origin[name] = np.zeros(data[matrix].shape[axis]), origin[matrix]
+            notes.append(f"{name} is in none of the files: zero, as {origin[matrix]} leaves zeros out.")
     files = ", ".join(str(path) for _, path, _ in given)
     faults += [Fault(files, name, None, "is in none of the files") for name in "KAfg" if name not in data]
     if faults:
         raise InputError(faults)
-    return data, origin, "" if origin["A"] == origin["f"] == origin["K"] else rows
+    if rows and not origin["A"] == origin["f"] == origin["K"]:
+        notes.append(rows)
+    return data, origin, notes
 
 
 def _of_problem(faults: list[Fault], path: Path, names: Sequence[str]) -> list[str]:

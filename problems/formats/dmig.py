@@ -31,6 +31,7 @@ SQUARE, RECTANGULAR, SYMMETRIC, COLUMNS = 1, 2, 6, 9  # forms
 REAL = (1, 2)  # types
 WHOLE = re.compile(r"(\d+)")
 NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([-+]\d+)|[eEdD](\d+))?")
+INCLUDE = re.compile(r"(?mi)^include\b.*$")
 Point = tuple[int, int]
 
 
@@ -127,7 +128,12 @@ def _over(
 def _cards(path: Path) -> dict[str, Cards]:
     """The matrices of a file by their names, in capitals. Raises InputError."""
     matrices: dict[str, Cards] = {}
-    for (line, name), *fields in _fields(read_text(path, "file", MIB)):
+    text = read_text(path, "file", MIB)
+    if included := INCLUDE.search(text):
+        line = text.count("\n", 0, included.start()) + 1
+        allowed = "is not followed: give the file that holds the cards"
+        raise InputError.one(path, f"line {line}", included[0], allowed)
+    for (line, name), *fields in _fields(text):
         name = name.upper()
         point, component, third, *rest = fields
         if point[1] == "0":

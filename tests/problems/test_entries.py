@@ -103,6 +103,7 @@ def test_text_of_any_program(form: str) -> None:
         (b"1,1,4.0\n4,4,3.0\n", "K.mtx", "row 2"),
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,\n,2,,-1\n", "K.pch", "point 2, component 0.*cut off"),
         (b"DMIG,K,0,6,2,0\nDMIG,K,1,,,1,,4,0\n", "K.pch", "line 2 = '0'"),
+        (b"DMIG,K,0,6,2,0\nINCLUDE 'f.pch'\n", "K.pch", "line 2 = .INCLUDE .*not followed"),
         (text("dmig", LOWER) * 2, "K.pch", "line 7, a header of = 'KAA': also in line 2"),
         (b"%%MatrixMarket matrix array real skew-symmetric\n2 2\n1.0\n", "K.mtx", r"= \[-1.0, 1.0\]: K must"),
         (b"%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "K.mtx", "pattern entries"),
@@ -161,6 +162,9 @@ def test_labelled_rows_are_said_and_digits_of_dmig_kept() -> None:
     shown = StringIO()
     import_([f"{name}.mtx" for name in "KAfg"], Path("out.npz"), Console(file=shown, width=200))
     assert "from node 4, dof 2 to node 9, dof 1: those of A and f must, too" in shown.getvalue()
+    formats.FORMATS["dmig"].write(Path("rest.pch"), data | {"K": sp.csr_array(K), "f": np.zeros(2)})
+    import_(["rest.pch"], Path("out.npz"), Console(file=shown, width=200))
+    assert "f is in none of the files: zero, as rest.pch leaves zeros out" in shown.getvalue()
 
 
 def test_files_of_a_folder_and_of_other_formats_are_not_named_alike() -> None:
