@@ -23,7 +23,7 @@ from itertools import count, islice
 from math import ceil, comb, floor, log
 
 from harness.placement.candidates import Plan
-from harness.placement.search import PLANS, Search, Step, Values
+from harness.placement.search import FEW, PLANS, Search, Step, Values
 from problems.errors import InputError
 
 ALPHA = 0.05
@@ -177,5 +177,5 @@ def searched(search: Search, own: Plan, goal: Goal) -> tuple[list[Step], Step]:
         steps.append(best := search.best_of_all(best, goal.count))
     elif goal.count is not None:
         steps += islice(search.removal(best, before), len(best.plan) - goal.count - 1)
-        steps.append(best := search.fewer(steps[-1], before, every=True)[0])
+        steps.append(best := search.fewer(steps[-1], before, every=goal.count <= FEW)[0])
     return [*steps, *search.wholes(search.even(len(best.plan)), "uniform")], best

@@ -16,8 +16,8 @@ be less (the lazy greedy method: Minoux, Optimization Techniques, 234–243, 197
 Exchange moves a fastener to one of the free holes next to where the gap is too large: one of the nearest, or
 of those that are needed least. The best move is made as long as it makes φ less. Of the plan without the
 fastener that is needed least and uniform ones of as many, it starts from the one of least G. Where there are
-few plans of a number of fasteners, all of them are compared instead. Where the number is given, it starts
-from each.
+few plans of a number of fasteners, all of them are compared instead. Where a number of FEW or less is asked
+for, it starts from each.
 """
 
 from __future__ import annotations
@@ -40,13 +40,14 @@ Ask: TypeAlias = Callable[[Sequence[Question]], list[list[Outcome]]]
 Value: TypeAlias = tuple[float, float]
 Values: TypeAlias = dict[Place, Value]
 
-TOGETHER, FEW = 50, 14  # cases of two questions, at most; of estimates
+TOGETHER, ESTIMATED = 50, 14  # cases of two questions, at most; of estimates
 MORE_CASES = 8  # than twice those that may fail, in an estimate: of fewer, a plan's worst may be new ones
 AT_ONCE = 8  # plans that are tried together
 NONE = (0.0, 0.0)  # less than any φ
 HOLES, NEAREST, LEAST = 3, 3, 3  # of an exchange: holes, fasteners near each, fasteners needed least
 SHARE_AT_ONCE = 8  # a plan's share that is taken out at once, as long as that keeps the limit
 NEXT = 3  # a fastener and those next to it
+FEW = 3  # fasteners, for whose number exchange starts from every plan
 PLANS = 300  # that are all compared; after a removal half as many
 FURTHER = 1.25  # times what is enough: how far removal goes on
 DIGITS = 6  # of mm: values closer than a nanometre are equal, whatever the rounding
@@ -245,7 +246,7 @@ class Search:
 
     def _values(self, step: Step, plans: Sequence[Plan], cases: tuple[int, ...] = ()) -> list[Value]:
         """φ of other plans, estimated. cases : those that decide, unless given."""
-        found = self._left(plans, cases or self._deciding(step), FEW, step.plan)
+        found = self._left(plans, cases or self._deciding(step), ESTIMATED, step.plan)
         return [
             (round(max(self.gap(each), self.limit_mm), DIGITS), round(float(np.mean(each.mean)), DIGITS))
             for each in found
