@@ -4,7 +4,7 @@ from the cache.
 
 import time
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -202,7 +202,7 @@ def _fits(given: Any) -> bool:
     return bool(inside.all() and (nearest.astype(values.dtype) == values).all())
 
 
-def refuse_dependent(A: sp.csc_array, where: object) -> None:
+def refuse_dependent(A: sp.csc_array, where: object, name: Callable[[int], str] = "A[:, {}]".format) -> None:
     """Raise InputError naming the first column of A (n, m), none zero, that depends on others before it.
 
     By the pivots of AᵀA = LLᵀ, l_jj² = min_z ‖a_j − Σ_{i<j} z_i a_i‖₂². AᵀA is block diagonal, a block per
@@ -216,10 +216,10 @@ def refuse_dependent(A: sp.csc_array, where: object) -> None:
     before = scaled[:, :first]
     z = abs(spsolve(sp.csc_array(before.T @ before), (before.T @ scaled[:, [first]]).toarray().ravel()))
     others = np.flatnonzero(z > z.max() * SLIGHT).tolist()
-    names = ", ".join(f"A[:, {j}]" for j in others[:SHOWN])
+    names = ", ".join(map(name, others[:SHOWN]))
     more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
     allowed = "must not depend on the columns before it"
-    raise InputError.one(where, f"A[:, {first}]", f"dependent on {names}{more}", allowed)
+    raise InputError.one(where, name(first), f"dependent on {names}{more}", allowed)
 
 
 def _scaled(A: sp.csc_array) -> sp.csc_array:

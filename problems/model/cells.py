@@ -22,6 +22,7 @@ from problems.forms.assembly import Indices, Mask, Matrix, Vector
 
 FLAT = 1e-9  # of its longest edge squared: a triangle without area
 ROUNDING = 1e-3  # rad, by which 90°, or four nodes on one circle, may be missed
+SLIVER = 1e-2  # rad: a triangle with a smaller angle is no half of a rectangle
 BRIDGE, HOLE = 2.5, 2.25  # times the usual distance of neighbours; times the longest edge
 
 
@@ -41,7 +42,8 @@ def cells_of(nodes: Matrix, triangles: Indices, beside: Indices) -> tuple[Indice
     inside = (beside >= 0) & solid[beside] & solid[:, None]
     across = np.where(inside, angle[beside, opposite], 0.0)
     blunt = angle >= np.pi / 2 - ROUNDING
-    alike = inside & (abs(angle + across - np.pi) <= ROUNDING)
+    fat = angle.min(axis=1) > SLIVER
+    alike = inside & fat[:, None] & fat[beside] & (abs(angle + across - np.pi) <= ROUNDING)
     cell, pocket = (_joined(here[each], beside[each], len(here)) for each in (alike, alike | inside & blunt))
 
     near = solid[:, None] & (~inside | ~blunt & (across < np.pi / 2 - ROUNDING))

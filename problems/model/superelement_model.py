@@ -9,10 +9,9 @@ definite.
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -51,22 +50,8 @@ class SuperelementModel:
         assert isinstance(scene.joint, SuperelementJoint)
         model = cls(scene, scene.joint)
         model._refuse_free()
-        try:
-            refuse_dependent(model.A, scene.source_of("A"))
-        except InputError as error:
-            chain = "independent contacts: without this pair, or with other nodes at its place"
-            raise InputError(
-                [replace(fault, **model._named(fault), allowed=chain) for fault in error.faults]
-            ) from None
+        refuse_dependent(model.A, scene.source_of("A"), model.joint.contact_name)
         return model
-
-    def _named(self, fault: Fault) -> dict[str, str]:
-        """The key and the value of a fault, with pair and node for each column of A."""
-
-        def name(column: re.Match[str]) -> str:
-            return self.joint.contact_name(int(column[1]))
-
-        return {key: re.sub(r"A\[:, (\d+)\]", name, str(getattr(fault, key))) for key in ("key", "value")}
 
     @cached_property
     def A(self) -> sp.csc_array:
