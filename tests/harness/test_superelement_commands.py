@@ -80,6 +80,8 @@ def test_solve_writes_pictures_tables_and_forces(folder: Path, tmp_path: Path) -
     done = harness("solve", folder / "edited.toml", "--out", tmp_path / "out", "--allow-gap", 5.0)
     assert done.exit_code == 0, done.output
     assert "What the grid leaves out is not known here" in done.output
+    refined = harness("solve", folder / "edited.toml", "--refine", "--out", tmp_path / "refined")
+    assert refined.exit_code == 2
     record = json.loads((tmp_path / "out" / "solution.json").read_text())
     assert [force["force_N"] for force in record["fasteners"]] == [300.0, 300.0]
     assert record["marks"] == {"fasteners": [[100.0, 60.0], [290.0, 33.0]]}

@@ -156,6 +156,14 @@ def test_nodes_beyond_the_other_part_and_too_far_from_it_are_no_contacts(tmp_pat
     assert "19 (9 mm)" in said
 
 
+def test_a_node_far_from_all_others_is_told(tmp_path: Path) -> None:
+    xyz = NODES.copy()
+    xyz[5] = 9999.0
+    (said,) = scene_from(two(tmp_path, xyz=xyz)).unusual
+    assert "part.b, nodes far from all others = 1" in said
+    assert said.endswith("Ids 6")
+
+
 def test_feet_that_change_places(tmp_path: Path) -> None:
     """Normals that meet before they reach the other part."""
     normals = UP.copy()
