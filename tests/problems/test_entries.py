@@ -72,6 +72,20 @@ def test_both_triangles_one_or_contradictory_ones(form: str, symmetric: bool) ->
 
 
 @pytest.mark.parametrize("form", ["mtx", "dmig", "abaqus", "npz"])
+def test_zeros_that_are_listed_are_read_and_stay_in_the_callers_matrix(form: str) -> None:
+    zeros = [(1, 1, 4.0), (1, 2, 0.0), (2, 1, 0.0), (2, 2, 3.0)]
+    np.testing.assert_array_equal(read(text(form, zeros, symmetric=False), NAMES[form]), np.diag([4.0, 3.0]))
+    M, _ = formats.read_stiffness(Path(NAMES[form]))
+    checked({"K": M, "A": sp.csc_array((2, 0)), "f": np.zeros(2), "g": np.zeros(0)}, {})
+    np.testing.assert_array_equal(sp.coo_array(M).toarray(), np.diag([4.0, 3.0]))
+
+
+def test_a_plus_is_a_sign() -> None:
+    signed = [(i, j, f"{value:+e}") for i, j, value in BOTH]
+    np.testing.assert_array_equal(read(text("mtx", signed, symmetric=False), "K.mtx"), K)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("form", ["mtx", "dmig", "abaqus", "npz"])
 def test_an_entry_that_is_listed_twice_is_refused_with_its_place(form: str) -> None:
     for again in (3.0, 1.0):
         with pytest.raises(InputError, match=r"(line [456].* and .*line [678]|\[1, 1\] and).*listed once"):
