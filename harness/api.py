@@ -10,13 +10,15 @@
 A problem is min ½xᵀKx − fᵀx subject to Aᵀx ≤ g: x (n,) displacements in mm, λ (m,) contact forces in N,
 g (m,) initial gaps in mm, f (n,) loads in N. A `scene` argument is a Scene, the name of a packaged one, the
 path of a .toml or .npz file, or a dict with the content of a scene's file. All faults of an input are in one
-InputError. Matrices are cached as by the command line.
+InputError. Matrices are cached as by the command line. Arrays are copied, and threads take turns
+(solving/turns.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -24,23 +26,24 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from harness.conformance.check import run as check_solver
+from harness.conformance import check
 from harness.planning.form_choice import chosen_form
-from harness.scene.solution import Solution, Source, load_scene, solve, solver_named
+from harness.scene import solution
+from harness.scene.solution import Solution, Source, solver_named
 from harness.series.session import Job, Result, SeriesSession
 from harness.solving.session import forces_of, form_of
+from harness.solving.turns import in_turn
 from harness.verification.judge import LIMIT_MM, Judgement
 from harness.verification.reference_problem import opened
-from problems.build import prepared
 from problems.errors import InputError
 from problems.forms import FORMS, Form
-from problems.forms.assembly import LoadCase, Vector
+from problems.forms.assembly import Assembly, LoadCase, Vector
 from problems.forms.prepared import dual_alone, load_of
 from problems.forms.problem import in_form
 from problems.input.entries import SYMMETRY, contradictions
 from problems.input.user_matrices import SMALL, checked
 from problems.load_cases import Listed, LoadCases
-from problems.load_cases.random_gaps import random_gaps
+from problems.load_cases import random_gaps as random_fields
 from problems.model.scene import ManufacturedProblem, ManufacturedScene, Scene
 from solvers.base import Answer, Solver
 
@@ -64,7 +67,13 @@ __all__ = [
 
 NOT_FINITE = "NaN or infinity"
 
+check_solver = in_turn(check.run)
+load_scene = in_turn(solution.load_scene)
+random_gaps = in_turn(random_fields.random_gaps)
+solve = in_turn(solution.solve)
 
+
+@in_turn
 def own_matrices(
     K: Any, A: Any, f: ArrayLike, g: ArrayLike, nodes: ArrayLike | None = None, title: str = "own matrices"
 ) -> Scene:
@@ -74,13 +83,14 @@ def own_matrices(
     f : (n,) N. g : (m,) mm. nodes : (n, 2) mm, which `newton` uses to number the contacts.
     """
     given = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
-    arrays = {name: M if sp.issparse(M) else np.asarray(M) for name, M in (("K", K), ("A", A))}
+    arrays = {name: M.copy() if sp.issparse(M) else np.array(M) for name, M in (("K", K), ("A", A))}
     arrays |= {name: np.array(value) for name, value in given.items()}
     sparse = sp.issparse(K) and K.shape[0] > SMALL
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)
     return ManufacturedScene.of(title, ManufacturedProblem(assembly, load), title)
 
 
+@in_turn
 def judge(
     scene: Source,
     x: ArrayLike,
@@ -100,6 +110,7 @@ def judge(
     return problem.judged(x, forces, limit_mm)
 
 
+@in_turn
 def solve_dual(
     Q: ArrayLike,
     p: ArrayLike,
@@ -130,6 +141,7 @@ def solve_dual(
     return forces_of(name, chosen, in_form(dual_alone(Q), form), load_of(p), tolerance)
 
 
+@in_turn
 def solve_series(
     scene: Source,
     cases: LoadCases | Iterable[LoadCase],
@@ -143,8 +155,8 @@ def solve_series(
 ) -> Iterator[Result]:
     """Solve load cases on one assembly: in blocks if the solver can, else each from the nearest answer.
 
-    cases : made by `random_gaps` or another file of problems/load_cases; or each a LoadCase(f, g), best with
-        the same array f if the forces are the same.
+    cases : made by `random_gaps` or another file of problems/load_cases; or each a LoadCase(f, g), taken and
+        copied some at a time, so that a generator may have no end and reuse its arrays.
     form : in "sparse", f and the generated cases have all unknowns of the model, and nothing dense is made.
     check : every so many cases are compared with the certified reference; 0: none.
     Yields for each case, in order, its `row` (status, iterations, seconds, residuals, the proven bound_mm,
@@ -153,16 +165,41 @@ def solve_series(
     scene = load_scene(scene)
     name, chosen = solver_named(solver, options)
     taken = form_of(name, chosen.forms, form)
-    assembly = prepared(scene, form=taken).assembly
-    if not isinstance(cases, LoadCases):
-        given = list(cases)
-        f = {id(case.f): _vector(f"case {k}", "f", case.f, assembly.n) for k, case in enumerate(given)}
-        g = [_vector(f"case {k}", "g", case.g, assembly.m) for k, case in enumerate(given)]
-        cases = Listed(tuple(LoadCase(f[id(case.f)], mine) for case, mine in zip(given, g, strict=True)))
+    first = cases if isinstance(cases, LoadCases) else Listed(())
     job = Job(
-        scene, cases, name, taken, tolerance, limit_mm, check, threads=None, options=dict(options or {})
+        scene, first, name, taken, tolerance, limit_mm, check, threads=None, options=dict(options or {})
     )
-    return chain.from_iterable(SeriesSession(job, chosen).solve(range(cases.count)))
+    session = SeriesSession(job, chosen)
+    if isinstance(cases, LoadCases):
+        return _results(session, [cases])
+    copies = _copies(cases, session.data.assembly)
+    return _results(session, _blocks(list(copies) if isinstance(cases, Sequence) else copies, session.block))
+
+
+def _copies(cases: Iterable[LoadCase], assembly: Assembly) -> Iterator[LoadCase]:
+    """With the same array f as the case before if its entries are the same: K⁻¹f is then computed once."""
+    before = np.zeros(0)
+    for k, case in enumerate(cases):
+        f = _vector(f"case {k}", "f", case.f, assembly.n)
+        before = before if np.array_equal(f, before) else f
+        yield LoadCase(before, _vector(f"case {k}", "g", case.g, assembly.m))
+
+
+def _blocks(cases: Iterable[LoadCase], size: int) -> Iterator[LoadCases]:
+    """Cases that are solved together, with their numbers."""
+    cases, first = iter(cases), 0
+    while some := tuple(islice(cases, size)):
+        yield Listed(some, first)
+        first += len(some)
+
+
+def _results(session: SeriesSession, blocks: Iterable[LoadCases]) -> Iterator[Result]:
+    step = in_turn(next)
+    for cases in blocks:
+        session.job = replace(session.job, cases=cases)
+        results = session.solve(range(cases.first, cases.first + cases.count))
+        while some := step(results, None):
+            yield from some
 
 
 def _vector(where: str, name: str, value: ArrayLike, size: int) -> Vector:

@@ -32,19 +32,16 @@ if TYPE_CHECKING:
 DENSEST = 0.25  # of a block's entries: a denser K gains nothing from the sparse form
 SMALL = 200  # unknowns up to which any K is taken
 
-_last: tuple[Scene, Model] | None = None  # of several, only the last one stays in memory
-
 
 def model_of(scene: Scene) -> Model:
-    """The model of a scene, made once for the same scene object."""
-    global _last
-    if _last is None or _last[0] is not scene:
-        if isinstance(scene, JointScene):
-            _last = scene, _of_joint(scene)
-        else:
-            assert isinstance(scene, MatricesScene | ManufacturedScene)
-            _last = scene, GivenModel.of(scene)
-    return _last[1]
+    """The model of a scene; that of a joint is made once and kept by the scene object."""
+    if not isinstance(scene, JointScene):
+        assert isinstance(scene, MatricesScene | ManufacturedScene)
+        return GivenModel(scene)
+    if scene.model is None:
+        object.__setattr__(scene, "model", _of_joint(scene))
+    model: Model = scene.model
+    return model
 
 
 def _of_joint(scene: JointScene) -> JointModel | SuperelementModel:
@@ -81,19 +78,10 @@ class GivenModel:
 
     scene: MatricesScene | ManufacturedScene
 
-    @classmethod
-    def of(cls, scene: MatricesScene | ManufacturedScene) -> GivenModel:
-        """Raises InputError if contacts of a rung depend on one another; a user's are checked when read."""
-        if isinstance(scene, ManufacturedScene):
-            from problems.input.user_matrices import refuse_dependent
-
-            refuse_dependent(scene.made.assembly.A, scene.source_of("A"))
-        return cls(scene)
-
     def sparse(self) -> SparsePrepared:
         """Raises InputError also if K is dense."""
         start, scene = time.perf_counter(), self.scene
-        given, *_ = self._given(sparse=True)
+        given, *_ = self._checked(sparse=True)
         K = given.K.as_sparse(given.nodes)
         for block in K.blocks:
             share = block.matrix.nnz / block.size**2
@@ -106,7 +94,7 @@ class GivenModel:
         return SparsePrepared(replace(given, K=K), key, seconds, scene.source_of, own)
 
     def dense(self, progress: Progress = silent) -> DensePrepared:
-        given, _, seconds, key = self._given(sparse=False)
+        given, _, seconds, key = self._checked(sparse=False)
         K = given.K.as_dense()
         if K is not given.K:
             given = replace(given, K=K, parts=tuple(f"part {k + 1}" for k in range(len(K.blocks))))
@@ -118,6 +106,15 @@ class GivenModel:
     @property
     def built(self) -> bool:
         return self.dense().built
+
+    def _checked(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
+        """Raises InputError if contacts of a rung depend on one another; a user's are checked when read."""
+        given = self._given(sparse)
+        if isinstance(self.scene, ManufacturedScene):
+            from problems.input.user_matrices import refuse_dependent
+
+            refuse_dependent(given[0].A, self.scene.source_of("A"))
+        return given
 
     def _given(self, sparse: bool) -> tuple[Assembly, LoadCase, float, str]:
         """The matrices and loads, the seconds that reading them took, and their key."""

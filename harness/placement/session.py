@@ -19,6 +19,7 @@ import numpy as np
 import threadpoolctl
 
 from harness.placement.candidates import Place, Plan
+from harness.solving.turns import in_turn
 from harness.verification.assess import GapError, assess
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference import proof_of
@@ -136,6 +137,7 @@ class PlanSession:
 _sessions: dict[str, PlanSession] = {}  # the one that this process keeps, so that it opens the assembly once
 
 
+@in_turn
 def answer(task: tuple[Study, Question]) -> list[Outcome]:
     study, question = task
     if study.key not in _sessions:

@@ -22,6 +22,7 @@ from harness.measurement.worker import START_S
 from harness.results.provenance import provenance
 from harness.results.records import Row
 from harness.solving.answers import StoredFiles
+from harness.solving.turns import in_turn
 from harness.verification.reference import proof_of
 from problems.build import prepared
 from problems.errors import Fault, InputError
@@ -114,6 +115,7 @@ def ended(job: Job, case: int, end: Row) -> Row:
     }
 
 
+@in_turn
 def solve_on_worker(task: tuple[Job, Sequence[int]]) -> list[Result]:
     """Cases of a job, in the session that this process keeps for it: each worker opens the assembly once."""
     job, numbers = task

@@ -92,6 +92,7 @@ class SeriesSession:
         self.block_time_s = 0.0 if report else BLOCK_TIME_S
         self.code = provenance()
         self.data: Prepared = prepared(job.scene, form=job.form)
+        self.block = min(BLOCK, max(BLOCK_BYTES // (8 * self.data.assembly.n), 1))
         self.proof = proof_of(self.data)
         self.gap_error = GapError.of(self.data.assembly)
         self.problem = in_form(self.data, job.form)
@@ -110,9 +111,8 @@ class SeriesSession:
 
     def solve(self, numbers: Sequence[int]) -> Iterator[list[Result]]:
         """The results of the cases with these numbers, a block at a time."""
-        size = min(BLOCK, max(BLOCK_BYTES // (8 * self.data.assembly.n), 1))
-        for start in range(0, len(numbers), size):
-            block = numbers[start : start + size]
+        for start in range(0, len(numbers), self.block):
+            block = numbers[start : start + self.block]
             loads = list(zip(block, self.problem.loads([self.job.cases.load(k) for k in block]), strict=True))
             if self.session.batch is not None:
                 yield self._results(self._try_batch(loads))

@@ -11,10 +11,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.solving.session import candidates
 from problems import storage
@@ -49,7 +47,9 @@ def reference_of(
     """The reference of a scene: the answer that it was made from, if any, else that of its load case."""
     made = scene.made if isinstance(scene, ManufacturedScene) else None
     if made is not None and made.x is not None and made.lam is not None:
-        return Reference(made.x, made.lam, made.lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm)
+        return Reference(
+            made.x.copy(), made.lam.copy(), made.lam > 0, 0.0, "chosen, exact", made.unit_mm, made.gap_unit_mm
+        )
     return reference(prepared, load, limit_s, given)
 
 
@@ -67,8 +67,9 @@ def reference(
         return Reference(x, lam, lam > 0, facts["bound_mm"], facts["route"])
     found = best_of_candidates(prepared, load, limit_s, given)
     if found.bound_mm <= REFERENCE_SHARE * LIMIT_MM:  # else another candidate may prove more
-        made: dict[str, NDArray[Any]] = {"x": found.x, "lam": found.lam}
-        storage.store(key, made, {"bound_mm": found.bound_mm, "route": found.route})
+        arrays = {"x": found.x, "lam": found.lam}
+        facts = {"bound_mm": found.bound_mm, "route": found.route}
+        storage.load_or_make(key, lambda: (arrays, facts))  # unless another process was faster
     return found
 
 

@@ -11,11 +11,12 @@ from problems.storage import digest
 
 
 class LoadCases(ABC):
-    """Cases 0 … count − 1. Case k depends on k alone: not on `count`, nor on the cases made before it."""
+    """Cases first … first + count − 1. Case k depends on k alone, not on `count` or the cases before."""
 
     count: int
     #: Sentences on the input that its user reads before a verdict.
     notes: tuple[str, ...] = ()
+    first: int = 0  # the number of the first case
 
     @property
     @abstractmethod
@@ -37,9 +38,10 @@ class LoadCases(ABC):
 
 @dataclass(frozen=True)
 class Listed(LoadCases):
-    """Case k is cases[k]. Cases with the same forces should share the array f: K⁻¹f is then computed once."""
+    """Case first + k is cases[k]. Cases with the same forces should share the array f: K⁻¹f is made once."""
 
     cases: tuple[LoadCase, ...]
+    first: int = 0
 
     @property
     def count(self) -> int:  # type: ignore[override]
@@ -50,4 +52,4 @@ class Listed(LoadCases):
         return digest(*(array.tobytes() for case in self.cases for array in (case.f, case.g)))
 
     def load(self, k: int) -> LoadCase:
-        return self.cases[k]
+        return self.cases[k - self.first]

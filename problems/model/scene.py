@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -70,10 +70,17 @@ class Scene(ABC):
 
 @dataclass(frozen=True)
 class JointScene(Scene):
-    """A joint and the effects that the scene includes."""
+    """A joint and the effects that the scene includes.
+
+    model : see `problems.build.model_of`; neither copied nor sent to a worker.
+    """
 
     joint: AnyJoint
     effects: tuple[Effect, ...] = ()
+    model: Any = field(default=None, init=False, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"model": None}
 
     def effects_of(self, kind: type[E]) -> Iterator[E]:
         """The effects of one class, in the scene's order."""

@@ -1,0 +1,106 @@
+"""Any public function, called from eight threads at once, gives the bits that one thread gives."""
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count, islice
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from long import draws
+from small import make_load, make_prepared
+
+import harness
+from harness import LoadCase
+from problems.forms.prepared import Prepared
+from problems.model.scene import Scene
+from solvers.methods.gi import GoldfarbIdnani
+
+THREADS = 8
+NAMES = ("gallery/three-part-stack", "gallery/heavy-sheet-on-tool")
+
+
+def problem(k: int) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
+    data = make_prepared(k, 4 + k % 3, tools=2)
+    load = make_load(k, data)[1]
+    return data, load, (sp.block_diag(data.assembly.K.matrices), data.assembly.A, load.f, load.g)
+
+
+OWN = [harness.own_matrices(*problem(k)[2]) for k in range(THREADS)]
+JOINT = harness.load_scene("gallery/three-part-stack")  # one object for all threads
+
+
+def series(scene: Scene, cases: Any) -> list[Any]:
+    return [result.gap for result in harness.solve_series(scene, cases)]
+
+
+def cases(k: int) -> list[LoadCase]:
+    return [make_load(10 * k + i, problem(k)[0])[0] for i in range(3)]
+
+
+CALLS: dict[str, Callable[[int], Any]] = {
+    "load_scene": lambda k: harness.load_scene(NAMES[k % len(NAMES)]).key,
+    "own_matrices": lambda k: harness.own_matrices(*problem(k)[2]).key,
+    "solve": lambda k: [(s := harness.solve(harness.own_matrices(*problem(k)[2]))).x, s.lam, s.gap],
+    "solve one object": lambda k: harness.solve(OWN[k % 2], (None, "newton")[k % 2]).x,
+    "solve a joint": lambda k: harness.solve(JOINT, form=("dual", "sparse")[k % 2]).x,
+    "solve by name": lambda k: harness.solve(NAMES[k % len(NAMES)]).x,
+    "judge": lambda k: harness.judge(OWN[k], np.ones(10 + 2 * (k % 3))).displacement_error_mm,
+    "solve_dual": lambda k: harness.solve_dual(problem(k)[0].Q, problem(k)[1].p, ("newton", "gi")[k % 2]).lam,
+    "solve_series": lambda k: series(OWN[k], cases(k)),
+    "solve_series of random gaps": lambda k: series(JOINT, harness.random_gaps(JOINT, 3, seed=k)),
+    "random_gaps": lambda k: harness.random_gaps(JOINT, 2, seed=k).load(1).g,
+    "check_solver": lambda k: list(map(str, harness.check_solver(GoldfarbIdnani, ("dual",)))),
+}
+
+
+def bits(value: Any) -> Any:
+    return [bits(each) for each in value] if isinstance(value, list) else np.asarray(value).tobytes()
+
+
+def endless(data: Prepared, f: np.ndarray, g: np.ndarray) -> Iterator[LoadCase]:
+    """Cases without end, all in the same two arrays."""
+    for k in count():
+        case = make_load(k, data)[0]
+        f[:], g[:] = case.f, case.g
+        yield LoadCase(f, g)
+
+
+def test_a_generator_may_have_no_end_and_reuse_its_arrays() -> None:
+    data, load, own = problem(0)
+    found = harness.solve_series(harness.own_matrices(*own), endless(data, load.f.copy(), load.g.copy()))
+    listed = series(OWN[0], [make_load(k, data)[0] for k in range(70)])
+    some = list(islice(found, 70))
+    assert [result.row["case"] for result in some] == list(range(70))
+    for result, gap in zip(some, listed, strict=True):
+        np.testing.assert_array_equal(result.gap, gap)
+
+
+def test_what_the_caller_owns_is_the_callers() -> None:
+    """Own matrices may be changed afterwards, and an answer may be written to."""
+    K, A, f, g = np.diag([2.0, 4.0]), np.eye(2), np.array([1.0, 1.0]), np.array([0.1, 1.0])
+    scene = harness.own_matrices(K, A, f, g)
+    for array in (K, A, f, g):
+        array[:] = 7.0
+    x = harness.solve(scene).x
+    np.testing.assert_allclose(x, [0.1, 0.25])
+    rung = harness.load_scene("hard/pivoting/murty-08")
+    before = harness.solve(rung).x.copy()
+    harness.solve(rung).x[:] = 7.0
+    np.testing.assert_array_equal(harness.solve("hard/pivoting/murty-08").x, before)
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_threads_get_the_bits_of_one(name: str) -> None:
+    call, rounds = CALLS[name], -(-draws(16, 1000) // THREADS)
+    alone = [bits(call(k)) for k in range(THREADS)]
+    barrier = threading.Barrier(THREADS)
+
+    def hammer(k: int) -> int:
+        barrier.wait()
+        return sum(bits(call((k + i) % THREADS)) != alone[(k + i) % THREADS] for i in range(rounds))
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        assert list(pool.map(hammer, range(THREADS))) == [0] * THREADS
