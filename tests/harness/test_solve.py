@@ -203,7 +203,7 @@ def test_own_matrices_without_coordinates(tmp_path: Path) -> None:
     }
     said = harness("validate", tmp_path / "mine.npz").output
     assert "n = 3, m = 2, blocks of 3" in said
-    assert "seem to have 1 digits" in said
+    assert "seem to have 16 digits" in said
 
 
 def test_a_vtu_file_reads_back(solved: tuple[dict[str, Any], Path], tmp_path: Path) -> None:

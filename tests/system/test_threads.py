@@ -30,6 +30,7 @@ def problem(k: int) -> tuple[Prepared, LoadCase, tuple[Any, ...]]:
 
 OWN = [harness.own_matrices(*problem(k)[2]) for k in range(THREADS)]
 JOINT = harness.load_scene("gallery/three-part-stack")  # one object for all threads
+LAW = {"mean": 0.1, "sd": 0.05, "correlation_length": 300.0}
 
 
 def series(scene: Scene, cases: Any) -> list[Any]:
@@ -50,8 +51,8 @@ CALLS: dict[str, Callable[[int], Any]] = {
     "judge": lambda k: harness.judge(OWN[k], np.ones(10 + 2 * (k % 3))).displacement_error_mm,
     "solve_dual": lambda k: harness.solve_dual(problem(k)[0].Q, problem(k)[1].p, ("newton", "gi")[k % 2]).lam,
     "solve_series": lambda k: series(OWN[k], cases(k)),
-    "solve_series of random gaps": lambda k: series(JOINT, harness.random_gaps(JOINT, 3, seed=k)),
-    "random_gaps": lambda k: harness.random_gaps(JOINT, 2, seed=k).load(1).g,
+    "solve_series of random gaps": lambda k: series(JOINT, harness.random_gaps(JOINT, 3, k, **LAW)),
+    "random_gaps": lambda k: harness.random_gaps(JOINT, 2, k, **LAW).load(1).g,
     "check_solver": lambda k: list(map(str, harness.check_solver(GoldfarbIdnani, ("dual",)))),
 }
 
