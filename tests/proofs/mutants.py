@@ -201,9 +201,20 @@ CHANGES: dict[str, dict[str, tuple[str, ...]]] = {
     "harness/placement/search.py": {
         "reverse=True)[self.allowed]": ("reverse=True)[0]", "reverse=True)[self.allowed + 1]"),
         "set(nearest(step.plan, place, NEXT))": ("set()",),
-        "for plan in even}": ("for plan in []}",),
-        "key=lambda each: (round(each.gap_mm, DIGITS), each.plan)": ("key=lambda each: each.plan",),
+        "for plan in self.even(len(step.plan) - 1)}": ("for plan in []}",),
+        "round(self.gap_mm, DIGITS), self.plan": ("0.0, self.plan",),
         "set(more := self._deciding(after)) <= set(cases)": ("(more := self._deciding(after))",),
+    },
+    "harness/placement/fresh.py": {
+        "(1 - self.share) * cases / 2": ("(1 - self.share) * cases",),
+        "binom.cdf(c, n, q) <= alpha / 2": ("binom.cdf(c, n, q) <= alpha",),
+        "cases, 1 - self.share) <= alpha / 2": ("cases, 1 - self.share) <= alpha",),
+        "ALPHA / 2 ** (len(samples) + 1)": ("ALPHA / 2",),
+    },
+    "problems/input/entries.py": {
+        "SYMMETRY * sizes[i] * sizes[j]": ("SYMMETRY * sizes.max() ** 2",),
+        "if M.nnz < len(values)": ("if False",),
+        "M + sign * M.multiply(alone).T": ("M + sign * M.T",),
     },
     "solvers/algorithms/sweeps.py": {
         "self.A.T @ change.f / self.squares": ("self.A.T @ change.f",),
@@ -247,7 +258,9 @@ TESTS = {
     "problems/stiffness/__init__.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "problems/stiffness/operator.py": ("proofs/test_definite.py", "proofs/test_proof.py"),
     "harness/placement/session.py": ("harness/test_place.py",),
-    "harness/placement/search.py": ("harness/test_place.py",),
+    "harness/placement/search.py": ("harness/test_search.py", "harness/test_place.py"),
+    "harness/placement/fresh.py": ("harness/test_place.py",),
+    "problems/input/entries.py": ("problems/test_entries.py", "problems/test_formats.py"),
     "solvers/algorithms/sweeps.py": (
         "solvers/test_sweeps.py",
         "problems/test_outside.py",
