@@ -19,7 +19,7 @@ from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Vector
 from problems.input.bounded import regular_file
-from problems.input.tables import Cells, doubt, number
+from problems.input.tables import Cells, doubt, is_stray, number
 
 MIB = 1024
 #: The names of displacements and of contact forces.
@@ -135,7 +135,7 @@ def _columns(path: Path) -> dict[str, Vector]:
     """The columns of HEADINGS in a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
     table = Cells.of(path, MIB, ())
     rows = table.rows()
-    header = next(rows, (0, []))[1]
+    header = [cell.lstrip("# ") for cell in next(rows, (0, []))[1]]
     names = [name for known in HEADINGS.values() for name in known if name in header]
     if twice := [name for name in names if header.count(name) > 1]:
         raise InputError.one(path, "names", twice, "each heading once")
@@ -144,7 +144,7 @@ def _columns(path: Path) -> dict[str, Vector]:
     for line, cells in rows:
         texts = [cells[k] if k < len(cells) else "" for k in at]
         read.append([number(text, mark)[0] for text in texts])
-        if any(cells[len(header) :]) or not np.isfinite(read[-1]).all():
+        if is_stray(header, cells) or not np.isfinite(read[-1]).all():
             allowed = (
                 doubt(texts, mark) or f"every cell must be a finite number, one for each heading; {ALLOWED}"
             )

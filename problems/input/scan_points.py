@@ -67,7 +67,8 @@ def unlike(points: Matrix) -> Iterator[tuple[int, str]]:
     near = neighbours(points[:, :2])
     found = outliers(points[:, 2], near)
     apart = np.linalg.norm(points[near[:, 0], :2] - points[:, :2], axis=1)
-    found |= (points == 0).all(axis=1) & (apart > QUARTILES * np.median(apart))
+    beside, far = points[near, 2], apart > QUARTILES * np.median(apart)
+    found |= (points == 0).all(axis=1) & (far | (beside.min(axis=1) > 0) | (beside.max(axis=1) < 0))
     where = np.flatnonzero(found)
     for k in where[:SHOWN]:
         last = len(where) > SHOWN and k == where[SHOWN - 1]

@@ -1,8 +1,9 @@
 """Tables of numbers from any program: CSV files, all read by the same rules.
 
     separator   what the header has of ; tab and comma, in this order, or what a line sep=; says
-    header      the first line that has the headings; what is above it is skipped, as are empty lines and
-                lines that begin with #
+    header      the first line that has the headings; what is above it is skipped, as are empty lines
+    comments    lines of one cell that begins with # and a blank
+    stray       nothing stands under an empty heading but in the first column, an index
     unit        mm, unless a heading ends in another one or a row of units follows: converted
     decimal     one mark a file: that of the first number which can be read in one way only; without such a
                 number the point, if commas separate the cells
@@ -20,11 +21,12 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 
 from problems.errors import Fault, InputError
 
+from .bounded import LARGEST
 from .text_files import read_text
 
 CSV_MIB = 100
@@ -53,6 +55,7 @@ PLAIN = re.compile(r"[+-]?(?:\d+(?:([.,])\d*)?|([.,])\d+)(?:e[+-]?\d+)?", re.ASC
 APART = ".,' \u2019\u00a0\u2009\u202f"  # what may part thousands
 GROUPS = re.compile(rf"[+-]?[1-9]\d{{0,2}}([{APART}])\d{{3}}(?:\1\d{{3}})*(?:(?!\1)([.,])\d+)?", re.ASCII)
 OTHER = {".": ",", ",": "."}
+STRAY = "no more cells than headings, and none under an empty heading"
 
 
 @dataclass(frozen=True)
@@ -96,8 +99,8 @@ class Cells:
         reader = csv.reader(islice(self.text, self.start, None), delimiter=self.delimiter)
         try:
             for cells in reader:
-                if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
-                    texts = [cell.strip().replace("\u2212", "-") for cell in cells]
+                texts = [cell.strip().replace("\u2212", "-") for cell in cells]
+                if any(texts) and not (texts[0].split()[:1] == ["#"] and not any(texts[1:])):
                     yield self.start + reader.line_num, texts
         except csv.Error as error:
             raise InputError.one(self.path, "file", str(error), "a readable CSV file") from error
@@ -163,14 +166,16 @@ def _read(table: Cells, headings: Mapping[str, str], missing: list[str], read: R
         if texts[-1].lower() in missing or numbers[-1][0] in marks:
             continue
         fault = ""
-        if any(cells[len(names) :]):  # 0,5 would be two cells
-            fault = "no more cells than headings"
-        elif not all(math.isfinite(value) for value, _ in numbers):
-            fault = doubt(texts, mark) or f"a finite number in each of the columns {listed}"
+        if is_stray(names, cells):
+            fault = STRAY
+        elif not all(abs(value) <= LARGEST for value, _ in numbers):
+            fault = doubt(texts, mark) or f"a finite number up to {LARGEST:g} in each column: {listed}"
         elif any(new and old and new != old for (_, new), old in zip(numbers, seen, strict=True)):
             fault = "thousands written alike in the whole column"
         if fault:
             read.faults.append(Fault(str(table.path), f"line {line}", table.delimiter.join(cells), fault))
+            if fault == STRAY and not read.rows:
+                return
             continue
         seen = [old or new for (_, new), old in zip(numbers, seen, strict=True)]
         factors = [scale[unit] for unit, scale in zip(units, scales, strict=True)]
@@ -179,6 +184,11 @@ def _read(table: Cells, headings: Mapping[str, str], missing: list[str], read: R
         read.lines.append(line)
     if not read.rows and not read.faults:
         read.faults.append(Fault(str(table.path), "rows", 0, "at least one row below the header"))
+
+
+def is_stray(names: Sequence[str], cells: Sequence[str]) -> bool:
+    """Whether a cell stands under no heading: 0,5 would be two cells. The first column may be an index."""
+    return any(cell and not name for name, cell in list(zip_longest(names, cells, fillvalue=""))[1:])
 
 
 def headings(path: Path, wanted: Iterable[str] = ("id", "x", "y", "z")) -> list[str]:

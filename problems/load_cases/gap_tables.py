@@ -1,9 +1,8 @@
 """Tables of gaps as CSV: one row per case, one column per contact, by the rules of problems/input/tables.py.
 
-A first line is a header if it has no number, or if it counts: three or more whole numbers without a decimal
-mark, each one more than the one before. Other whole numbers, all different, may be names of nodes: they are
-refused above rows with decimal marks. A first column that counts its rows, or whose heading says so, is left
-out.
+A header has no number, or counts the contacts from 0 or 1 in whole numbers; titles above it are skipped.
+Other whole numbers in the first line, or large ones below a header, are refused: they may be names of nodes,
+or parts of decimal numbers. A first column that counts its rows, or whose heading says so, is left out.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from problems.errors import InputError
 from problems.forms.assembly import Matrix, Vector
 from problems.input.tables import LENGTHS, Cells, doubt, heading, number
 
-COUNTS = {"", "case", "index", "row", "no", "no.", "nr", "nr.", "id", "unnamed: 0"}
+COUNTS = {"", "case", "name", "index", "row", "no", "no.", "nr", "nr.", "id", "unnamed: 0"}
 PLAUSIBLE = 5  # mm: gaps before riveting are smaller
 FIRST = 20  # rows that tell whether the first line is a header
 QUICK = re.compile(r"[-+.\deE]+", re.ASCII)
@@ -32,17 +31,14 @@ def read_gaps(path: Path, m: int, mib: float) -> Matrix:
     first = list(islice(rows, FIRST))
     names = _header(path, first, m)
     unit = LENGTHS[_unit(path, names)]
-    mark, ends = table.decimal_mark(range(2 * m + 2)), True
-    values = []
-    for line, cells in chain(first, rows):
-        values.append(_numbers(path, line, cells, mark))
-        ends = ends and not cells[-1]
-        if len(cells) != len(values[0]):
-            allowed = f"{len(values[0])} cells, as in the first row"
+    mark, values = table.decimal_mark(range(2 * m + 2)), []
+    for line, row in chain(first, rows):
+        cells = _trimmed(row, m)
+        values.append(_numbers(path, line, cells, mark, m))
+        if len(cells) < len(names) or len(cells) != len(values[0]):
+            allowed = f"{max(len(values[0]), len(names))} cells, as in the first row"
             raise InputError.one(path, f"line {line}, cells", len(cells), allowed)
     gaps = np.array(values).reshape(len(values), -1) if values else np.empty((0, 0))
-    if ends and gaps.shape[1] > m:
-        gaps = gaps[:, :-1]
     if gaps.shape[1] == m + 1:
         counting = len(gaps) > 1 and (np.diff(gaps[:, 0]) == 1).all() and not gaps[0, 0] % 1
         if counting or (len(names) == m + 1 and names[0].lower() in COUNTS):
@@ -50,35 +46,46 @@ def read_gaps(path: Path, m: int, mib: float) -> Matrix:
     return gaps * unit.numerator / unit.denominator
 
 
-def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
-    """The header, taken from the first rows with a row of units below it, which is added to the names."""
-    if not rows:
-        return []
-    line, cells = rows[0]
+def _trimmed(cells: list[str], m: int) -> list[str]:
+    """The cells without empty ones at the end, but m of them."""
     while len(cells) > m and not cells[-1]:
         cells = cells[:-1]
-    labels, others = cells[-m:], [cell for _, row in rows[1:] for cell in row]
-    if all(isnan(number(label, mark)[0]) for label in labels for mark in ".,"):
-        del rows[0]
-        if rows and all(text.strip("[]() ").lower() in LENGTHS for text in rows[0][1]) and any(rows[0][1]):
-            _, units = rows.pop(0)
-            return [f"{cell} [{unit.strip('[]() ')}]" for cell, unit in zip(cells, units, strict=False)]
-        return cells
-    if (
-        len(labels) < m
-        or not all(label.isascii() and label.isdigit() for label in labels)
-        or len({*labels}) < len(labels)
+    return cells
+
+
+def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
+    """The header, taken from the first rows with a row of units below it, which is added to the names."""
+    names: list[str] = []
+    while (
+        rows and not names and all(isnan(number(cell, mark)[0]) for cell in rows[0][1][-m:] for mark in ".,")
     ):
-        return []
-    numbers, fractions = [int(label) for label in labels], any("." in cell or "," in cell for cell in others)
-    counts = numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-    if counts and len(numbers) > 2:
+        cells = [cell.lstrip("# ") for cell in _trimmed(rows.pop(0)[1], m)]
+        names = cells if len(cells) >= m else []
+    if (
+        names
+        and rows
+        and any(rows[0][1])
+        and all(cell.strip("[]() ").lower() in LENGTHS for cell in rows[0][1])
+    ):
+        _, units = rows.pop(0)
+        names = [f"{cell} [{unit.strip('[]() ')}]" for cell, unit in zip(names, units, strict=False)]
+    numbers = [int(digits[-1]) for name in names[-m:] if (digits := re.findall(r"\d+", name))]
+    counts = [list(range(m)), list(range(1, m + 1))]
+    if sorted(numbers) in counts and numbers not in counts:
+        allowed = f"columns of the contacts 0 to {m - 1} in this order"
+        raise InputError.one(path, "header", ", ".join(names), allowed)
+    line, cells = (rows[0][0], _trimmed(rows[0][1], m)) if rows else (0, [])
+    labels = [number(cell, ".")[0] for cell in cells[-m:]]
+    whole = len(labels) == m and all(cell.isascii() and cell.isdigit() for cell in cells[-m:])
+    counting = m > 2 and not names and labels in counts
+    fractions = any({*cell} & {*".,"} for _, row in rows[1:] for cell in row)
+    if counting and whole and fractions:
         del rows[0]
         return cells
-    if others and (fractions or max(numbers) > PLAUSIBLE):
-        allowed = "a header or gaps? Delete a header; write gaps with a decimal mark, as 1.0"
-        raise InputError.one(path, f"line {line}", ", ".join(labels[:5]), allowed)
-    return []
+    if counting or (whole and (not names or (fractions and max(labels) > PLAUSIBLE))):
+        allowed = "a header or gaps? Delete a header; write one of letters above gaps, with decimal marks"
+        raise InputError.one(path, f"line {line}", ", ".join(cells[:5]), allowed)
+    return names
 
 
 def _unit(path: Path, names: list[str]) -> str:
@@ -91,12 +98,16 @@ def _unit(path: Path, names: list[str]) -> str:
     return units[0] if units else ""
 
 
-def _numbers(path: Path, line: int, cells: list[str], mark: str) -> Vector:
+def _numbers(path: Path, line: int, cells: list[str], mark: str, m: int) -> Vector:
+    """The numbers of a row. Raises InputError if one of the last m is none."""
     if mark == "." and QUICK.fullmatch("".join(cells)):
         try:
             return np.array(list(map(float, cells)))
         except ValueError:
             pass
-    if wrong := doubt(cells, mark):
-        raise InputError.one(path, f"line {line}", ", ".join(cells)[:80], wrong)
-    return np.array([number(cell, mark)[0] for cell in cells])
+    values = np.array([number(cell, mark)[0] for cell in cells])
+    wrong = doubt(cells, mark)
+    if wrong or np.isnan(values[-m:]).any():
+        allowed = wrong or "a finite number in each cell"
+        raise InputError.one(path, f"line {line}", ", ".join(cells)[:80], allowed)
+    return values

@@ -31,6 +31,7 @@ READ = {
     "Greek mu": "x [cm],y/mm,gap_\u03bcm\n0,0,100\n200,0,900\n125,300,500\n",
     "a row of units": "x,y,gap\nm,mm,um\n0,0,100\n2,0,900\n1.25,300,500\n",
     "missing": "x,y,gap\n0,0,0.1\n5,5,9999\n2000,0,0.9\n6,6,NaN\n1250,300,0.5\n7,7,\n8,8,-1\n",
+    "names that begin with #": "name,x,y,gap\n#1,0,0,.1\n#2,2000,0,.9\n# 3,1250,300,.5\n",
     "minus": "x;y;gap\n0;0;.1\n2000;\u22120;.9\n1250;300;.5\n",
 }
 BLANKS = READ["blanks and apostrophes"].replace("1\u202f250", "1'250")
@@ -53,6 +54,13 @@ def test_the_same_points(name: str, tmp_path: Path) -> None:
         ("x;y;gap\n1 250;0;0,5\n1.250;0;1\n", "line 3", "thousands written alike"),
         ("x\ty\tgap\n0\t0\t0,5\n1\t1\t0.5\n", "line 3", "',' as the decimal mark"),
         ("x,y,gap\n0,0,1\n0,1,2,5\n", "line 3", "no more cells"),
+        ("x,y,gap\n0,1,2,5\n0,1,2,5\n", "line 2", "no more cells"),
+        ("x,y,gap,\n0,0,0,5\n1,0,0,7\n", "line 2", "none under an empty heading"),
+        ("x,y,,gap\n0,0,0,5\n1,0,0,7\n", "line 2", "none under an empty heading"),
+        ("x,y,gap,\n0,1200,2300,.4,\n1,1220,2300,.3,\n", "line 2", "none under an empty heading"),
+        ("x,y,gap\n0,0,1\n#N/A,3,.2\n# a b\n", "line 3", "a finite number"),
+        ("x,y,gap\n0,0,1\n#N/A,#N/A,#N/A\n", "line 3", "a finite number"),
+        ("x,y,gap\n0,0,1\n1,0,1e36\n", "line 3", "a finite number up to 1e+15"),
         ("x,y,gap [px]\n0,0,1\n", "line 1", "x, y, gap"),
         ("x,y,gap\n0,0,1 mm\n", "line 2", "a finite number"),
         *(
@@ -86,8 +94,9 @@ ROW = ",".join(["0.25"] * 9)
 GAPS = {
     "counted from 0": "0,1,2,3,4,5,6,7,8\n",
     "counted from 1": "1,2,3,4,5,6,7,8,9\n",
-    "nodes": "101,102,103,104,105,106,107,108,109\n",
+    "names below a title": "Inspection report 7\na,b,c,d,e,f,g,h,i\n",
     "names": "a,b,c,d,e,f,g,h,9 mm\n",
+    "a comment": ",".join(["# gap", *"bcdefghi"]) + "\n",
     "micrometres": ",".join(f"c{k} [\u00b5m]" for k in range(9)) + "\n",
 }
 
@@ -96,7 +105,7 @@ GAPS = {
 @pytest.mark.parametrize("index", [False, True])
 @pytest.mark.parametrize("german", [False, True])
 def test_a_header_is_no_case(name: str, index: bool, german: bool, tmp_path: Path) -> None:
-    row = ROW.replace("0.25", "250.0") if name == "micrometres" else ROW
+    row = ROW.replace("0.25", "250") if name == "micrometres" else ROW
     lines = [GAPS[name].strip(), row, row]
     if index:
         lines = [f"{label},{line}" for label, line in zip(["", "0", "1"], lines, strict=True)]
@@ -111,8 +120,15 @@ def test_a_header_is_no_case(name: str, index: bool, german: bool, tmp_path: Pat
     ("text", "words"),
     [
         ("101,205,103,104,105,106,107,108,109\n" + ROW, "line 1 .* a header or gaps"),
+        ("Report 7\n101,102,103,104,105,106,107,108,109\n" + ROW, "line 2 .* a header or gaps"),
+        ("1,2,3,4,5,6,7,8,9\n3,3,2,2,1,1,1,1,1", "line 1 .* a header or gaps"),
+        ("0,1,0,2,0,3,0,4,1", "line 1 .* a header or gaps"),
+        (",".join(f"{k}.0" for k in range(9)) + "\n" + ROW, "line 1 .* a header or gaps"),
+        (",".join(f"c{k}" for k in (2, 1, 0, 3, 4, 5, 6, 7, 8)) + "\n" + ROW, "0 to 8 in this order"),
+        (f"{ROW}\n#N/A{ROW[4:]}", "line 2 .* a finite number"),
+        (f"{ROW}\n{','.join(['#N/A'] * 9)}", "line 2 .* a finite number"),
         (";".join(["1.250"] * 9), "line 1 .* may be 1250"),
-        (",".join(["1_0"] * 8 + ["1.5"]), "contact 0 and 7 more"),
+        (",".join(["1_0"] * 8 + ["1.5"]), "line 1 .* a finite number"),
         (",".join(f"c{k} [px]" for k in range(9)) + "\n" + ROW, "one unit of length"),
         (ROW + ",0.25", r"shape = \(1, 10\)"),
     ],
