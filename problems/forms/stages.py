@@ -3,17 +3,15 @@ first needed, with errors that name the scene.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
 from problems import storage
 from problems.errors import InputError
 from problems.stiffness import dense, operator
-from problems.stiffness.block import NotPositiveDefinite
+from problems.stiffness.block import Block, NotPositiveDefinite
 from problems.stiffness.operator import Stiffness
 from problems.storage import fingerprint
 
@@ -62,8 +60,8 @@ class SparsePrepared(Prepared):
             where = "" if nodes is None else " at ({:g}, {:g}) mm".format(*nodes[error.unknown])
             key, moves = f"x[{error.unknown}]{where}", "moves without a force"
             raise indefinite(self.source_of("K"), key, moves) from error
-        if self.own and (condition := Stiffness(K.blocks).condition(K.units)) > LARGEST_CONDITION:
-            raise indefinite(self.source_of("K"), "cond(K), in balanced units", condition)
+        if self.own:
+            refuse_nearly_singular(K.blocks, self.source_of)
 
 
 class DensePrepared(Prepared):
@@ -75,7 +73,8 @@ class DensePrepared(Prepared):
     before : seconds of the steps before.
     source_of : the origin of "K", for error messages.
 
-    Factors raise InputError if K is not positive definite or its condition number exceeds 1e14.
+    Factors raise InputError if K is not positive definite or, in balanced units, its condition number exceeds
+    1e14.
     """
 
     def __init__(
@@ -137,7 +136,7 @@ class DensePrepared(Prepared):
         spectrum = [block.extreme_eigenvalues() for block in self.blocks]
         least, largest = min(s[0] for s in spectrum), max(s[1] for s in spectrum)
         if largest > LARGEST_CONDITION * least:
-            raise indefinite(self.source_of("K"), "cond(K)", largest / least if least > 0 else np.inf)
+            refuse_nearly_singular(self.blocks, self.source_of)
         facts = {
             "cond_K": largest / least,
             "lambda_min": least,
@@ -152,6 +151,13 @@ class DensePrepared(Prepared):
         start = time.perf_counter()
         Q = self.assembly.K.compliance(self.assembly.A)
         return {"Q": Q}, {"seconds": time.perf_counter() - start}
+
+
+def refuse_nearly_singular(blocks: Sequence[Block], source_of: SourceOf) -> None:
+    """Raise InputError if the condition number of factored blocks exceeds 1e14 in balanced units."""
+    K = Stiffness(blocks)
+    if (condition := K.condition(K.units)) > LARGEST_CONDITION:
+        raise indefinite(source_of("K"), "cond(K), in balanced units", condition)
 
 
 def indefinite(where: object, key: str, value: object) -> InputError:
