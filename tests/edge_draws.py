@@ -259,7 +259,7 @@ def table(
         title = "" if k or index == "unnamed" else index.replace("#", "name")
         if index:
             line.insert(len(line) if index == "remark" else 0, title)
-    if lengths and index not in ("", "not in the heading") and draw.one("columns", "|turned"):
+    if lengths and index not in ("", "unnamed", "not in the heading") and draw.one("columns", "|turned"):
         head, body = [line[::-1] for line in head], [line[::-1] for line in body]
     end = draw.one("trailing", "|rows|all", "heading")
     above = [between.join(line) + between * (end in ("all", "heading")) for line in head if heads]
