@@ -69,7 +69,7 @@ def _plain(path: Path, folder: Path) -> Path:
     """The file, or if it is text, a copy in the folder as pyyeti reads it: with E before each exponent."""
     with path.open("rb") as file:
         start = file.read(4)
-    if 0 in start and not start.startswith((GZIP, *WIDE)):
+    if start.count(0) > 2 and not start.startswith((GZIP, *WIDE)):  # two: UTF-16 without a mark
         return path
     content = read_bytes(path, "file", MIB)
     if 0 in content[:4]:

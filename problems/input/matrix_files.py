@@ -37,7 +37,7 @@ Choose = Callable[[Sequence[str]], Sequence[str]]
 def damage(error: Exception) -> str:
     """What is wrong with a file, in words: without Python's, which a library raises for whatever it meets."""
     plain = isinstance(error, ValueError | OSError | Warning) and not isinstance(error, UnicodeError)
-    if not plain or any(words in str(error) for words in ("invalid literal", "pickled")):
+    if not plain or any(words in str(error) for words in ("invalid literal", "pickled", "itemsize")):
         return "damaged, or of another format"
     return getattr(error, "strerror", None) or str(error)
 

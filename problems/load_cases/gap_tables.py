@@ -56,19 +56,13 @@ def _trimmed(cells: list[str], m: int) -> list[str]:
 def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
     """The header, taken from the first rows with a row of units below it, which is added to the names."""
     names: list[str] = []
-    while (
-        rows and not names and all(isnan(number(cell, mark)[0]) for cell in rows[0][1][-m:] for mark in ".,")
-    ):
+    while rows and not names and not any(_is_number(cell) for cell in rows[0][1][-m:]):
         cells = [cell.lstrip("# ") for cell in _trimmed(rows.pop(0)[1], m)]
         names = cells if len(cells) >= m else []
-    if (
-        names
-        and rows
-        and any(rows[0][1])
-        and all(cell.strip("[]() ").lower() in LENGTHS for cell in rows[0][1])
-    ):
-        _, units = rows.pop(0)
-        names = [f"{cell} [{unit.strip('[]() ')}]" for cell, unit in zip(names, units, strict=False)]
+    units = [cell.strip("[]() ").lower() for cell in rows[0][1]] if names and rows else []
+    if any(units) and LENGTHS.keys() >= {*units}:
+        del rows[0]
+        names = [f"{cell} [{unit}]" for cell, unit in zip(names, units, strict=False)]
     numbers = [int(digits[-1]) for name in names[-m:] if (digits := re.findall(r"\d+", name))]
     counts = [list(range(m)), list(range(1, m + 1))]
     if sorted(numbers) in counts and numbers not in counts:
@@ -86,6 +80,10 @@ def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
         allowed = "a header or gaps? Delete a header; write one of letters above gaps, with decimal marks"
         raise InputError.one(path, f"line {line}", ", ".join(cells[:5]), allowed)
     return names
+
+
+def _is_number(cell: str) -> bool:
+    return not all(isnan(number(cell, mark)[0]) for mark in ".,")
 
 
 def _unit(path: Path, names: list[str]) -> str:
