@@ -8,6 +8,13 @@ times, median over median, has the interval
 
 over the repeats. A side with fewer than three is taken to vary by the factor TIE, as single runs do. With
 three on each side, all of the new ones are slower by chance alone once in 20 times.
+
+The other measurements show how much single runs vary on this machine. Of the ratios r of SEVERAL or more,
+with the median r₀ and the median s of |log r − log r₀|, one is a change beyond
+
+    r₀ exp(5 · 1.4826 s),
+
+so that a machine that was slower, or more restless, in one of the runs is no change of a method.
 """
 
 from __future__ import annotations
@@ -25,6 +32,7 @@ from report.results.rows import cells_of
 from .standings import TIE
 
 ENOUGH = 3  # repeats whose spread says how much times vary
+SEVERAL = 8  # measurements whose ratios say how much single runs vary
 MISSING = "not measured"
 WORSE, CHANGED, BETTER, ADDED, SAME = "worse", "another status", "better", "new", "alike"
 #: The kinds of lines, in their order, and the group of each.
@@ -50,6 +58,7 @@ def compared(
         table["ratio"] = table["seconds_new"] / table["seconds_old"]
         table["ratio_least"] = table["least_s_new"] / table["most_s_old"]
         table["ratio_most"] = table["most_s_new"] / table["least_s_old"]
+        _widen(table)
     else:
         table[["ratio", "ratio_least", "ratio_most"]] = np.nan
     found = [_change(line, max_digits_lost, max_slowdown) for line in table.to_dict("records")]
@@ -72,6 +81,20 @@ def merged(rows: pd.DataFrame) -> pd.DataFrame:
         bound_mm=cells["reference_bound_mm"],
         seconds=cells["load_case_s"],
     )
+
+
+def _widen(table: pd.DataFrame) -> None:
+    """Widen the intervals of single runs to what the ratios of the others are like."""
+    single = table[["repeats_old", "repeats_new"]].min(axis=1) < ENOUGH
+    logs = np.log(table.loc[single, "ratio"].dropna())
+    if len(logs) < SEVERAL:
+        return
+    usual = logs.median()
+    spread = 5 * 1.4826 * (logs - usual).abs().median()
+    ratio = table.loc[single, "ratio"]
+    least, most = ratio / np.exp(spread + max(usual, 0.0)), ratio * np.exp(spread - min(usual, 0.0))
+    table.loc[single, "ratio_least"] = np.minimum(table.loc[single, "ratio_least"], least)
+    table.loc[single, "ratio_most"] = np.maximum(table.loc[single, "ratio_most"], most)
 
 
 def _rank(verdict: str) -> int:

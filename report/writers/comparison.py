@@ -21,7 +21,7 @@ from report.writers.pages import written
 NOTE = (
     "Digits are those of the displacement error, + gained and − lost, above the reference's error bound. A "
     "ratio of times is that of seconds per load case, new over old, with its interval from the repeats; "
-    "fewer than three are taken to vary by 15 %."
+    "fewer than three are taken to vary by 15 %, or as the ratios of the other measurements do."
 )
 #: Columns of the page.
 ON_PAGE = (
