@@ -135,8 +135,10 @@ def _columns(path: Path) -> dict[str, Vector]:
     """The columns of HEADINGS in a CSV file, by the rules of `problems.input.tables`. Raises InputError."""
     table = Cells.of(path, MIB, ())
     rows = table.rows()
-    header = [cell.lstrip("# ") for cell in next(rows, (0, []))[1]]
-    names = [name for known in HEADINGS.values() for name in known if name in header]
+    wanted = [name for names in HEADINGS.values() for name in names]
+    heads = ([cell.lstrip("# ") for cell in cells] for _, cells in rows)
+    header = next((cells for cells in heads if not {*wanted}.isdisjoint(cells)), [])
+    names = [name for name in wanted if name in header]
     if twice := [name for name in names if header.count(name) > 1]:
         raise InputError.one(path, "names", twice, "each heading once")
     at = [header.index(name) for name in names]

@@ -92,7 +92,7 @@ class Cells:
             header = _cells(text[k].lstrip("# "), delimiter)
             if wanted <= {heading(cell)[0] for cell in header}:
                 return cls(path, text, delimiter, header, k + 1)
-        return cls(path, text, said[1] if said else _delimiter(text[first]), [], first + bool(said))
+        return cls(path, text, said[1] if said else _delimiter(text[first]), [], first + 1 if said else skip)
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """The number of each line that has a cell, and its cells. Raises InputError."""

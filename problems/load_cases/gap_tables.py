@@ -56,7 +56,9 @@ def _trimmed(cells: list[str], m: int) -> list[str]:
 def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
     """The header, taken from the first rows with a row of units below it, which is added to the names."""
     names: list[str] = []
-    while rows and not names and not any(_is_number(cell) for cell in rows[0][1][-m:]):
+    while len(rows) > 1 and rows[0][1][0].startswith("# ") and not any(map(_is_number, rows[1][1])):
+        del rows[0]
+    while rows and not names and not any(map(_is_number, rows[0][1][-m:])):
         cells = [cell.lstrip("# ") for cell in _trimmed(rows.pop(0)[1], m)]
         names = cells if len(cells) >= m else []
     units = [cell.strip("[]() ").lower() for cell in rows[0][1]] if names and rows else []

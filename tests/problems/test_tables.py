@@ -96,7 +96,7 @@ GAPS = {
     "counted from 1": "1,2,3,4,5,6,7,8,9\n",
     "names below a title": "Inspection report 7\na,b,c,d,e,f,g,h,i\n",
     "names": "a,b,c,d,e,f,g,h,9 mm\n",
-    "a comment": ",".join(["# gap", *"bcdefghi"]) + "\n",
+    "a comment": "# a, b\n# " + ",".join(f"c{k} [\u00b5m]" for k in range(9)) + "\n",
     "micrometres": ",".join(f"c{k} [\u00b5m]" for k in range(9)) + "\n",
 }
 
@@ -105,10 +105,12 @@ GAPS = {
 @pytest.mark.parametrize("index", [False, True])
 @pytest.mark.parametrize("german", [False, True])
 def test_a_header_is_no_case(name: str, index: bool, german: bool, tmp_path: Path) -> None:
-    row = ROW.replace("0.25", "250") if name == "micrometres" else ROW
-    lines = [GAPS[name].strip(), row, row]
+    row = ROW.replace("0.25", "250") if "\u00b5" in GAPS[name] else ROW
+    lines = [*GAPS[name].strip().split("\n"), row, row]
     if index:
-        lines = [f"{label},{line}" for label, line in zip(["", "0", "1"], lines, strict=True)]
+        lines = [
+            f"{label},{line}" for label, line in zip([*[""] * (len(lines) - 2), "0", "1"], lines, strict=True)
+        ]
     if german:
         lines = ["sep=;", *(line.replace(",", ";").replace(".", ",") + ";" for line in lines)]
     (tmp_path / "g.csv.gz").write_bytes(gzip.compress("\n".join(lines).encode("utf-8-sig")))
