@@ -142,7 +142,7 @@ def _columns(path: Path) -> dict[str, Vector]:
     if twice := [name for name in names if header.count(name) > 1]:
         raise InputError.one(path, "names", twice, "each heading once")
     at = [header.index(name) for name in names]
-    mark, read = table.decimal_mark(at), []
+    mark, read, index = table.decimal_mark(at), [], []
     for line, cells in rows:
         texts = [cells[k] if k < len(cells) else "" for k in at]
         read.append([number(text, mark)[0] for text in texts])
@@ -151,6 +151,10 @@ def _columns(path: Path) -> dict[str, Vector]:
                 doubt(texts, mark) or f"every cell must be a finite number, one for each heading; {ALLOWED}"
             )
             raise InputError.one(path, f"line {line}", table.delimiter.join(cells), allowed)
+        index.append(number(cells[0], mark)[0])
+    ascending = sorted(index)
+    if 0 not in at and index != ascending and (np.diff(ascending) == 1).all():
+        raise InputError.one(path, "first column", header[0], "an index that ascends: sort the rows by it")
     return {name: np.array([row[k] for row in read]) for k, name in enumerate(names)}
 
 
