@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -67,8 +67,10 @@ def _listed(folder: Path) -> set[Path]:
 
 def refuse_unwritable(out: Path, inputs: Sequence[Path] = (), option: str = "--out") -> None:
     """Raise InputError if `out` may not be written, or is one of the inputs: to be asked before long work."""
-    refuse_inputs([out], inputs)
+    refuse_inputs([out], inputs, option)
     target = resolved(out)
+    if not target.name:
+        raise _unwritable(option, out, "it needs a name")
     folder = next(each for each in target.parents if each.exists())
     if not folder.is_dir():
         raise _unwritable(option, out, f"{folder} is no folder")
@@ -81,12 +83,21 @@ def _unwritable(option: str, out: Path, why: str) -> InputError:
     return InputError.one(option, "path", str(out), f"cannot be written: {why}")
 
 
-def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path]) -> None:
+def refuse_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path]) -> None:
+    """Raise InputError if an option's file may not be written, is one of the inputs, or another's file."""
+    named: dict[Path, str] = {}
+    for option, path in outputs.items():
+        if path is not None:
+            refuse_unwritable(path, inputs, option)
+            if other := named.get(resolved(path)):
+                raise InputError.one(option, "path", str(path), f"is the file of {other}: name another")
+            named[resolved(path)] = option
+
+
+def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path], option: str = "--out") -> None:
     """Raise InputError if one of the targets is one of the inputs, or neither a file nor a folder."""
     for path in targets:
         if path.exists() and not (path.is_file() or path.is_dir()):
-            raise InputError.one("--out", "path", str(path), "no regular file: name another")
+            raise InputError.one(option, "path", str(path), "no regular file: name another")
         if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
-            raise InputError.one(
-                "--out", "path", str(path), "is one of the files that are read: name another"
-            )
+            raise InputError.one(option, "path", str(path), "is one of the files that are read: name another")

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -25,9 +25,13 @@ from rich.text import Text
 
 from harness.results.records import Row
 
-#: Control characters except the line break, those that reverse the direction of text, and lone surrogates,
-#: as in file names that are not UTF-8.
-ILLEGIBLE = re.compile("[\0-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+from . import READER_GONE
+
+#: Control characters except the line break, those that reverse the direction of text, lone surrogates, as in
+#: file names that are not UTF-8, and what is no character, which XML has no way to write.
+ILLEGIBLE = re.compile(
+    "[\0-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]"
+)
 UNKNOWN = "\N{REPLACEMENT CHARACTER}"
 QUIET_S = 2.0  # before a line says what is being done
 
@@ -41,6 +45,12 @@ class PlainConsole(Console):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(highlight=False, markup=False, emoji=False, **options)
+
+    def on_broken_pipe(self) -> None:
+        """End as a command does whose reader has gone: rich would end with 1, which is a verdict here."""
+        with suppress(SystemExit):
+            super().on_broken_pipe()
+        raise SystemExit(READER_GONE)
 
     def render_str(self, text: str, **options: Any) -> Text:
         """As in rich; here already, because the widths of a table's columns are measured before `render`.

@@ -16,7 +16,7 @@ from harness.planning.plan import expand
 from harness.planning.suite import RandomCases, read_written
 from harness.results import records
 from harness.results.answer_files import is_kept
-from harness.results.atomic_output import refuse_unwritable
+from harness.results.atomic_output import refuse_outputs
 from harness.results.kinds import refuse_wrong_kinds
 from harness.results.records import Row
 from harness.terminal import DONE, FAILED, NOTHING_JUDGED
@@ -34,6 +34,9 @@ NEEDED = ("key", "source", "scene_key", "form", "status", "gated", "limit_mm")
 MAX_CASES = 10**9
 UNREADABLE = "is missing, damaged or not finite"
 
+#: The files of a run that no output may replace.
+MEASURED = ("*.jsonl", "*.toml", "machine*.json", "answers/*")
+
 
 def gate(
     directory: Path,
@@ -49,13 +52,14 @@ def gate(
     baseline : the directory of an earlier run, whose errors may be exceeded by the factor `margin` at most.
     Returns 0 if all gated rows are within 1e-7 mm (on a rung of a ladder, what conditioning allows), 1 if
     not (a row is outside, has no answer, is missing, cannot be judged, or is worse than the baseline), 3 if
-    no answer at all could be judged. Raises InputError, Incomparable if the baseline is another suite's.
+    no answer at all could be judged, or compared with the baseline. Raises InputError, Incomparable if the
+    baseline is another suite's.
     """
     if not directory.is_dir():
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
-    for option, file in (("--json", json_file), ("--junit", junit_file)):
-        if file is not None:
-            refuse_unwritable(file, (), option)
+    sides = [directory] if baseline is None else [directory, baseline]
+    inputs = [path for side in sides for files in MEASURED for path in side.glob(files)]
+    refuse_outputs({"--json": json_file, "--junit": junit_file}, inputs)
     rows = gated_rows(directory / records.MEASUREMENTS)
     standard = read_baseline(baseline, margin, str(directory), rows.values()) if baseline else None
     found = judged(rows, directory, reference_limit_s, standard)
@@ -79,11 +83,15 @@ def concluded(findings: list[Finding], baseline: Baseline | None, console: Conso
     if failed:
         console.print(f"Accuracy lost: {failed} of {len(findings)} gated rows.", style="red")
         return FAILED
+    known = sum(finding.baseline_mm is not None for finding in findings)
+    if baseline and not known:
+        why = f"no gated row has an error within its limit in {baseline.name}"
+        console.print(f"Nothing could be compared: {why}.", style="red")
+        return NOTHING_JUDGED
     wider = any(finding.limit_mm > LIMIT_MM for finding in findings)
     limits = "their limits" if wider else f"{LIMIT_MM:g} mm"
     console.print(f"Passed: all {len(findings)} gated rows are within {limits}.", style="green")
     if baseline:
-        known = sum(finding.baseline_mm is not None for finding in findings)
         console.print(
             f"{known} of them are in {baseline.name}: none exceeds its error there {baseline.margin:g} times."
         )

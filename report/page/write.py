@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import zlib
 from base64 import b64encode
+from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
 import pandas as pd
-from mpld3 import urls  # ships D3
 
 from report.analysis.checks import commits_text
 from report.document.escape import plain, quoted, script_json, short
@@ -18,6 +18,7 @@ from report.results.series import Array
 
 HERE = Path(__file__).parent
 SCRIPTS = ("state", "judge", "matrix", "details", "plots", "maps", "page")
+D3 = "mpld3/js/d3.v5.min.js"  # read as a file: python -OO does not import mpld3
 Data = dict[str, Any]
 DIGITS = 1 << 11  # what is dropped of a float32's mantissa: 3.6 decimal digits are left
 
@@ -33,7 +34,7 @@ def write(path: Path, title: str, data: Data, directory: Path | None = None) -> 
         "title": heading,
         "style": (HERE / "page.css").read_text("utf-8"),
         "data": script_json(named),
-        "d3": Path(urls.D3_LOCAL).read_text("utf-8"),
+        "d3": Path(str(distribution("mpld3").locate_file(D3))).read_text("utf-8"),
         "scripts": [(HERE / f"{name}.js").read_text("utf-8") for name in SCRIPTS],
     }
     path.write_text(environment.get_template("page.html.j2").render(content), "utf-8")

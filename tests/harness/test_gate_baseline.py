@@ -13,7 +13,7 @@ from typer.testing import Result
 
 from harness.results import records
 from harness.results.sides import measurement
-from harness.verification.findings import Baseline, Finding, read_baseline
+from harness.verification.findings import Baseline, Finding, read_baseline, write_junit
 from harness.verification.judge import Judgement
 
 pytestmark = pytest.mark.slow
@@ -79,8 +79,38 @@ def test_a_baseline_outside_its_limit_is_no_standard(finished: Path, copy: Path,
     other = changed(Path(shutil.copytree(finished, tmp_path / "other")), verdict="outside")
     moved(answers(copy)[0], 9e-8)
     done = gate(copy, "--baseline", other)
-    assert done.exit_code == 0
-    assert "0 of them are in" in done.stdout
+    assert done.exit_code == 3
+    assert "Nothing could be compared" in done.stdout
+
+
+@pytest.mark.parametrize("error", [None, float("nan")])
+def test_a_baseline_without_errors_compares_nothing(
+    finished: Path, tmp_path: Path, error: float | None
+) -> None:
+    other = changed(Path(shutil.copytree(finished, tmp_path / "other")), displacement_error_mm=error)
+    assert gate(finished, "--baseline", other).exit_code == 3
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--json", "RUN/suite.toml"),
+        ("--junit", "RUN/measurements.jsonl"),
+        ("--json", "RUN/answers/../measurements.jsonl"),
+        ("--json", "RUN/link.json"),
+        ("--json", "RUN/x", "--junit", "RUN/answers/../x"),
+        ("--baseline", "BEFORE", "--json", "BEFORE/suite.toml"),
+    ],
+)
+def test_an_output_is_no_input_and_no_other_output(
+    finished: Path, copy: Path, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    (copy / "link.json").symlink_to(copy / "suite.toml")
+    before = {path: path.read_bytes() for path in copy.rglob("*") if path.is_file()}
+    done = gate(copy, *(word.replace("RUN", str(copy)).replace("BEFORE", str(copy)) for word in words))
+    assert done.exit_code == 2
+    assert "name another" in done.stderr
+    assert {path: path.read_bytes() for path in copy.rglob("*") if path.is_file()} == before
 
 
 @pytest.mark.parametrize(
@@ -98,6 +128,14 @@ def test_a_baseline_of_other_measurements_is_refused(
     assert done.exit_code == 5
     assert message in done.stderr
     assert gate(finished, "--baseline", copy / "none").exit_code == 2
+
+
+def test_a_message_of_any_characters_is_xml(tmp_path: Path) -> None:
+    """XML has no control characters, no lone surrogates and no U+FFFE."""
+    why = "".join(map(chr, [*range(0x20), 0xD800, 0xFFFE, 0xFFFF, 0xFDD0])) + '<&"é'
+    write_junit(tmp_path / "gate.xml", [Finding("a b", Judgement("no_answer"), 1e-7, why)])
+    (error,) = ElementTree.parse(tmp_path / "gate.xml").getroot().iter("error")
+    assert str(error.get("message")).endswith('<&"é')
 
 
 def test_the_findings_are_files_for_a_ci(finished: Path, copy: Path, tmp_path: Path) -> None:

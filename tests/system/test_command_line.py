@@ -62,3 +62,22 @@ def test_a_closed_terminal_ends_no_command(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "harness", "validate", "gallery/three-part-stack"]
     done = subprocess.run(["sh", "-c", f"{' '.join(words)} >&-"], cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_reader_that_goes_is_no_verdict() -> None:
+    """`| head` closes the pipe; 1 would say that accuracy was lost."""
+    words = [sys.executable, "-m", "harness", "validate", "gallery/three-part-stack"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert (process.wait(), process.stderr and process.stderr.read()) == (141, b"")
+
+
+@pytest.mark.slow
+def test_python_without_docstrings_and_assertions_writes_the_same_answer(tmp_path: Path) -> None:
+    words = ("-m", "harness", "solve", "gallery/heavy-sheet-on-tool", "--out")
+    run(tmp_path, *words, "plain")
+    run(tmp_path, "-OO", *words, "bare")
+    for name in ("contacts.csv", "nodes.csv"):
+        assert (tmp_path / "bare" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes()
+    assert (tmp_path / "bare" / "index.html").is_file()
