@@ -21,6 +21,7 @@ from problems.input.tables import LENGTHS, Cells, doubt, heading, number
 COUNTS = {"", "case", "name", "index", "row", "no", "no.", "nr", "nr.", "id", "unnamed: 0"}
 PLAUSIBLE = 5  # mm: gaps before riveting are smaller
 FIRST = 20  # rows that tell whether the first line is a header
+NOTHING = re.compile(r"#\D.*|n/?a|nan|null|-*", re.IGNORECASE)  # where a gap is not measured
 QUICK = re.compile(r"[-+.\deE]+", re.ASCII)
 
 
@@ -59,6 +60,8 @@ def _header(path: Path, rows: list[tuple[int, list[str]]], m: int) -> list[str]:
     while len(rows) > 1 and rows[0][1][0].startswith("# ") and not any(map(_is_number, rows[1][1])):
         del rows[0]
     while rows and not names and not any(map(_is_number, rows[0][1][-m:])):
+        if all(NOTHING.fullmatch(cell) for cell in rows[0][1][-m:]):
+            return []
         cells = [cell.lstrip("# ") for cell in _trimmed(rows.pop(0)[1], m)]
         names = cells if len(cells) >= m else []
     units = [cell.strip("[]() ").lower() for cell in rows[0][1]] if names and rows else []

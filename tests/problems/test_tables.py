@@ -127,6 +127,7 @@ def test_a_header_is_no_case(name: str, index: bool, german: bool, tmp_path: Pat
         ("0,1,0,2,0,3,0,4,1", "line 1 .* a header or gaps"),
         (",".join(f"{k}.0" for k in range(9)) + "\n" + ROW, "line 1 .* a header or gaps"),
         (",".join(f"c{k}" for k in (2, 1, 0, 3, 4, 5, 6, 7, 8)) + "\n" + ROW, "0 to 8 in this order"),
+        (",".join(["n/a"] * 9) + f"\n{ROW}", "line 1 .* a finite number"),
         (f"{ROW}\n#N/A{ROW[4:]}", "line 2 .* a finite number"),
         (f"{ROW}\n{','.join(['#N/A'] * 9)}", "line 2 .* a finite number"),
         (";".join(["1.250"] * 9), "line 1 .* may be 1250"),

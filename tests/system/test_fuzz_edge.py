@@ -249,7 +249,7 @@ def listed(draw: Draw, folder: Path) -> Task:
     """A table of gaps, a case a row."""
     m = int(draw.random.integers(3, 8))
     gaps = draw.random.integers(0, 500, (int(draw.random.integers(2, 5)), m)) / 1000
-    heads = draw.one("heads", "|0|1|101|gap")
+    heads = draw.one("heads", "|0|1|gap", "101")
     names = [f"gap {k}" if heads == "gap" else str(k + int(heads or 0)) for k in range(m)]
     columns = dict(zip(names, gaps.T.tolist(), strict=True))
     marked(draw, columns[draw.pick(names)])
