@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+CONTROL = re.compile("[\0-\x1f\x7f]")
+#: What "parts\\top.npz" of a TOML file has become: a tab and op.npz.
+BACKSLASH = "; a backslash in TOML's double quotes begins an escape: write /, or single quotes"
 
 
 @dataclass(frozen=True)
@@ -18,7 +23,10 @@ class Fault:
     def __str__(self) -> str:
         value = repr(self.value)
         value = value if len(value) <= 80 else value[:77] + "..."
-        return f"{self.where}: {self.key} = {value}: {self.allowed}"
+        where = CONTROL.sub(lambda found: repr(found[0])[1:-1], self.where)
+        path = str(self.value) if re.search("no such file|a path", self.allowed) else self.where
+        hint = BACKSLASH if CONTROL.search(path) else ""
+        return f"{where}: {self.key} = {value}: {self.allowed}{hint}"
 
 
 class InputError(ValueError):

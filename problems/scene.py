@@ -10,6 +10,7 @@ whose parts are plates, or superelements with `superelement` and `nodes` (docs/o
 of a whole problem, `[matrices]` with K, A, f, g (Matrix Market) or problem (.npz).
 """
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
@@ -29,7 +30,7 @@ from problems.model.interface import AnyJoint
 from problems.model.joint import Joint, Table
 from problems.model.scene import JointScene, MatricesScene, Scene
 
-from .errors import Fault, InputError
+from .errors import BACKSLASH, Fault, InputError
 
 FOLDER = Path(__file__).resolve().parent
 SCENES = FOLDER / "scenes"
@@ -104,7 +105,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits
-        raise InputError.one(path, "TOML", str(error), "valid TOML") from error
+        hint = BACKSLASH if re.search("Unescaped|hex value", str(error)) else ""
+        raise InputError.one(path, "TOML", str(error), f"valid TOML{hint}") from error
 
 
 def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:

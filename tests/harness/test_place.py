@@ -231,6 +231,8 @@ def test_a_plan_that_fresh_cases_refute_is_searched_again(strip: Path) -> None:
     first, second = found.samples
     assert (len(first.step.plan), first.kept, lines) == (0, 0, [120])
     assert (len(second.step.plan), second.kept) == (2, len(second.numbers))
+    # Each round spends half of what is left of 5 %.
+    assert [len(sample.numbers) for sample in found.samples] == [goal.fresh(0.025), goal.fresh(0.0125)]
     assert found.best is not None
     assert found.best.plan == second.step.plan
     chosen, *samples = (set(some) for some in (found.numbers, first.numbers, second.numbers))

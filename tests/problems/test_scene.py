@@ -209,6 +209,22 @@ def test_other_encodings_are_named(path: Path, content: bytes, key: str, value: 
     assert (fault.key, fault.value) == (key, value)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        '[matrices]\nproblem = "parts\\top.npz"',
+        '[[joint.part]]\nname = "a"\nsuperelement = "parts\\top.npz"\nnodes = "n.csv"',
+        'assembly = "parts\\new.toml"',
+        'assembly = "C:\\users\\new.toml"',
+        'assembly = "C:\\dir\\new.toml"',
+    ],
+)
+def test_a_backslash_in_a_path_is_named_as_the_cause(path: Path, text: str) -> None:
+    said = "\n".join(map(str, faults(path, text)))
+    assert "a backslash in TOML's double quotes begins an escape" in said
+    assert "\t" not in said
+
+
 @pytest.mark.parametrize("value", ['{ kind = "initial_gap", mean = 0.6 }', "3", '["initial_gap"]', "[3]"])
 def test_effect_must_be_tables(path: Path, value: str) -> None:
     (fault,) = faults(path, f'assembly = "wing-fragment-4386"\neffect = {value}\n')
