@@ -46,10 +46,14 @@ def compare(
                 5 not comparable: other problems, limits or suites; --max-slowdown on another machine.
     """
     with error_reporting() as console:
+        from harness.results.atomic_output import refuse_unwritable
+        from harness.results.records import MEASUREMENTS
         from harness.results.sides import read_side
         from harness.terminal import DONE, FAILED
         from report.writers.comparison import write
 
+        if out:
+            refuse_unwritable(out, [Path(name) / MEASUREMENTS for name in (old, *new)])
         before = read_side(old, key)
         compared = [_compared(before, read_side(name, key), max_digits_lost, max_slowdown) for name in new]
         for comparison in compared:

@@ -97,6 +97,8 @@ def series(
         from harness.measurement.describe import described
         from harness.measurement.scheduler import threads_per_worker
         from harness.planning.form_choice import chosen_form
+        from harness.results.atomic_output import refuse_inputs, refuse_unwritable
+        from harness.results.schema import SERIES
         from harness.results.series_file import read_facts
         from harness.scene.allowed_gap import refuse_unusable, show_series
         from harness.scene.validate import print_unusual
@@ -124,6 +126,9 @@ def series(
             faults.append(Fault("series", "tolerance, limit", (tolerance, limit), allowed))
         if faults:
             raise InputError(faults)
+        inputs = [Path(each) for each in (scene, around, gaps, plugin) if each]
+        refuse_unwritable(out, inputs)
+        refuse_inputs([out / SERIES], inputs)
         read = read_scene(scene)
         before = (read_facts(out) or {}).get("identity", {}).get("form")
         asked: Any = form.value if form else before if before in made.forms else None

@@ -38,7 +38,7 @@ def atomic_output(out: Path, inputs: Sequence[Path] = ()) -> Iterator[Path]:
                     "--out", "path", str(out), f"a {kind} is to be written, and this is none"
                 )
             if new.is_dir():
-                refuse_inputs([out / path.name for path in new.iterdir()], inputs)
+                refuse_inputs([*(out / path.name for path in new.iterdir()), *_listed(target)], inputs)
                 target.mkdir(exist_ok=True)
                 for path in _listed(target):
                     path.unlink(missing_ok=True)
@@ -85,13 +85,13 @@ def _unwritable(option: str, out: Path, why: str) -> InputError:
 
 def refuse_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path]) -> None:
     """Raise InputError if an option's file may not be written, is one of the inputs, or another's file."""
-    named: dict[Path, str] = {}
+    before: dict[str, Path] = {}
     for option, path in outputs.items():
         if path is not None:
             refuse_unwritable(path, inputs, option)
-            if other := named.get(resolved(path)):
+            for other in (name for name, earlier in before.items() if _is_same(path, earlier)):
                 raise InputError.one(option, "path", str(path), f"is the file of {other}: name another")
-            named[resolved(path)] = option
+            before[option] = path
 
 
 def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path], option: str = "--out") -> None:
@@ -99,5 +99,10 @@ def refuse_inputs(targets: Sequence[Path], inputs: Sequence[Path], option: str =
     for path in targets:
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise InputError.one(option, "path", str(path), "no regular file: name another")
-        if any(path.exists() and given.exists() and path.samefile(given) for given in inputs):
+        if any(_is_same(path, other) for other in inputs):
             raise InputError.one(option, "path", str(path), "is one of the files that are read: name another")
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    """Whether two paths are of one file, there or not, through links and relative spellings."""
+    return resolved(one) == resolved(other) or (one.exists() and other.exists() and one.samefile(other))

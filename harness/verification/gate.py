@@ -59,8 +59,10 @@ def gate(
         raise InputError.one("DIR", "directory", str(directory), "no such directory; `run` makes one")
     sides = [directory] if baseline is None else [directory, baseline]
     inputs = [path for side in sides for files in MEASURED for path in side.glob(files)]
-    refuse_outputs({"--json": json_file, "--junit": junit_file}, inputs)
+    outputs = {"--json": json_file, "--junit": junit_file}
+    refuse_outputs(outputs, [*inputs, *(side / "suite.toml" for side in sides)])
     rows = gated_rows(directory / records.MEASUREMENTS)
+    refuse_outputs(outputs, [Path(str(row["source"])) for row in rows.values()])
     standard = read_baseline(baseline, margin, str(directory), rows.values()) if baseline else None
     found = judged(rows, directory, reference_limit_s, standard)
     findings = [*found, *never_measured(rows, directory)]

@@ -98,6 +98,7 @@ def test_a_baseline_without_errors_compares_nothing(
         ("--junit", "RUN/measurements.jsonl"),
         ("--json", "RUN/answers/../measurements.jsonl"),
         ("--json", "RUN/link.json"),
+        ("--json", "BEFORE/hard", "--junit", "BEFORE/harder"),
         ("--json", "RUN/x", "--junit", "RUN/answers/../x"),
         ("--baseline", "BEFORE", "--json", "BEFORE/suite.toml"),
     ],
@@ -106,6 +107,8 @@ def test_an_output_is_no_input_and_no_other_output(
     finished: Path, copy: Path, words: tuple[str, ...], tmp_path: Path
 ) -> None:
     (copy / "link.json").symlink_to(copy / "suite.toml")
+    (copy / "hard").touch()
+    (copy / "harder").hardlink_to(copy / "hard")
     before = {path: path.read_bytes() for path in copy.rglob("*") if path.is_file()}
     done = gate(copy, *(word.replace("RUN", str(copy)).replace("BEFORE", str(copy)) for word in words))
     assert done.exit_code == 2

@@ -19,6 +19,27 @@ COMMANDS = [
 ]
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "compare RUN RUN --out RUN/measurements.jsonl",
+        "series gallery/sheet-over-former --gaps g.csv --out g.csv",
+        "solve gallery/sheet-over-former --out /",
+    ],
+)
+def test_a_folder_to_write_is_no_input_and_no_root(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("RUN").mkdir()
+    Path("RUN/measurements.jsonl").touch()
+    Path("g.csv").write_text("0.1\n")
+    done = harness(*command.split())
+    assert done.exit_code == 2
+    assert done.stderr.startswith("--out: path = ")
+    assert len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("out", ["file/out", "locked/out"])
 def test_what_cannot_be_written_is_said_before_the_work(
