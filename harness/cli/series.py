@@ -91,7 +91,7 @@ def series(
 
     \b
     Exit codes: 0 solved, 1 a case is outside the limit or has no answer, 2 wrong usage or bad input,
-                3 nothing could be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
+                3 a case could not be judged, 4 a gap is larger than --allow-gap, 130 interrupted.
     """
     with error_reporting() as console:
         from harness.measurement.describe import described

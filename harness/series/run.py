@@ -25,6 +25,7 @@ from problems.build import prepared
 from problems.errors import Fault, InputError
 from problems.load_cases import LoadCases
 from problems.model.scene import JointScene
+from report.document.numbers import counted
 
 from .places import results_of
 from .session import Job, Result
@@ -37,16 +38,15 @@ def run(
 ) -> int:
     """Solve the remaining cases of a series. `facts`: of the solver; part of its identity.
 
-    Returns 0, 1 if an answer is outside the limit or missing, 3 if none could be judged. Raises InputError
+    Returns 0, 1 if an answer is outside the limit or missing, 3 if one could not be judged. Raises InputError
     if DIRECTORY holds another series; after KeyboardInterrupt the same command resumes.
     """
     with records.locked(directory, (), other=records.MEASUREMENTS):
         open_series(directory, identity(job) | facts, metadata(job))
         done = solved(directory, job.cases)
         remaining = np.flatnonzero(~done).tolist()
-        console.print(
-            f"{job.scene.name}: {len(done)} cases, {len(done) - len(remaining)} already in {directory}"
-        )
+        cases, there = counted(len(done), "case"), len(done) - len(remaining)
+        console.print(f"{job.scene.name}: {cases}, {there} already in {directory}")
         if remaining:
             with results_of(job, remaining, scheduler, console) as results:
                 solve_remaining(job, len(remaining), results, directory, console)
@@ -68,7 +68,7 @@ def solve_remaining(
             made += len(some)
             bar.update(task, completed=made)
             print_failures(some, console)
-    console.print(f"{made} cases in {time.monotonic() - begun:.1f} s")
+    console.print(f"{counted(made, 'case')} in {time.monotonic() - begun:.1f} s")
 
 
 def print_failures(results: list[Result], console: Console) -> None:
@@ -168,6 +168,6 @@ def summary(rows: Iterable[Row], asked: int, console: Console) -> int:
     if missing := asked - sum(counts.values()):
         console.print(f"Not solved: {missing}. Run the same command again.", style="red")
         return FAILED
-    if not counts["within"] + counts["outside"]:
-        return NOTHING_JUDGED
-    return FAILED if counts["outside"] + counts["no_answer"] else DONE
+    if counts["outside"] + counts["no_answer"] and counts["within"] + counts["outside"]:
+        return FAILED
+    return DONE if counts["within"] == asked else NOTHING_JUDGED

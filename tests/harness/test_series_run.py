@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import tiny
 from commands import harness
+from rich.console import Console
 from runs import series_rows, wait_for
 from small import solve_by_nnls
 from strip import write_strip
@@ -20,6 +21,7 @@ from strip import write_strip
 from harness.results import records, series_file
 from harness.results.schema import SERIES
 from harness.series import session as session_module
+from harness.series.run import summary
 from harness.series.session import Job, Result, SeriesSession
 from problems.build import load_case, prepared
 from problems.forms.problem import Dual
@@ -271,3 +273,18 @@ def test_cases_that_cannot_be_solved_at_once_are_solved_one_after_another(fault:
     assert [row["case"] for row in rows] == list(range(count))
     assert {row["status"] for row in rows} == {"solved"}
     assert [("setup_s" in row) for row in rows] == [False] * session_module.BLOCK + [True] * 5
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "code"),
+    [
+        (["within", "within"], 0),
+        (["within", "cannot_be_judged"], 3),
+        (["cannot_be_judged", "no_answer"], 3),
+        (["within", "cannot_be_judged", "outside"], 1),
+        (["within", "no_answer"], 1),
+    ],
+)
+def test_a_case_that_cannot_be_judged_is_no_success(verdicts: list[str], code: int) -> None:
+    rows = [{"case": k, "verdict": verdict} for k, verdict in enumerate(verdicts)]
+    assert summary(rows, len(rows), Console(quiet=True)) == code
