@@ -56,6 +56,12 @@ class Answer:
     reported_s: float | None = None
     details: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def cause(self) -> str | None:
+        """The reason why it is not solved, in the words of the method or of its library, if they say one."""
+        said = [self.details.get(name) for name in ("cause", "message", "status")]
+        return None if self.status == "solved" else next((str(text) for text in said if text), None)
+
 
 def failed(cause: str, iterations: int | None = None) -> Answer:
     """An answer without forces, and its cause."""

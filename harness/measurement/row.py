@@ -137,7 +137,7 @@ def _row(
         "threads_asked": m.threads,
         **measured,
         **asdict(judgement),
-        "message": measured["message"] or _why_not_judged(judgement, problem),
+        "message": _why_not_judged(judgement, problem) or measured["message"],
         **{name: getattr(m, name) for name in ("time_limit_s", "memory_limit_mib")},
         "stop": m.stop or None,
         "overhead_s": elapsed_s - sum(steps) if m.case is None else None,

@@ -15,7 +15,7 @@ from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
-from problems.errors import InputError
+from problems.errors import InputError, unreadable
 from problems.forms import Form
 from problems.forms.assembly import Vector
 from problems.input.bounded import regular_file
@@ -119,7 +119,7 @@ def read_answer(path: Path) -> dict[str, Vector]:
     except InputError:
         raise
     except Exception as error:  # numpy, zipfile and csv raise kinds of their own
-        raise InputError.one(path, "file", f"{type(error).__name__}: {error}", ALLOWED) from error
+        raise InputError.one(path, "file", unreadable(error), ALLOWED) from error
     if not found:
         wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
         raise InputError.one(path, "names", names, wanted)

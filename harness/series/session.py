@@ -179,7 +179,7 @@ class SeriesSession:
         answer, job = attempt.answer, self.job
         row = attempt.row | {
             "status": answer.status,
-            "message": answer.details.get("cause"),
+            "message": answer.cause,
             "iterations": answer.iterations,
             "inner_iterations": answer.inner_iterations,
             "form_s": assess_s,

@@ -169,6 +169,7 @@ def figures(answer: Answer) -> Row:
         "iterations": answer.iterations,
         "inner_iterations": answer.inner_iterations,
         "solver_reported_s": answer.reported_s,
+        "message": answer.cause,
         "details": answer.details,
     }
 

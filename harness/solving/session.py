@@ -224,7 +224,7 @@ def forces_of(name: str, solver: Solver, problem: Problem, case: LoadCase, toler
 
 def no_answer(name: str, answer: Answer) -> InputError:
     """The error of a solver that gives neither forces nor displacements."""
-    said = f"{answer.status}: {answer.details['cause']}" if "cause" in answer.details else answer.status
+    said = ": ".join(filter(None, (answer.status, answer.cause)))
     return InputError.one(f"solver {name}", "status", said, NO_ANSWER)
 
 

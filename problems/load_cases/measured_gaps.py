@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from problems.build import load_case
-from problems.errors import Fault, InputError
+from problems.errors import Fault, InputError, unreadable
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded import regular_file
@@ -128,8 +128,7 @@ def _read(path: Path, m: int) -> Matrix:
     except InputError:
         raise
     except Exception as error:  # and zipfile raise their own kinds
-        said = f"{type(error).__name__}: {error}"
-        raise InputError.one(path, "file", said, "a readable table of numbers") from error
+        raise InputError.one(path, "file", unreadable(error), "a readable table of numbers") from error
     raise InputError.one(path, "file", suffix, "a .csv, .npz or .npy")
 
 

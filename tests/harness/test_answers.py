@@ -2,15 +2,19 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from harness.conformance.known_problems import known_problems
-from harness.solving.answers import LARGEST_DETAILS, InvalidAnswer, checked, examined
+from harness.solving.answers import LARGEST_DETAILS, InvalidAnswer, checked, examined, figures
+from harness.solving.session import no_answer
+from problems.errors import InputError
 from problems.forms.problem import Problem, in_form
-from solvers.base import Answer
+from problems.load_cases.measured_gaps import _read
+from solvers.base import Answer, Status
 
 
 class Odd(Exception):
@@ -93,3 +97,35 @@ def test_the_gate_makes_plain_types_that_nobody_can_change() -> None:
         found.lam[0] = 7
     large = checked(replace(given, details={"a": "x" * LARGEST_DETAILS}), smallest())
     assert large.details.keys() == {"dropped"}
+
+
+@pytest.mark.parametrize(
+    ("status", "details", "cause"),
+    [
+        ("failed", {"message": "singular KKT"}, "singular KKT"),
+        ("failed", {"status": "InsufficientProgress"}, "InsufficientProgress"),
+        ("inaccurate", {"cause": "rounding", "status": "MaxIterations"}, "rounding"),
+        ("failed", {}, None),
+        ("solved", {"status": "Solved"}, None),
+    ],
+)
+def test_a_row_has_the_cause_in_the_words_of_the_library(
+    status: Status, details: dict[str, str], cause: str | None
+) -> None:
+    answer = Answer(status, None, details=details)
+    assert figures(answer)["message"] == cause
+    assert str(no_answer("osqp", answer)).count(": ".join(filter(None, (status, cause)))) == 1
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"PK\3\4cut", b"\x93NUMPY"])
+@pytest.mark.parametrize("suffix", [".npz", ".npy"])
+def test_an_unreadable_file_is_told_without_names_of_python(
+    content: bytes, suffix: str, tmp_path: Path
+) -> None:
+    path = tmp_path / f"gaps{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=path.name) as raised:
+        _read(path, 3)
+    assert "Error" not in str(raised.value)
+    assert "pickle" not in str(raised.value)
+    assert "BadZip" not in str(raised.value)
