@@ -14,6 +14,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,22 @@ def read_toml(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits
         hint = BACKSLASH if re.search("Unescaped|hex value", str(error)) else ""
         raise InputError.one(path, "TOML", str(error), f"valid TOML{hint}") from error
+
+
+def files_of(source: str) -> list[Path]:
+    """The file of a scene, and the files that it names."""
+    path = Path(source)
+    left: list[Any] = [read_toml(path)] if path.suffix == ".toml" and path.is_file() else []
+    named = [path]
+    while left:
+        match left.pop():
+            case dict() as table:
+                left += table.values()
+            case list() as entries:
+                left += entries
+            case str() as text if isfile(path.parent / text):
+                named.append(path.parent / text)
+    return named
 
 
 def _scene(name: str, path: Path, data: dict[str, Any]) -> Scene:

@@ -35,8 +35,8 @@ from problems.forms.prepared import Prepared
 from problems.forms.problem import in_form
 from problems.input import matrix_files
 from problems.input.user_matrices import NAMES, checked
-from problems.model.scene import MatricesScene, Scene
-from problems.scene import read_scene
+from problems.model.scene import Scene
+from problems.scene import files_of, read_scene
 
 from .validate import digits_sentence, print_facts
 
@@ -67,8 +67,7 @@ def export(
         raise InputError.one("--format", "format", format, allowed)
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     scene = read_scene(source)
-    own = [path for _, path in scene.files] if isinstance(scene, MatricesScene) else []
-    inputs = [Path(source), *own]
+    inputs = files_of(source)
     refuse_unwritable(out, inputs)
     if format is not None:
         problem = opened(scene)

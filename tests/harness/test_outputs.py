@@ -40,6 +40,17 @@ def test_a_folder_to_write_is_no_input_and_no_root(
     assert len(done.stderr.splitlines()) == 1
 
 
+def test_an_answer_replaces_no_file_that_its_scene_names(tmp_path: Path) -> None:
+    matrices, scene = tmp_path / "out/solution.npz", tmp_path / "scene.toml"
+    assert not harness("export", "gallery/sheet-over-former", "--format", "npz", "--out", matrices).exit_code
+    scene.write_text('[matrices]\nproblem = "out/solution.npz"\n')
+    before = matrices.read_bytes()
+    done = harness("solve", scene, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "is one of the files that are read" in done.stderr
+    assert matrices.read_bytes() == before
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("out", ["file/out", "locked/out"])
 def test_what_cannot_be_written_is_said_before_the_work(
