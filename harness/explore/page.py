@@ -33,6 +33,7 @@ from problems.effects.pressure import Pressure
 from problems.errors import InputError
 from problems.forms.assembly import Matrix
 from problems.scene import scene_of
+from report.document.numbers import position
 
 NOTHING = "rgba(0, 0, 0, 0)"
 DIGITS = 3  # of mm, where a fastener is dropped
@@ -202,7 +203,7 @@ class Page:
 def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
     """PASS or FAIL, the largest gap with its place, and how sure that is."""
     k = int(answer.gap.argmax())
-    gap, (x, y) = float(answer.gap[k]), places[k]
+    gap, place = float(answer.gap[k]), position(*places[k])
     e = answer.error_mm
     sure = "…" if e is None else f"every gap within {e:.1e} mm, proven" if np.isfinite(e) else "not proven"
     untold = e is not None and not abs(gap - limit_mm) > e
@@ -211,7 +212,7 @@ def outcome(answer: Answer, places: Matrix, limit_mm: float) -> str:
     above = np.count_nonzero(answer.gap > limit_mm)
     return (
         f'<b style="color:{colour};font-size:130%">{word}</b> largest gap <b id="gap">{gap:.6g}</b> mm at '
-        f"({x:.4g}, {y:.4g}) mm; {above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
+        f"{place}; {above} of {len(answer.gap)} contacts above {limit_mm:g} mm; "
         f"{len(answer.settings.places)} fasteners, {np.count_nonzero(answer.lam)} contacts closed, which "
         f"carry {answer.lam.sum():.4g} N. {sure}"
     )

@@ -42,6 +42,7 @@ from problems.load_cases.random_gaps import RandomGaps
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene, scene_of
 from problems.storage import digest
+from report.document.numbers import position
 
 RECORD = "place.json"
 SERIES = ("own", "plan")
@@ -216,12 +217,12 @@ def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
     if step.gap_mm <= goal.limit_mm:
         return f"PASS: {left}, proven.", DONE
     worst = step.worst if sample is None else sample.numbers[step.worst]
-    x, y = nodes[step.outcome.contact[step.worst]]
+    place = position(*nodes[step.outcome.contact[step.worst]])
     if sample:
         share = f"{100 * goal.share:.4g} % of the cases" if goal.share < 1 else "every case"
         left += f"; in {share} it is {step.gap_mm:.3g} mm"
     more = f"{step.gap_mm - goal.limit_mm:.3g} mm more than allowed"
-    return f"FAIL: {left}, {more}; case {worst} is the worst, at ({x:.4g}, {y:.4g}) mm.", GAP_EXCEEDED
+    return f"FAIL: {left}, {more}; case {worst} is the worst, at {place}.", GAP_EXCEEDED
 
 
 def _counted(number: int, word: str) -> str:

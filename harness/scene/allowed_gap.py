@@ -19,6 +19,7 @@ from rich.console import Console
 from harness.terminal import DONE, GAP_EXCEEDED, NOTHING_JUDGED
 from problems.errors import InputError
 from problems.forms.assembly import Mask, Vector
+from report.document.numbers import position
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,7 +116,7 @@ def show_series(directory: Path, allowed_mm: float, console: Console) -> int:
 
 
 def _place(contact: int, nodes: Vector | None) -> str:
-    at = "" if nodes is None else f", ({nodes[contact, 0]:.4g}, {nodes[contact, 1]:.4g}) mm"
+    at = "" if nodes is None else f", {position(*nodes[contact])}"
     return f"contact {contact}{at}"
 
 

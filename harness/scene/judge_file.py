@@ -20,6 +20,7 @@ from problems.forms import Form
 from problems.forms.assembly import Vector
 from problems.input.bounded import regular_file
 from problems.input.tables import Cells, doubt, is_stray, number
+from report.document.numbers import position
 
 MIB = 1024
 #: The names of displacements and of contact forces.
@@ -96,7 +97,7 @@ def _place(problem: ReferenceProblem, x: Vector) -> str:
     assembly = problem.prepared.assembly
     nodes = assembly.asked_nodes
     worst = int(np.argmax(assembly.at_junction(abs(x - problem.reference.x))))
-    return f"at entry {worst}" if nodes is None else f"at ({nodes[worst, 0]:.4g}, {nodes[worst, 1]:.4g}) mm"
+    return f"at entry {worst}" if nodes is None else f"at {position(*nodes[worst])}"
 
 
 def read_answer(path: Path) -> dict[str, Vector]:

@@ -23,6 +23,11 @@ def significant(value: object, digits: int = 3) -> str:
     return f"{rounded:.{max(0, digits - 1 - exponent)}f}"
 
 
+def position(*coordinates: float) -> str:
+    """'(1077.93, 0) mm', to the hundredth: places of a part of metres are told apart, and rounding is 0."""
+    return f"({', '.join(f'{round(float(value), 2) + 0.0:.10g}' for value in coordinates)}) mm"
+
+
 def power(value: object, digits: int = 3) -> str:
     """4.10e-9: always with a power of ten, without leading zeros in it."""
     number = as_number(value)

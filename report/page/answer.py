@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from report.document.numbers import listed, significant
+from report.document.numbers import listed, position, significant
 from report.page.write import Data, banner
 from report.results.answers import Answer, fasteners, pair_name
 from report.results.series import Array
@@ -60,8 +60,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     pair = next(pair for pair in record["pairs"] if pair["start"] <= worst < pair["stop"])
     at = f"contact {worst}"
     if "contact_nodes" in arrays:
-        x, y = arrays["contact_nodes"][worst]
-        at = f"x = {significant(x)}, y = {significant(y)} mm"
+        at = position(*arrays["contact_nodes"][worst])
     largest = f"the largest gap left is {significant(gap[worst])} mm, at {at} ({pair_name(pair)})"
     check = record.get("allowed_gap")
     if check is None:
@@ -70,7 +69,7 @@ def headline(record: Data, arrays: dict[str, Array]) -> Data:
     kind, word = kinds[check["exceeded"]]
     near = ", closer to the limit than the grid can tell" if check.get("closer_than_grid_mm") else ""
     near += f"; {check['beyond_scan']}" if "beyond_scan" in check else ""
-    return {"kind": kind, "text": f"{word} at {significant(check['allowed_mm'])} mm: {largest}{near}."}
+    return {"kind": kind, "text": f"{word}: limit {check['allowed_mm']:g} mm; {largest}{near}."}
 
 
 def two_answers_data(answers: list[Answer]) -> Data:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from report.document.escape import plain
-from report.document.numbers import significant
+from report.document.numbers import position, significant
 from report.figures import style
 from report.page.answer import facts, headline
 from report.results.answers import fasteners
@@ -33,7 +33,7 @@ def write_pdf(path: Path, record: dict[str, Any], arrays: dict[str, Array], pict
     known = [("scene", f"{record['scene']}, key {record['scene_key'][:16]}"), *facts(record)]
     known += [(name, str(record[name])) for name in ("commit", "machine", "recorded_at") if record.get(name)]
     forces = [
-        f"{kind}, {contact}, at ({significant(x)}, {significant(y)}) mm: {significant(force)} N"
+        f"{kind}, {contact}, at {position(x, y)}: {significant(force)} N"
         for kind, contact, x, y, force in fasteners(record).itertuples(index=False)
     ]
     room = page.lines_left - len(known) - 4

@@ -218,17 +218,17 @@ def test_the_banners_name_the_code(tmp_path: Path) -> None:
         (
             True,
             "fail",
-            "FAIL at 0.200 mm: the largest gap left is 0.300 mm, at x = 4.00, y = 1.00 mm (a – b)",
+            "FAIL: limit 0.2 mm; the largest gap left is 0.300 mm, at (1077.93, 0) mm (a – b)",
         ),
-        (False, "pass", "PASS at 0.200 mm: "),
-        (None, "", "CANNOT BE TOLD at 0.200 mm: "),
-        ("not asked", "", "The largest gap left is 0.300 mm, at x = 4.00"),
+        (False, "pass", "PASS: limit 0.2 mm; "),
+        (None, "", "CANNOT BE TOLD: limit 0.2 mm; "),
+        ("not asked", "", "The largest gap left is 0.300 mm, at (1077.93, 0) mm"),
     ],
 )
 def test_an_answer_opens_with_its_largest_gap(exceeded: Any, kind: str, begins: str) -> None:
     arrays = {
         "gap_after": np.array([0.1, 0.3, 0.0]),
-        "contact_nodes": np.array([[0.0, 1.0], [4.0, 1.0], [8.0, 1.0]]),
+        "contact_nodes": np.array([[0.0, 1.0], [1077.93, -1.42e-14], [8.0, 1.0]]),
     }
     record: dict[str, Any] = {"m": 3, "pairs": [{"pair": ["a", "b"], "start": 0, "stop": 3}]}
     if exceeded != "not asked":
