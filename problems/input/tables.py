@@ -100,7 +100,8 @@ class Cells:
         try:
             for cells in reader:
                 texts = [cell.strip().replace("\u2212", "-") for cell in cells]
-                if any(texts) and not (texts[0].split()[:1] == ["#"] and not any(texts[1:])):
+                comment = texts[:1] and texts[0].split()[:1] == ["#"] and not any(texts[1:])
+                if any(text.strip(";,") for text in texts) and not comment:
                     yield self.start + reader.line_num, texts
         except csv.Error as error:
             raise InputError.one(self.path, "file", str(error), "a readable CSV file") from error
