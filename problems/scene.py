@@ -13,6 +13,7 @@ of a whole problem, `[matrices]` with K, A, f, g (Matrix Market) or problem (.np
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from os.path import isfile
 from pathlib import Path
@@ -62,7 +63,7 @@ def read_scene(name_or_path: str) -> Scene:
     if path.suffix == ".npz":
         if not path.is_file():
             raise InputError.one(path, "scene", name_or_path, "no such file")
-        return MatricesScene(path.stem, f"own matrices {path.name}", (("problem", path),))
+        return MatricesScene(path.stem, f"own matrices {path.name}", (("problem", path),), sources=(path,))
     if path.suffix != ".toml":
         path = SCENES / f"{name_or_path}.toml"
         if not path.is_file():
@@ -70,7 +71,8 @@ def read_scene(name_or_path: str) -> Scene:
     table = read_toml(path)
     is_users = not resolved(path).is_relative_to(SCENES)
     name = path.stem if is_users else resolved(path).relative_to(SCENES).with_suffix("").as_posix()
-    return _scene(name, path, table)
+    sources = tuple(_files_of(path, table))
+    return replace(_scene(name, path, table), sources=sources)
 
 
 def scene_of(table: Mapping[str, Any], name: str = "scene") -> Scene:
@@ -110,11 +112,9 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError.one(path, "TOML", str(error), f"valid TOML{hint}") from error
 
 
-def files_of(source: str) -> list[Path]:
-    """The file of a scene, and the files that it names."""
-    path = Path(source)
-    left: list[Any] = [read_toml(path)] if path.suffix == ".toml" and path.is_file() else []
-    named = [path]
+def _files_of(path: Path, table: dict[str, Any]) -> list[Path]:
+    """The file of a scene, and the files that its table names."""
+    left, named = [*table.values()], [path]
     while left:
         match left.pop():
             case dict() as table:

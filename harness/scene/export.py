@@ -36,7 +36,7 @@ from problems.forms.problem import in_form
 from problems.input import matrix_files
 from problems.input.user_matrices import NAMES, checked
 from problems.model.scene import Scene
-from problems.scene import files_of, read_scene
+from problems.scene import read_scene
 
 from .validate import digits_sentence, print_facts
 
@@ -67,17 +67,16 @@ def export(
         raise InputError.one("--format", "format", format, allowed)
     _refuse_suffix(out, formats.FORMATS[format or "npz"], form is not None)
     scene = read_scene(source)
-    inputs = files_of(source)
-    refuse_unwritable(out, inputs)
+    refuse_unwritable(out, scene.sources)
     if format is not None:
         problem = opened(scene)
         data = matrices(problem.prepared, problem.load)
-        with atomic_output(out, inputs) as new:
+        with atomic_output(out, scene.sources) as new:
             formats.FORMATS[format].write(new, data)
         said = f"n = {len(data['f'])}, m = {len(data['g'])}, {formats.FORMATS[format].description}"
     elif form is not None:
         arrays, about = _program(source, scene, form, with_reference, reference_limit_s)
-        with atomic_output(out, inputs) as new:
+        with atomic_output(out, scene.sources) as new:
             (_write_npz if out.suffix == ".npz" else _write_mtx)(new, arrays, about)
         said = f"{form} form, {len(arrays['q'])} unknowns, {about['m']} contacts"
     console.print(f"{out}: {scene.name}, {said}.")

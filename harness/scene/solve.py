@@ -38,7 +38,7 @@ from problems.model.interface import AnyJoint
 from problems.model.joint import Joint
 from problems.model.positions import FORCES
 from problems.model.scene import JointScene, MatricesScene, Scene
-from problems.scene import files_of, read_scene
+from problems.scene import read_scene
 
 from . import allowed_gap, grid_error, solution
 from .solution import Solution
@@ -66,8 +66,7 @@ def solve(
         raise InputError.one("--tolerance", "tolerance", tolerance, "must be positive and finite")
     allowed_gap.refuse_unusable(allow_gap_mm)
     scene = read_scene(source)
-    inputs = files_of(source)
-    refuse_unwritable(out, inputs)
+    refuse_unwritable(out, scene.sources)
     if refine and not _is_of_plates(scene):
         allowed = "left out: the grid of superelements and of given matrices is not known here"
         raise InputError.one("--refine", "scene", scene.name, allowed)
@@ -102,7 +101,7 @@ def solve(
     code = DONE if record["verdict"] == "within" else FAILED
     if allow_gap_mm is not None:
         code = code or allowed_gap.show(record["allowed_gap"], found.gap, assembly.contact_nodes, console)
-    with console.status(Text("pictures and files")), atomic_output(out, inputs) as new:
+    with console.status(Text("pictures and files")), atomic_output(out, scene.sources) as new:
         from report.writers.solution import write  # slow to import: not before the answer is shown
 
         new.mkdir()

@@ -35,6 +35,7 @@ class Scene(ABC):
     on_ladder : whether it is a rung, whose limit follows its conditioning.
     refused : text of the InputError that building this rung must raise; "" if it must not raise one.
     printed : the optimum that the source of the problem prints.
+    sources : the files that it was read from, which no output may replace.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Scene(ABC):
     on_ladder: bool = False
     refused: str = ""
     printed: PrintedOptimum | None = None
+    sources: tuple[Path, ...] = field(default=(), repr=False, compare=False)
 
     @property
     @abstractmethod

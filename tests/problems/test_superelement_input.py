@@ -62,7 +62,7 @@ FILES: dict[str, tuple[Callable[[Path], list[Tables]], str, str, str]] = {
     ),
     "an id twice": (lambda f: two(f, id=[1, 2, 3, 3, *range(5, 25)]), "id", "3", "each id once"),
     "an id that is no number": (lambda f: two(f, id=[1.5, *range(2, 25)]), "id", "1.5", "whole numbers"),
-    "another planet": (lambda f: two(f, xyz=_beyond()), "x, y, z", "ids 4", "at most 1e+09 mm"),
+    "another planet": (lambda f: two(f, xyz=_beyond()), "line 5", "4,9.22", "up to 1e+15"),
     "two nodes at one place": (lambda f: two(f, xyz=_doubled()), "x, y, z", "1 and 2", "one node at each"),
     "asymmetric": (lambda f: two(f, asymmetric()), "K[0, 1] and K[1, 0]", "[3.0, 0.0]", "1e-10"),
     "not finite": (lambda f: two(f, infinite()), "K", "NaN or infinity", "finite"),
