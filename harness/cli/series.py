@@ -105,7 +105,7 @@ def series(
         from harness.series.given import RANDOM, GivenCases
         from harness.series.run import run
         from harness.series.session import Job
-        from harness.terminal import DONE
+        from harness.terminal import DONE, NOTHING_JUDGED
         from harness.terminal.console import waiting
         from problems.errors import Fault, InputError
         from problems.load_cases.sweep import sweep as swept
@@ -148,6 +148,6 @@ def series(
             from report.writers.series import write  # slow to import: not before the first row
 
             console.print(f"Report: {write(out)}")
-        if code == DONE and allow_gap is not None:
-            code = show_series(out, allow_gap, console)
+        if code in (DONE, NOTHING_JUDGED) and allow_gap is not None:
+            code = show_series(out, allow_gap, console) or code
         raise typer.Exit(code)

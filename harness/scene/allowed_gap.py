@@ -86,6 +86,8 @@ def show_series(directory: Path, allowed_mm: float, console: Console) -> int:
     from report.results.series import read
 
     series = read(directory)
+    if not len(series.cases):
+        return NOTHING_JUDGED
     found = exceeding(series, allowed_mm)
     written = write(directory, series, found)
     within = found.answered - len(found.cases) - found.undecided
