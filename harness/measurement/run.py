@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -193,5 +194,11 @@ def summary(rows: list[Row], console: Console) -> int:
     console.print(", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items()))
     if counts["within"] + counts["outside"]:
         return DONE
-    console.print("Nothing could be judged: no row has an answer.", style="red")
+    why = "no row has an answer"
+    if unjudged := [row for row in rows if row["verdict"] == "cannot_be_judged"]:
+        bounds = (row["reference_bound_mm"] for row in unjudged)  # null is an infinite one
+        least = min(inf if bound is None else bound for bound in bounds)
+        known = f"the references are proven to {least:.0e} mm" if least < inf else "no reference is proven"
+        why = f"{known}, and a tenth of the limit is needed"
+    console.print(f"Nothing could be judged: {why}.", style="red")
     return NOTHING_JUDGED

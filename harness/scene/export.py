@@ -157,7 +157,7 @@ def import_(files: list[str], out: Path, console: Console) -> None:
     about = ("about ", " in balanced units") if problem.form == "sparse" else ("", "")
     condition = f"{problem.prepared.condition:.1e}".join(about)
     console.print(f"K is symmetric and positive definite, cond(K) = {condition}.")
-    sentence, few = digits_sentence(problem)
+    sentence, few = digits_sentence(problem, solved=False)
     console.print(f"{sentence}.", style="yellow" if few else None)
 
 

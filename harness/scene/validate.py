@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Sequence
 
+import numpy as np
 import scipy.sparse as sp
 from rich.console import Console
 from rich.table import Table
@@ -14,10 +15,11 @@ from harness.planning.form_choice import chosen_form, size_of
 from harness.results.provenance import physical_memory_mib
 from harness.verification.judge import LIMIT_MM
 from harness.verification.reference_problem import ReferenceProblem
+from harness.verification.rounded_stiffness import about, expected_error
 from problems.build import model_of, prepared
 from problems.forms import FORMS
 from problems.forms.assembly import Assembly
-from problems.input.matrix_files import DOUBLE, apparent_digits, expected_error
+from problems.input.matrix_files import DOUBLE, apparent_digits
 from problems.model.effect import SpringEffect
 from problems.model.joint import Joint
 from problems.model.part import PartLoadEffect
@@ -134,12 +136,20 @@ def digits_of(assembly: Assembly) -> int:
     return min(apparent_digits(K.data if sp.issparse(K) else K) for K in assembly.K.matrices)
 
 
-def digits_sentence(problem: ReferenceProblem) -> tuple[str, bool]:
-    """A sentence on the digits of K, and whether they are too few for 1e-7 mm at the answer."""
-    digits = digits_of(problem.prepared.assembly)
+def digits_sentence(problem: ReferenceProblem, solved: bool) -> tuple[str, bool]:
+    """A sentence on the digits of K, and whether they are too few for 1e-7 mm at the answer.
+
+    solved : at the reference; else at displacements of about its size.
+    """
+    data = problem.prepared
+    digits = digits_of(data.assembly)
     if digits == DOUBLE:
         return "The entries of K have all digits of double precision", False
-    error = expected_error(problem.prepared, problem.reference.x, problem.reference.lam, digits)
+    if solved:
+        x, lam = problem.reference.x, problem.reference.lam
+    else:
+        x, lam = about(data, problem.load), np.zeros(data.assembly.m)
+    error = expected_error(data, x, lam, digits)
     text = f"The entries of K seem to have {digits} digits: if they were rounded, displacements are off by"
     few = error > LIMIT_MM
     more = f", more than {LIMIT_MM:g} mm: export it with more digits" if few else ""

@@ -135,7 +135,7 @@ class Proof:
             if not going.all():
                 left, load = left[going], LoadCase(load.f[:, going], load.g[:, going])
                 x2, lam2, r, s = x2[:, going], lam2[:, going], r[:, going], s[:, going]
-            dx, dlam = self._corrections(r.value, s.value, lam2.hi, enough_mm)
+            dx, dlam = self.corrections(r.value, s.value, lam2.hi, enough_mm)
             dlam = np.maximum(dlam, -lam2.hi)
             x2, lam2 = x2.plus(dx), lam2.plus(dlam)
             negative = lam2.hi < 0
@@ -188,8 +188,12 @@ class Proof:
         rounding = gamma(roundings) * (abs(delta) + abs(units.At) @ abs(z)) + roundings * ETA * z.any(axis=0)
         return left, uncertain + SAFE * rounding, units.energy(z)
 
-    def _corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float) -> tuple[Matrix, Matrix]:
-        """dx and dλ. r, s, λ : as they are, a column for each load case."""
+    @np.errstate(over="ignore", invalid="ignore", divide="ignore")
+    def corrections(self, r: Matrix, s: Matrix, lam: Matrix, enough_mm: float = 0.0) -> tuple[Matrix, Matrix]:
+        """dx (n, k) and dλ (m, k) that make r zero, and s at closed contacts, in balanced units.
+
+        r (n, k), s (m, k), λ (m, k) : as they are. enough_mm : a displacement that does not count.
+        """
         units = self.balanced
         dx = units.solve(r)
         y = s - units.At @ dx
@@ -199,7 +203,9 @@ class Proof:
         w = units.solve(units.A @ dlam)
         dx -= w
         missed = np.where(C, -(y + units.At @ w), 0.0)
-        target = np.maximum(REDUCTION * length(np.where(C, y, 0.0)), enough_mm / 2 / self.spread)
+        target = REDUCTION * length(np.where(C, y, 0.0))
+        if enough_mm:
+            target = np.maximum(target, enough_mm / 2 / self.spread)
         direction, before = np.zeros_like(missed), np.ones(missed.shape[1])
         for _ in range(MAX_PRODUCTS):
             going = length(missed) > target

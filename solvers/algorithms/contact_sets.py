@@ -38,7 +38,8 @@ from solvers.base import LoadCase
 
 from .block_pivoting import SIGN_UNCERTAINTY, TrialSolution
 
-STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact: more loses digits of K
+STIFFER = 2.0**7  # ρ in units of the stiffest unknown at a contact, or more where K is well conditioned
+KEPT = 2.0**26  # ρ in these units times cond(K): half of the digits of K are left
 PASSES = 2
 GROWTH = 4.0  # of ρ per step; twice as much leaves the edge behind, and pivoting then needs more sets
 
@@ -104,7 +105,7 @@ class ContactSprings:
     """K with springs at closed contacts, in place of Q⁻¹; vectors in the order of A.
 
     K : one matrix. order : K with springs at all contacts, whose numbering serves those at any. stiffest :
-    N/mm, of the unknowns at contacts, as a spring at that contact.
+    N/mm, of the unknowns at contacts, as a spring at that contact. rho : of the springs at closed contacts.
     """
 
     def __init__(self, prepared: Prepared) -> None:
@@ -113,6 +114,7 @@ class ContactSprings:
         self.order = sparse_block(sp.csc_array(self.K + self.A @ self.A.T), assembly.nodes)
         stiffest = float(assembly.K.diagonal[self.A.indices].max(initial=0.0))
         self.stiffest = stiffest / ((self.A.data**2).max(initial=0.0) or 1.0)
+        self.rho = self.stiffest * max(STIFFER, KEPT / prepared.condition)
 
     def block(self, rho: float, C: Mask) -> SparseBlock:
         """K + ρ A_C A_Cᵀ."""
@@ -121,8 +123,7 @@ class ContactSprings:
 
     def set(self, start: TrialSolution, C: Mask) -> TrialSolution:
         """λ⁺ and y⁺ of the set C, from a point (λ, y)."""
-        A, lam, y = self.A, start.lam, start.y
-        rho = STIFFER * self.stiffest
+        A, lam, y, rho = self.A, start.lam, start.y, self.rho
         K, change = self.block(rho, C), np.zeros_like(lam)
         for _ in range(PASSES):
             closed = A.T @ K.solve(A @ np.where(C, rho * y - change, lam))

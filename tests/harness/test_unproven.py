@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 from runs import said_by
 
+from harness.measurement.run import summary as summary_of_run
 from harness.scene.solve import solve
 from harness.series.run import summary
 from problems.build import prepared
@@ -67,3 +68,13 @@ def test_a_series_says_how_many_bounds_are_missing() -> None:
     first, *_, last = (line for line in console.file.getvalue().splitlines() if "bound" in line)
     assert "largest proven error bound 1.0e-09 mm" in first
     assert "some bounds could not be proven" in last
+
+
+@pytest.mark.parametrize(
+    ("bound", "said"), [(3e-7, "the references are proven to 3e-07 mm"), (None, "no reference is proven")]
+)
+def test_a_run_whose_answers_cannot_be_judged_says_so(bound: float | None, said: str) -> None:
+    console = Console(file=StringIO(), width=200)
+    rows: list[Any] = [{"verdict": "cannot_be_judged", "reference_bound_mm": bound}]
+    assert summary_of_run([*rows, {"verdict": "no_answer"}], console) == 3
+    assert f"Nothing could be judged: {said}, and a tenth of the limit" in console.file.getvalue()

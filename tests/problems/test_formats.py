@@ -1,5 +1,6 @@
 """Matrices out to other programs' files and back, and what is said of the files' digits."""
 
+import re
 import subprocess
 import sys
 from io import StringIO
@@ -17,12 +18,15 @@ from small import make_load, make_prepared, solve_by_nnls
 
 from harness.scene.export import export, import_, matrices
 from harness.scene.solve import solve
+from harness.verification.reference_problem import ReferenceProblem
+from harness.verification.rounded_stiffness import expected_error
 from problems import formats
 from problems.build import load_case, prepared
 from problems.errors import InputError
 from problems.forms.assembly import Assembly, LoadCase
+from problems.forms.compliance import ComplianceProducts
 from problems.forms.prepared import Prepared
-from problems.input.matrix_files import apparent_digits, expected_error
+from problems.input.matrix_files import apparent_digits
 from problems.scene import read_scene
 from problems.stiffness.operator import Stiffness
 
@@ -273,6 +277,25 @@ def test_too_few_digits_are_warned_of_with_the_error(tmp_path: Path) -> None:
     shown = StringIO()
     import_([str(tmp_path / "all.npz")], tmp_path / "out2.npz", Console(file=shown, width=200))
     assert "all digits of double precision" in shown.getvalue()
+
+
+def test_digits_of_many_separate_unknowns_take_no_reference_and_no_dense_matrix(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """K = diag(k) of three digits, A first differences: |δx| ≤ 5e-3 |x|."""
+    n = 4000
+    k, f = np.round(np.random.default_rng(0).uniform(1.0, 2.0, n), 2), np.sin(np.arange(n) / 300)
+    A = sp.eye_array(n, n - 1) - sp.eye_array(n, n - 1, k=-1)
+    data = {"K": sp.csr_array(sp.diags_array(k)), "A": sp.csr_array(A), "f": f, "g": np.full(n - 1, 0.1)}
+    formats.FORMATS["npz"].write(tmp_path / "mine.npz", data)
+    monkeypatch.setattr(ComplianceProducts, "toarray", None)
+    solved, shown = StringIO(), StringIO()
+    solve(str(tmp_path / "mine.npz"), None, 1e-9, tmp_path / "answer", Console(file=solved, width=200))
+    monkeypatch.setattr(ReferenceProblem, "reference", None)
+    import_([str(tmp_path / "mine.npz")], tmp_path / "out.npz", Console(file=shown, width=200))
+    for said in (solved.getvalue(), shown.getvalue()):
+        (error,) = re.findall("seem to have 3 digits.* off by about (.*) mm, more", said)
+        assert 1e-3 < float(error) < 1e-2
 
 
 def test_an_op4_that_ends_early_has_whole_matrices_or_is_refused(tmp_path: Path) -> None:

@@ -185,7 +185,7 @@ def test_many_answers_are_proven_as_they_are(monkeypatch: pytest.MonkeyPatch) ->
     """Without a correction, and to no more than some times their error."""
     data, load, x, lam = beam(150, np.asfortranarray, 0)
     proof = proof_of(data)
-    monkeypatch.setattr(proof, "_corrections", None)
+    monkeypatch.setattr(proof, "corrections", None)
     noise = 1 + 1e-9 * np.random.default_rng(1).standard_normal((20, len(lam)))
     for each in assess(proof, [load] * 20, list(lam * noise), [None] * 20, enough_mm=1.0):
         assert abs(each.x - x).max() <= each.bound_mm <= 100 * abs(each.x - x).max()
@@ -281,13 +281,13 @@ def test_forces_near_the_answer_are_refined_to_rounding(
 def test_a_case_that_is_near_enough_is_not_refined_with_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     data, load, _, lam = beam(60, sp.csc_array, 0)
     proof, passes = proof_of(data), []
-    corrections = proof._corrections
+    corrections = proof.corrections
 
     def noted(r: np.ndarray, *others: Any) -> Any:
         passes.append(r.shape[1])
         return corrections(r, *others)
 
-    monkeypatch.setattr(proof, "_corrections", noted)
+    monkeypatch.setattr(proof, "corrections", noted)
     assert proof.proven([load], [lam * 1.001], enough_mm=1e9)[0].bound_mm <= 1e9
     assert not passes
     both = proof.proven([load, load], [lam, lam * 1.001], enough_mm=1e-7)
@@ -302,7 +302,7 @@ def test_a_correction_that_goes_beyond_zero_forces_is_not_believed(
     """x + dx and λ + dλ balance, but λ + dλ is negative: the pressed contact would be open."""
     proof, _ = springs(kind, 4.0, 16.0)
     steps = array(0.5, 0.0)[:, None] / proof.balanced.D, array(-2.0)[:, None] / proof.balanced.R
-    monkeypatch.setattr(proof, "_corrections", lambda *_: steps)
+    monkeypatch.setattr(proof, "corrections", lambda *_: steps)
     (found,) = proof.proven([LoadCase(array(5.0, 32.0), array(2.0))], [array(1.0)], [array(1.0, 2.0)], 1e-3)
     assert abs(found.x.hi - array(1.25, 2.0)).max() <= found.bound_mm
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from scipy.optimize import isotonic_regression
 from small import make_load, make_prepared, make_strips, solve_by_nnls
 from sparse_matrices import band_matrix, graph_matrix
 from test_matrices import write_mtx
@@ -152,3 +153,25 @@ def test_contacts_all_over_an_area_are_refused_with_the_reason() -> None:
     answer = session_of("mprgp", data).next(load, None)
     assert (answer.status, answer.lam) == ("failed", None)
     assert "all over an area" in answer.details["cause"]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_separate_unknowns_settle_in_a_few_products(order: int) -> None:
+    """Isotonic and convex regression, too many contacts for M = Q⁻¹. Against pool adjacent violators, and by
+    the optimality conditions."""
+    n = 4000
+    f = np.sin(np.arange(n) / 300) + 0.1 * np.random.default_rng(0).standard_normal(n)
+    A = sp.eye_array(n, format="csc")
+    for _ in range(order):
+        A = sp.csc_array(A[:, :-1] - A[:, 1:])
+    A, g = (-1) ** (order - 1) * A, np.full(A.shape[1], 1e-3 * (order - 1))
+    data = Prepared(Assembly(Stiffness.of(sp.eye_array(n, format="csc")), A))
+    answer = session_of("newton", data).next(LoadCase(f, g), None)
+    assert answer.status == "solved"
+    assert answer.iterations is not None
+    assert answer.iterations <= 30
+    x = f - A @ answer.lam
+    gap = g - A.T @ x
+    assert max(-gap.min(), abs(np.minimum(answer.lam, gap)).max()) < 1e-9
+    if order == 1:
+        np.testing.assert_allclose(x, isotonic_regression(f).x, atol=LIMIT_MM)
