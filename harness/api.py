@@ -83,7 +83,7 @@ def own_matrices(
     f : (n,) N. g : (m,) mm. nodes : (n, 2) mm, which `newton` uses to number the contacts.
     """
     given = {"f": f, "g": g} | ({} if nodes is None else {"nodes": nodes})
-    arrays = {name: M.copy() if sp.issparse(M) else np.array(M) for name, M in (("K", K), ("A", A))}
+    arrays = {name: M if sp.issparse(M) else np.asarray(M) for name, M in (("K", K), ("A", A))}
     arrays |= {name: np.array(value) for name, value in given.items()}
     sparse = sp.issparse(K) and K.shape[0] > SMALL
     assembly, load = checked(arrays, dict.fromkeys(arrays, title), sparse)

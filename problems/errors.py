@@ -11,11 +11,6 @@ CONTROL = re.compile("[\0-\x1f\x7f]")
 BACKSLASH = "; a backslash in TOML's double quotes begins an escape: write /, or single quotes"
 
 
-def unreadable(error: Exception) -> str:
-    """What a library says of a file that it cannot read, without Python's names."""
-    return "no file of this kind with numbers only" if "pickle" in str(error) else str(error) or "cut off"
-
-
 @dataclass(frozen=True)
 class Fault:
     """One error in an input. where : file or argument. key : the entry in it. allowed : valid values."""

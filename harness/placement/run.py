@@ -42,7 +42,7 @@ from problems.load_cases.random_gaps import RandomGaps
 from problems.model.scene import JointScene, Scene
 from problems.scene import read_scene, scene_of
 from problems.storage import digest
-from report.document.numbers import position
+from report.document.numbers import counted, position
 
 RECORD = "place.json"
 SERIES = ("own", "plan")
@@ -142,7 +142,7 @@ def _identity(study: Study, own: Plan, candidates: Plan, goal: Goal) -> dict[str
     holes = {"candidates": candidates, "the scene's fasteners": own}
     return {
         **asdict(goal),
-        **{name: f"{_counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
+        **{name: f"{counted(len(plan), 'place')}, hash {digest(plan)[:8]}" for name, plan in holes.items()},
         "scene_key": study.bare.key,
         "fastener": study.fastener.model_dump(mode="json", include={"preload", "between"}),
         "cases_key": study.cases.key,
@@ -193,7 +193,7 @@ def _record(
 def _kept(goal: Goal, sample: Sample, which: str = "") -> str:
     """3 fasteners keep 0.12 mm in 96.7 % of 300 fresh cases (95 % interval 94.0 to 98.4 %)"""
     step, cases = sample.step, len(sample.numbers)
-    plan = f"{which}{_counted(len(step.plan), 'fastener')} {'keeps' if len(step.plan) == 1 else 'keep'}"
+    plan = f"{which}{counted(len(step.plan), 'fastener')} {'keeps' if len(step.plan) == 1 else 'keep'}"
     digits = max(1, floor(1e-9 - log10(1 - goal.share))) if goal.share < 1 else 1
     share, low, high = (f"{100 * value:.{digits}f}" for value in (sample.kept / cases, *sample.interval))
     limit = f"{step.gap_mm:.3g}" if goal.limit_mm is None else f"{goal.limit_mm:g}"
@@ -211,7 +211,7 @@ def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
         left = _kept(goal, sample, which)
     else:
         leave = "leaves" if count == 1 else "leave"
-        left = f"{which}{_counted(count, 'fastener')} {leave} {step.gap_mm:.3g} mm in the one load case"
+        left = f"{which}{counted(count, 'fastener')} {leave} {step.gap_mm:.3g} mm in the one load case"
     if goal.limit_mm is None:
         return f"{left}, proven.", DONE
     if step.gap_mm <= goal.limit_mm:
@@ -225,10 +225,6 @@ def _said(found: Found, goal: Goal, nodes: Matrix) -> tuple[str, int]:
     return f"FAIL: {left}, {more}; case {worst} is the worst, at {place}.", GAP_EXCEEDED
 
 
-def _counted(number: int, word: str) -> str:
-    return f"{number} {word}{'s' * (number != 1)}"
-
-
 @contextmanager
 def _showing(console: Console) -> Iterator[Callable[[Step], None]]:
     """Shows each plan that is kept, as a line of its own if the console is no terminal."""
@@ -236,8 +232,8 @@ def _showing(console: Console) -> Iterator[Callable[[Step], None]]:
         numbers = count(1)
 
         def said(step: Step) -> None:
-            proven = _counted(next(numbers), "plan")
-            plan = f"{_counted(len(step.plan), 'fastener')}, {step.moved}"
+            proven = counted(next(numbers), "plan")
+            plan = f"{counted(len(step.plan), 'fastener')}, {step.moved}"
             line = f"{plan}: {step.gap_mm:.3g} mm ({proven} proven)"
             if console.is_terminal:
                 status.update(line)

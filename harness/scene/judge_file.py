@@ -15,10 +15,11 @@ from harness.terminal import DONE, FAILED, NOTHING_JUDGED
 from harness.terminal.console import STYLES
 from harness.verification.judge import Judgement
 from harness.verification.reference_problem import ReferenceProblem, reference_problem
-from problems.errors import InputError, unreadable
+from problems.errors import InputError
 from problems.forms import Form
 from problems.forms.assembly import Vector
 from problems.input.bounded import regular_file
+from problems.input.matrix_files import damage
 from problems.input.tables import Cells, doubt, is_stray, number
 from report.document.numbers import position
 
@@ -120,7 +121,7 @@ def read_answer(path: Path) -> dict[str, Vector]:
     except InputError:
         raise
     except Exception as error:  # numpy, zipfile and csv raise kinds of their own
-        raise InputError.one(path, "file", unreadable(error), ALLOWED) from error
+        raise InputError.one(path, "file", damage(error), ALLOWED) from error
     if not found:
         wanted = " or ".join(each for headings in HEADINGS.values() for each in headings)
         raise InputError.one(path, "names", names, wanted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -59,10 +60,16 @@ class MeasuredGap(ContactEffect, GapEffect):
 
     def _at(self, nodes: Matrix) -> tuple[Vector, Vector]:
         """Gaps, and the distances of `beyond`."""
-        points = np.array(self.points)
-        points = points[np.lexsort(points.T[::-1])]
-        surface = Triangles.of(points[:, :2], holes=False)
+        surface, gaps = _surface(self.points)
         distance, nearest = surface.tree.query(nodes - surface.middle)
         W = surface.weights(nodes)
         outside = W.sum(axis=1) == 0
-        return np.where(outside, points[nearest, 2], W @ points[:, 2]), np.where(outside, distance, 0.0)
+        return np.where(outside, gaps[nearest], W @ gaps), np.where(outside, distance, 0.0)
+
+
+@lru_cache(maxsize=2)
+def _surface(points: tuple[tuple[float, float, float], ...]) -> tuple[Triangles, Vector]:
+    """The surface through the points, and their gaps in the order of its nodes."""
+    ordered = np.array(points)
+    ordered = ordered[np.lexsort(ordered.T[::-1])]
+    return Triangles.of(ordered[:, :2], holes=False), ordered[:, 2]

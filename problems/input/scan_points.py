@@ -29,10 +29,18 @@ SHOWN = 10
 
 
 def crowded(points: Matrix) -> list[tuple[int, int]]:
-    """The pairs (i, k), i < k, of points (n, 2) that are at one place."""
+    """Pairs (i, k), i < k, of points (n, 2) at one place: the first two of equal ones, and each place with
+    the nearest other one. A scanner that saw nothing may write thousands of equal points.
+    """
     from scipy.spatial import cKDTree
 
-    return sorted(cKDTree(points).query_pairs(CLOSE))
+    places, first, of = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    again = np.setdiff1d(np.arange(len(points)), first)
+    equal, second = np.unique(of.ravel()[again], return_index=True)
+    pairs = {*zip(first[equal].tolist(), again[second].tolist(), strict=True)}
+    apart, near = cKDTree(places).query(places, 2)
+    pairs |= {(min(pair), max(pair)) for pair in map(tuple, first[near[apart[:, 1] <= CLOSE]].tolist())}
+    return sorted(pairs)
 
 
 def neighbours(points: Matrix) -> Indices:

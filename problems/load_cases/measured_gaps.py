@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from problems.build import load_case
-from problems.errors import Fault, InputError, unreadable
+from problems.errors import Fault, InputError
 from problems.forms import Form
 from problems.forms.assembly import LoadCase, Matrix, Vector
 from problems.input.bounded import regular_file
+from problems.input.matrix_files import damage
 from problems.input.scan_points import neighbours, outliers
 from problems.model.effect import GapEffect
 from problems.model.scene import JointScene, Scene
@@ -128,7 +129,7 @@ def _read(path: Path, m: int) -> Matrix:
     except InputError:
         raise
     except Exception as error:  # and zipfile raise their own kinds
-        raise InputError.one(path, "file", unreadable(error), "a readable table of numbers") from error
+        raise InputError.one(path, "file", damage(error), "a readable table of numbers") from error
     raise InputError.one(path, "file", suffix, "a .csv, .npz or .npy")
 
 

@@ -105,7 +105,7 @@ class JointScene(Scene):
     def expected_size(self) -> tuple[int, int]:
         return self.joint.size
 
-    @property
+    @cached_property
     def unusual(self) -> list[str]:
         """A sentence on each parameter that may be, but is rarely meant."""
         found = [("joint", self.joint.unusual())]

@@ -11,7 +11,7 @@ from problems.effects.fasteners import Fasteners
 from problems.effects.initial_gap import InitialGap
 from problems.effects.measured_gap import MeasuredGap
 from problems.errors import InputError
-from problems.input.scan_points import unlike
+from problems.input.scan_points import crowded, unlike
 from problems.input.tables import read_columns
 from problems.load_cases.measured_gaps import measured_gaps
 from problems.load_cases.random_gaps import random_gaps
@@ -249,3 +249,9 @@ def test_lines_above_a_table_are_skipped(tmp_path: Path) -> None:
     for key, wrong in (("skip_lines", -1), ("missing", 9999)):
         (fault,) = EffectTable(tmp_path / "scene.toml", 0, table | {key: wrong}).read()
         assert fault.key == f"effect[0] (measured_gap).{key}"
+
+
+def test_thousands_of_equal_points_are_one_fault() -> None:
+    """A scanner that saw nothing: all pairs of them would not fit into memory."""
+    points = np.vstack([np.zeros((20_000, 2)), [[5.0, 5.0], [5.0, 5.009], [7.0, 7.0], [7.0, 7.02]]])
+    assert crowded(points) == [(0, 1), (20_000, 20_001)]
