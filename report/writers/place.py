@@ -95,9 +95,10 @@ def _curve(record: dict[str, Any], steps: pd.DataFrame) -> Figure:
     for name, (text, colour, marker, line) in FAMILIES.items():
         own = steps[steps["moved"] == name].sort_values("fasteners")
         if len(own):
-            axes.plot(
-                own["fasteners"], own["gap_mm"], marker=marker, linestyle=line, color=colour, label=text, ms=5
-            )
+            look: dict[str, Any] = {"marker": marker, "linestyle": line, "color": colour, "ms": 5}
+            # What the search found may be a uniform plan, too: it stays visible.
+            look |= {"ms": 9, "zorder": 2} if name == "uniform" else {"zorder": 3}
+            axes.plot(own["fasteners"], own["gap_mm"], label=text, **look)
     if record["limit_mm"] is not None:
         axes.axhline(record["limit_mm"], color=style.GREY, linewidth=1, label="the limit")
     axes.set(xlabel="fasteners", ylabel="largest gap, mm", xlim=(0, None), yscale="log")
